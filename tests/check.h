@@ -1,0 +1,66 @@
+/* The check macro, the random numbers and the counters that all tests share. */
+#ifndef CHECK_H
+#define CHECK_H
+
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static int check_passed, check_failed, check_skipped;
+static int check_bad; /* failed checks within the running test */
+
+/* Notes a failed condition and goes on; at most three lines a test. */
+#define CHECK(condition)                                                                 \
+    do {                                                                                 \
+        if (!(condition) && check_bad++ < 3)                                             \
+            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, __func__, #condition); \
+    } while (0)
+
+/* Runs one test function; its name says the behaviour. */
+#define RUN(test)                                                    \
+    do {                                                             \
+        check_bad = 0;                                               \
+        test();                                                      \
+        if (check_bad)                                               \
+            fprintf(stderr, "FAILED %s (%d)\n", #test, check_bad);   \
+        check_failed += check_bad != 0;                              \
+        check_passed += check_bad == 0;                              \
+    } while (0)
+
+/* A test that cannot run here says why and counts as skipped. */
+#define SKIP(why) (printf("skipped %s: %s\n", __func__, why), check_skipped++, check_passed--)
+
+static uint32_t check_state = 2463534242u;
+
+/* Uniform 32-bit numbers (Marsaglia's xorshift), the same on every machine. */
+static uint32_t random_bits(void)
+{
+    check_state ^= check_state << 13;
+    check_state ^= check_state >> 17;
+    check_state ^= check_state << 5;
+    return check_state;
+}
+
+/* Uniform in [low, high). */
+static float random_float(float low, float high)
+{
+    return low + (high - low) * (float)(random_bits() >> 8) * (1.0f / 16777216.0f);
+}
+
+/* Uniform in [low, high]. */
+static uint32_t random_range(uint32_t low, uint32_t high)
+{
+    return low + random_bits() % (high - low + 1u);
+}
+
+/* Prints the closing line; returns the exit code. */
+static int check_report(void)
+{
+    printf("%d passed, %d failed", check_passed, check_failed);
+    if (check_skipped)
+        printf(", %d skipped", check_skipped);
+    printf("\n");
+    return check_failed != 0;
+}
+
+#endif

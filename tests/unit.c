@@ -1,0 +1,39 @@
+/* All unit tests: header only, no graphics.
+   Build: cc -std=c99 -I. tests/unit.c -lm -o unit && ./unit
+   Expect: a last line `N passed, 0 failed`, in less than 10 s. */
+#include <stdlib.h>
+
+/* Every allocation of the library is counted: what says it allocates nothing is held to it. */
+static size_t unit_allocations;
+
+static void *unit_malloc(size_t bytes)
+{
+    unit_allocations++;
+    return malloc(bytes);
+}
+
+#define TERRIMP_MALLOC(bytes) unit_malloc(bytes)
+#define TERRIMP_FREE(pointer) free(pointer)
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+
+#include "check.h"
+#include "unit_heightfield.h"
+#include "unit_simplifier.h"
+#include "unit_camera.h"
+#include "unit_impostor.h"
+#include "unit_atlas.h"
+#include "unit_terrain.h"
+#include "unit_bad_input.h"
+
+int main(void)
+{
+    heightfield_tests();
+    simplifier_tests();
+    camera_tests();
+    impostor_tests();
+    atlas_tests();
+    terrain_tests();
+    bad_input_tests();
+    return check_report();
+}
