@@ -1,0 +1,439 @@
+/* Flies a camera over a large terrain and draws it with terrain impostors, through OpenGL without a
+   window. Leaves pictures, a table with a line a frame, and a summary.
+   Build:  make flyover
+   Use:    flyover --dem N42E001.hgt --frames 300 --out pictures --save-every 100 --compare
+   Expect: `key value` lines; with --compare, PSNR and speed-up against the full mesh. */
+#define _POSIX_C_SOURCE 200112L /* isatty, mkdir */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+
+#include "host/context.h"
+#include "host/dem.h"
+#include "host/flight.h"
+#include "host/gl_terrain.h"
+#include "host/image.h"
+#include "host/lightmap.h"
+#include "host/options.h"
+#include "host/procedural.h"
+#include "host/stats.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define DEGREE 0.017453293f
+
+/* A way of drawing the terrain, with the times it took. */
+typedef struct contender {
+    const char *name;
+    terrimp_view *view;
+    terrimp_stats now;  /* of the newest frame */
+    stats ms;
+    uint8_t *picture;   /* of the newest frame that was read back */
+} contender;
+
+typedef struct flyover {
+    options options;
+    dem dem;                      /* owns the samples of the field */
+    terrimp_heightfield field;
+    terrimp_terrain *terrain;
+    terrimp_terrain_info info;
+    context context;
+    gl_terrain gl;
+    flight flight;
+    contender chosen, full;       /* full takes part with --compare only */
+    FILE *table;
+    stats psnr, psnr_terrain;     /* of each compared frame [dB] */
+    double captures, captured_texels, captured_triangles, triangles, draws;
+    float worst_parallax_px;
+    uint32_t repacks;
+} flyover;
+
+/* Says what is wrong, in one line, and ends the program. */
+static void stop(const char *trouble)
+{
+    fprintf(stderr, "flyover: %s\n", trouble);
+    exit(2);
+}
+
+static void stop_file(const char *path, const char *trouble)
+{
+    fprintf(stderr, "flyover: %s: %s\n", path, trouble);
+    exit(2);
+}
+
+static void need(terrimp_result result)
+{
+    if (result != TERRIMP_OK)
+        stop(terrimp_result_text((int)result));
+}
+
+static void *allocate(size_t bytes)
+{
+    void *memory = malloc(bytes);
+    if (!memory)
+        stop("out of memory");
+    return memory;
+}
+
+/* ---- The terrain -------------------------------------------------------- */
+
+/* Samples from a file; voids are filled in place. */
+static void load_dem(flyover *f)
+{
+    size_t bytes, filled;
+    void *scratch;
+    if (!dem_load(&f->dem, f->options.dem, &f->options.file))
+        stop(f->dem.error);
+    f->field = dem_heightfield(&f->dem);
+    bytes = terrimp_heightfield_fill_voids_scratch_bytes(f->dem.width, f->dem.depth);
+    scratch = allocate(bytes);
+    need(terrimp_heightfield_fill_voids(&f->field, f->dem.samples, scratch, bytes, &filled));
+    free(scratch);
+    f->field.has_no_data = 0;
+    printf("voids_filled %zu\n", filled);
+}
+
+static void make_procedural(flyover *f)
+{
+    uint32_t size = f->options.terrain_size;
+    f->dem.samples = procedural_terrain(size, size, f->options.seed);
+    if (!f->dem.samples)
+        stop("no memory for the terrain");
+    f->dem.width = f->dem.depth = size;
+    f->dem.format = TERRIMP_FORMAT_U16;
+    f->dem.spacing_x = f->dem.spacing_z = 1.0f;
+    f->field = dem_heightfield(&f->dem);
+    f->field.height_scale = PROCEDURAL_HEIGHT_SCALE;
+}
+
+static void build_terrain(flyover *f)
+{
+    terrimp_terrain_desc desc;
+    double start;
+    if (f->options.dem)
+        load_dem(f);
+    else
+        make_procedural(f);
+    if (f->options.spacing[0] > 0.0f) {
+        f->field.spacing_x = f->options.spacing[0];
+        f->field.spacing_z = f->options.spacing[1];
+    }
+    if (f->options.height_scale > 0.0f)
+        f->field.height_scale = f->options.height_scale;
+    memset(&desc, 0, sizeof desc);
+    desc.field = f->field;
+    desc.chunk_quads = f->options.chunk;
+    start = clock_ms();
+    need(terrimp_terrain_create(&desc, NULL, &f->terrain));
+    need(terrimp_terrain_get_info(f->terrain, &f->info));
+    printf("samples %ux%u\nchunks %u\nbuild_ms %.1f\n", f->field.width, f->field.depth,
+           f->info.chunks_x * f->info.chunks_z, clock_ms() - start);
+}
+
+static void open_graphics(flyover *f, uint32_t atlas_size)
+{
+    uint8_t *lightmap = lightmap_bake(&f->field);
+    const char *trouble;
+    if (!lightmap)
+        stop("no memory for the lightmap");
+    trouble = context_open(&f->context, (int)f->options.width, (int)f->options.height);
+    if (!trouble)
+        trouble = gl_terrain_open(&f->gl, &f->context, f->terrain, &f->field, lightmap, atlas_size);
+    if (trouble)
+        stop(trouble);
+    free(lightmap);
+    printf("renderer %s\n", context_renderer());
+}
+
+/* ---- The views and the flight ------------------------------------------- */
+
+/* Returns the side of the view's atlases. */
+static uint32_t open_contender(flyover *f, contender *c, const char *name, int mode)
+{
+    terrimp_view_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.mode = mode;
+    desc.fade_start = f->options.fade[0];
+    desc.fade_end = f->options.fade[1];
+    desc.max_angle_rad = f->options.max_angle_degrees * DEGREE;
+    desc.tolerance_px = f->options.tolerance;
+    desc.texels_per_px = f->options.texels;
+    desc.atlas_size = f->options.atlas;
+    desc.max_captures = f->options.max_captures;
+    c->name = name;
+    c->picture = allocate((size_t)f->options.width * f->options.height * 3);
+    need(terrimp_view_desc_resolve(f->terrain, &desc, &desc));
+    need(terrimp_view_create(f->terrain, &desc, NULL, &c->view));
+    return desc.atlas_size;
+}
+
+static void plan_flight(flyover *f)
+{
+    float speed = f->options.speed, spacing = f->dem.spacing_x;
+    size_t count = f->options.frames;
+    int ok;
+    if (f->options.spacing[0] > 0.0f)
+        spacing = f->options.spacing[0];
+    if (!(speed > 0.0f))
+        speed = 80.0f * spacing;
+    if (f->options.path)
+        ok = flight_load(&f->flight, f->options.path);
+    else
+        ok = flight_circle(&f->flight, &f->field, count ? count : 600, speed / f->options.fps);
+    if (!ok)
+        stop(f->flight.error);
+    if (count && count < f->flight.count)
+        f->flight.count = count;
+}
+
+/* The camera of a frame; its clip distances hold the whole terrain. */
+static terrimp_camera camera_of(const flyover *f, size_t frame)
+{
+    const flight_pose *pose = &f->flight.poses[frame];
+    terrimp_camera camera;
+    int i;
+    memset(&camera, 0, sizeof camera);
+    for (i = 0; i < 3; i++) {
+        camera.eye[i] = pose->eye[i];
+        camera.forward[i] = pose->target[i] - pose->eye[i];
+    }
+    camera.fov_y_rad = f->options.fov_degrees * DEGREE;
+    camera.width_px = f->options.width;
+    camera.height_px = f->options.height;
+    camera.z_far = terrimp_box_farthest(&f->info.box, camera.eye) * 1.2f;
+    camera.z_near = camera.z_far * (1.0f / 8192.0f);
+    return camera;
+}
+
+/* ---- A frame ------------------------------------------------------------ */
+
+/* Brings the clip distances to what the update says is needed: the depth buffer's precision goes
+   where there is something to draw. */
+static void tighten(terrimp_camera *camera, const terrimp_stats *now)
+{
+    float up = tanf(0.5f * camera->fov_y_rad);
+    float right = up * (float)camera->width_px / (float)camera->height_px;
+    float corner = 1.0f / sqrtf(1.0f + up * up + right * right); /* depth of a ray of length 1 */
+    if (now->z_near * corner > camera->z_near)
+        camera->z_near = now->z_near * corner;
+    if (now->z_far > camera->z_near)
+        camera->z_far = now->z_far * 1.01f;
+}
+
+/* Draws a frame; what is timed is all that a host would do for it. */
+static double draw_frame(flyover *f, contender *c, terrimp_camera camera)
+{
+    terrimp_callbacks callbacks = gl_terrain_callbacks(&f->gl);
+    double start = clock_ms(), ms;
+    need(terrimp_view_update(c->view, &camera));
+    need(terrimp_view_get_stats(c->view, &c->now));
+    tighten(&camera, &c->now);
+    need(gl_terrain_begin(&f->gl, &camera, f->options.sky));
+    need(terrimp_view_render(c->view, &callbacks));
+    gl_terrain_end(&f->gl);
+    ms = clock_ms() - start;
+    stats_add(&c->ms, ms);
+    return ms;
+}
+
+static void write_picture(const flyover *f, const char *name, size_t frame, const uint8_t *rgb,
+                          int width, int height)
+{
+    char path[1024];
+    const char *trouble;
+    snprintf(path, sizeof path, "%s/%05zu_%s.png", f->options.out, frame, name);
+    trouble = image_write_png(path, rgb, width, height);
+    if (trouble)
+        stop_file(path, trouble);
+}
+
+/* Saves the frame just drawn, with its outlines and atlases if they are wanted. */
+static void save_frame(flyover *f, contender *c, size_t frame)
+{
+    int width = (int)f->options.width, height = (int)f->options.height, i;
+    write_picture(f, c->name, frame, c->picture, width, height);
+    if (f->options.wireframe) {
+        uint8_t *lines = allocate((size_t)width * (size_t)height * 3);
+        char name[64];
+        need(gl_terrain_wireframe(&f->gl, c->view));
+        context_read(&f->context, lines);
+        snprintf(name, sizeof name, "%s_wireframe", c->name);
+        write_picture(f, name, frame, lines, width, height);
+        free(lines);
+    }
+    for (i = 0; f->options.show_atlas && c == &f->chosen && i < 2; i++) {
+        int side = f->gl.atlas_size;
+        uint8_t *atlas = allocate((size_t)side * (size_t)side * 3);
+        if (gl_terrain_read_atlas(&f->gl, i, atlas))
+            write_picture(f, i ? "atlas_1" : "atlas_0", frame, atlas, side, side);
+        free(atlas);
+    }
+}
+
+static double run_contender(flyover *f, contender *c, const terrimp_camera *camera, size_t frame)
+{
+    double ms = draw_frame(f, c, *camera);
+    int saved = f->options.out && options_saves(&f->options, (uint32_t)frame);
+    if (saved || f->options.compare)
+        context_read(&f->context, c->picture);
+    if (saved)
+        save_frame(f, c, frame);
+    return ms;
+}
+
+/* How far the chosen mode's picture is from the full one's. */
+static void compare(flyover *f, size_t frame)
+{
+    size_t pixels = (size_t)f->options.width * f->options.height;
+    const uint8_t *a = f->chosen.picture, *b = f->full.picture;
+    stats_add(&f->psnr, image_psnr(image_mean_square(a, b, pixels, NULL)));
+    stats_add(&f->psnr_terrain, image_psnr(image_mean_square(a, b, pixels, f->options.sky)));
+    if (f->options.out && options_saves(&f->options, (uint32_t)frame)) {
+        image_difference(a, b, pixels, 1, f->chosen.picture);
+        write_picture(f, "difference", frame, f->chosen.picture, (int)f->options.width,
+                      (int)f->options.height);
+    }
+}
+
+/* ---- Figures ------------------------------------------------------------ */
+
+static void open_table(flyover *f)
+{
+    if (!f->options.stats)
+        return;
+    f->table = fopen(f->options.stats, "w");
+    if (!f->table)
+        stop_file(f->options.stats, strerror(errno));
+    fprintf(f->table, "frame\tms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+                      "captured_triangles\tvisible_chunks%s\n",
+            f->options.compare ? "\tfull_ms\tpsnr\tpsnr_terrain" : "");
+}
+
+static void note_frame(flyover *f, size_t frame, double ms, double full_ms)
+{
+    const terrimp_stats *s = &f->chosen.now;
+    f->captures += s->captures;
+    f->captured_texels += s->captured_texels;
+    f->captured_triangles += s->captured_triangles;
+    f->triangles += s->triangles;
+    f->draws += s->draws;
+    f->repacks = s->repacks;
+    if (s->worst_parallax_px > f->worst_parallax_px)
+        f->worst_parallax_px = s->worst_parallax_px;
+    if (!f->table)
+        return;
+    fprintf(f->table, "%zu\t%.3f\t%u\t%u\t%u\t%u\t%u\t%u", frame, ms, s->triangles, s->draws,
+            s->captures, s->captured_texels, s->captured_triangles, s->visible);
+    if (f->options.compare)
+        fprintf(f->table, "\t%.3f\t%.2f\t%.2f", full_ms, f->psnr.values[f->psnr.count - 1],
+                f->psnr_terrain.values[f->psnr_terrain.count - 1]);
+    fprintf(f->table, "\n");
+}
+
+static void show_progress(const flyover *f, size_t frame, double ms)
+{
+    if (isatty(2))
+        fprintf(stderr, "\rframe %zu of %zu, %.1f ms%s", frame + 1, f->flight.count, ms,
+                frame + 1 == f->flight.count ? "        \n" : "        ");
+}
+
+static double smallest(const stats *s)
+{
+    double least = s->values[0];
+    size_t i;
+    for (i = 1; i < s->count; i++)
+        if (s->values[i] < least)
+            least = s->values[i];
+    return least;
+}
+
+static void print_summary(const flyover *f)
+{
+    double frames = (double)f->flight.count;
+    stats_summary summary = stats_summarise(&f->chosen.ms);
+    printf("mode %s\nframes %.0f\n", f->options.mode, frames);
+    stats_print(stdout, "ms", summary);
+    printf("ms_first %.3f\n", f->chosen.ms.values[0]);
+    printf("triangles_mean %.0f\ndraws_mean %.1f\n", f->triangles / frames, f->draws / frames);
+    printf("captures_mean %.2f\ncaptured_texels_mean %.0f\ncaptured_triangles_mean %.0f\n",
+           f->captures / frames, f->captured_texels / frames, f->captured_triangles / frames);
+    printf("repacks %u\nworst_parallax_px %.3f\n", f->repacks, (double)f->worst_parallax_px);
+    if (f->options.compare) {
+        stats_summary full = stats_summarise(&f->full.ms);
+        stats_print(stdout, "full_ms", full);
+        printf("psnr_mean %.2f\npsnr_worst %.2f\n", stats_summarise(&f->psnr).mean,
+               smallest(&f->psnr));
+        printf("psnr_terrain_mean %.2f\npsnr_terrain_worst %.2f\n",
+               stats_summarise(&f->psnr_terrain).mean, smallest(&f->psnr_terrain));
+        printf("speed_up %.2f\n", full.median / summary.median);
+    }
+}
+
+/* ---- All of it ---------------------------------------------------------- */
+
+static void fly(flyover *f)
+{
+    size_t frame;
+    for (frame = 0; frame < f->flight.count; frame++) {
+        terrimp_camera camera = camera_of(f, frame);
+        double ms = run_contender(f, &f->chosen, &camera, frame), full_ms = 0.0;
+        if (f->options.compare) {
+            full_ms = run_contender(f, &f->full, &camera, frame);
+            compare(f, frame);
+        }
+        note_frame(f, frame, ms, full_ms);
+        show_progress(f, frame, ms);
+    }
+}
+
+static void close_contender(contender *c)
+{
+    terrimp_view_destroy(c->view);
+    stats_free(&c->ms);
+    free(c->picture);
+}
+
+static void close_all(flyover *f)
+{
+    if (f->table && fclose(f->table) != 0)
+        stop("the table could not be written to its end");
+    close_contender(&f->chosen);
+    close_contender(&f->full);
+    stats_free(&f->psnr);
+    stats_free(&f->psnr_terrain);
+    flight_free(&f->flight);
+    gl_terrain_close(&f->gl);
+    context_close(&f->context);
+    terrimp_terrain_destroy(f->terrain);
+    dem_free(&f->dem);
+}
+
+int main(int argc, char **argv)
+{
+    static flyover f; /* all zero */
+    uint32_t atlas_size;
+    if (!options_parse(&f.options, argc, argv))
+        stop(f.options.error);
+    if (f.options.help) {
+        options_print_help(stdout);
+        return 0;
+    }
+    build_terrain(&f);
+    plan_flight(&f);
+    atlas_size = open_contender(&f, &f.chosen, f.options.mode, f.options.terrimp_mode);
+    if (f.options.compare)
+        open_contender(&f, &f.full, "full", TERRIMP_MODE_FULL);
+    open_graphics(&f, atlas_size);
+    if (f.options.out && mkdir(f.options.out, 0777) != 0 && errno != EEXIST)
+        stop_file(f.options.out, strerror(errno));
+    open_table(&f);
+    fly(&f);
+    print_summary(&f);
+    close_all(&f);
+    return 0;
+}

@@ -1,0 +1,217 @@
+#include "context.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The windowless system: system_open makes a context current and stores what system_close
+   needs; both are written once for OSMesa and once for EGL. */
+
+#if defined(HOST_OSMESA)
+
+#include <GL/osmesa.h>
+
+#define SYSTEM_NAME "OSMesa"
+
+/* OSMesa insists on a buffer of its own; nothing is ever drawn into it. */
+typedef struct osmesa_system {
+    OSMesaContext context;
+    uint8_t unused_frame[4 * 4 * 4];
+} osmesa_system;
+
+static void system_close(void *system)
+{
+    osmesa_system *s = system;
+    OSMesaDestroyContext(s->context);
+    free(s);
+}
+
+static const char *system_open(void **system)
+{
+    static const int attributes[] = { OSMESA_FORMAT, OSMESA_RGBA,
+                                      OSMESA_DEPTH_BITS, 24,
+                                      OSMESA_PROFILE, OSMESA_CORE_PROFILE,
+                                      OSMESA_CONTEXT_MAJOR_VERSION, 3,
+                                      OSMESA_CONTEXT_MINOR_VERSION, 3, 0 };
+    osmesa_system *s = calloc(1, sizeof *s);
+    if (!s)
+        return "out of memory";
+    s->context = OSMesaCreateContextAttribs(attributes, NULL);
+    if (!s->context) {
+        free(s);
+        return "OSMesa gives no OpenGL 3.3 context";
+    }
+    if (!OSMesaMakeCurrent(s->context, s->unused_frame, GL_UNSIGNED_BYTE, 4, 4)) {
+        system_close(s);
+        return "OSMesa does not make its context current";
+    }
+    *system = s;
+    return NULL;
+}
+
+#elif defined(HOST_EGL)
+
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+
+#define SYSTEM_NAME "EGL"
+
+typedef struct egl_system {
+    EGLDisplay display;
+    EGLContext context;
+} egl_system;
+
+static void system_close(void *system)
+{
+    egl_system *s = system;
+    eglMakeCurrent(s->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    if (s->context != EGL_NO_CONTEXT)
+        eglDestroyContext(s->display, s->context);
+    eglTerminate(s->display);
+    free(s);
+}
+
+/* Mesa's surfaceless platform needs neither a display server nor a graphics card. */
+static EGLDisplay surfaceless_display(void)
+{
+    PFNEGLGETPLATFORMDISPLAYEXTPROC get_platform_display =
+        (PFNEGLGETPLATFORMDISPLAYEXTPROC)eglGetProcAddress("eglGetPlatformDisplayEXT");
+    EGLDisplay display = EGL_NO_DISPLAY;
+    if (get_platform_display)
+        display = get_platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
+    return display != EGL_NO_DISPLAY ? display : eglGetDisplay(EGL_DEFAULT_DISPLAY);
+}
+
+static const char *make_egl_context(egl_system *s)
+{
+    static const EGLint config_attributes[] = { EGL_SURFACE_TYPE, EGL_PBUFFER_BIT,
+                                                EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE };
+    static const EGLint attributes[] = { EGL_CONTEXT_MAJOR_VERSION, 3,
+                                         EGL_CONTEXT_MINOR_VERSION, 3,
+                                         EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE };
+    EGLConfig config;
+    EGLint configs = 0;
+    if (!eglBindAPI(EGL_OPENGL_API))
+        return "EGL has no desktop OpenGL";
+    if (!eglChooseConfig(s->display, config_attributes, &config, 1, &configs) || configs < 1)
+        return "EGL has no configuration for OpenGL";
+    s->context = eglCreateContext(s->display, config, EGL_NO_CONTEXT, attributes);
+    if (s->context == EGL_NO_CONTEXT)
+        return "EGL gives no OpenGL 3.3 context";
+    if (!eglMakeCurrent(s->display, EGL_NO_SURFACE, EGL_NO_SURFACE, s->context))
+        return "EGL cannot make a context current without a surface";
+    return NULL;
+}
+
+static const char *system_open(void **system)
+{
+    const char *trouble;
+    egl_system *s = calloc(1, sizeof *s);
+    if (!s)
+        return "out of memory";
+    s->context = EGL_NO_CONTEXT;
+    s->display = surfaceless_display();
+    if (s->display == EGL_NO_DISPLAY || !eglInitialize(s->display, NULL, NULL)) {
+        free(s);
+        return "EGL has no display without a window";
+    }
+    trouble = make_egl_context(s);
+    if (trouble) {
+        system_close(s);
+        return trouble;
+    }
+    *system = s;
+    return NULL;
+}
+
+#else
+#error "say -DHOST_OSMESA or -DHOST_EGL"
+#endif
+
+static GLuint attach_renderbuffer(GLenum attachment, GLenum format, int width, int height)
+{
+    GLuint buffer;
+    glGenRenderbuffers(1, &buffer);
+    glBindRenderbuffer(GL_RENDERBUFFER, buffer);
+    glRenderbufferStorage(GL_RENDERBUFFER, format, width, height);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, buffer);
+    return buffer;
+}
+
+static const char *make_framebuffer(context *c)
+{
+    GLint limit = 0;
+    glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &limit);
+    if (c->width > limit || c->height > limit)
+        return "the frame is larger than OpenGL's limit";
+    c->reading = malloc((size_t)c->width * (size_t)c->height * 4u);
+    if (!c->reading)
+        return "out of memory";
+    glGenFramebuffers(1, &c->framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, c->framebuffer);
+    c->colour = attach_renderbuffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, c->width, c->height);
+    c->depth = attach_renderbuffer(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT24, c->width, c->height);
+    if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+        return "the frame's framebuffer is not complete";
+    return NULL;
+}
+
+const char *context_open(context *c, int width, int height)
+{
+    const char *trouble;
+    memset(c, 0, sizeof *c);
+    c->width = width;
+    c->height = height;
+    if (width < 1 || height < 1)
+        return "the frame needs at least one pixel";
+    trouble = system_open(&c->system);
+    if (!trouble)
+        trouble = make_framebuffer(c);
+    if (trouble)
+        context_close(c);
+    else
+        context_bind(c);
+    return trouble;
+}
+
+void context_bind(const context *c)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, c->framebuffer);
+    glViewport(0, 0, c->width, c->height);
+}
+
+void context_read(const context *c, uint8_t *rgb)
+{
+    int row, column;
+    glBindFramebuffer(GL_FRAMEBUFFER, c->framebuffer);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, c->width, c->height, GL_RGBA, GL_UNSIGNED_BYTE, c->reading);
+    for (row = 0; row < c->height; row++) { /* OpenGL's first row is the bottom one */
+        const uint8_t *from = c->reading + (size_t)(c->height - 1 - row) * (size_t)c->width * 4u;
+        for (column = 0; column < c->width; column++, from += 4, rgb += 3) {
+            rgb[0] = from[0];
+            rgb[1] = from[1];
+            rgb[2] = from[2];
+        }
+    }
+}
+
+const char *context_renderer(void)
+{
+    static char name[160];
+    snprintf(name, sizeof name, "%s: %s", SYSTEM_NAME, (const char *)glGetString(GL_RENDERER));
+    return name;
+}
+
+void context_close(context *c)
+{
+    if (c->system) {
+        glDeleteFramebuffers(1, &c->framebuffer);
+        glDeleteRenderbuffers(1, &c->colour);
+        glDeleteRenderbuffers(1, &c->depth);
+        system_close(c->system);
+    }
+    free(c->reading);
+    memset(c, 0, sizeof *c);
+}

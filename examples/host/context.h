@@ -1,0 +1,34 @@
+/* An OpenGL 3.3 context without a window, and one framebuffer to draw frames into.
+   OSMesa (-DHOST_OSMESA) or EGL without a surface (-DHOST_EGL): only context.c knows which. */
+#ifndef HOST_CONTEXT_H
+#define HOST_CONTEXT_H
+
+#include "gl.h"
+
+#include <stdint.h>
+
+typedef struct context {
+    int width, height;     /* of the frame, pixels */
+    GLuint framebuffer;    /* RGBA8 colour with 24-bit depth, own making: alike on both systems */
+    GLuint colour, depth;  /* its renderbuffers */
+    uint8_t *reading;      /* RGBA rows on their way to context_read */
+    void *system;          /* what the windowless system keeps */
+} context;
+
+/* Makes a context current and binds its framebuffer, width x height pixels.
+   Returns null, or one line that says what is missing. */
+const char *context_open(context *c, int width, int height);
+
+/* Draw calls go to the frame again (after a capture); the viewport is all of it. */
+void context_bind(const context *c);
+
+/* Waits for the frame and copies it to rgb[height][width][3], top row first. */
+void context_read(const context *c, uint8_t *rgb);
+
+/* The renderer's own name, and the system under it, e.g. "OSMesa: llvmpipe (...)". */
+const char *context_renderer(void);
+
+/* Frees everything; fine after a failed open, and twice. */
+void context_close(context *c);
+
+#endif

@@ -1,0 +1,556 @@
+#include "gl_terrain.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- Shaders ------------------------------------------------------------ */
+
+/* All positions are taken relative to the eye first: large coordinates keep their precision. */
+static const char ground_vertex[] =
+    "#version 330 core\n"
+    "in vec3 position;\n"
+    "uniform mat4 matrix;\n"
+    "uniform vec3 eye;\n"
+    "uniform float scale;\n"
+    "uniform vec4 field;\n"
+    "out vec2 uv;\n"
+    "out float distance_to_eye;\n"
+    "void main() {\n"
+    "    vec3 p = position - eye;\n"
+    "    uv = position.xz * field.xy + field.zw;\n"
+    "    distance_to_eye = length(p);\n"
+    "    gl_Position = matrix * vec4(p * scale, 1.0);\n"
+    "}\n";
+
+static const char ground_fragment[] =
+    "#version 330 core\n"
+    "uniform sampler2D lightmap;\n"
+    "in vec2 uv;\n"
+    "out vec4 colour;\n"
+    "void main() { colour = vec4(texture(lightmap, uv).rgb, 1.0); }\n";
+
+static const char fading_fragment[] =
+    "#version 330 core\n"
+    "uniform sampler2D lightmap;\n"
+    "uniform vec2 fade;\n"
+    "in vec2 uv;\n"
+    "in float distance_to_eye;\n"
+    "out vec4 colour;\n"
+    "void main() {\n"
+    "    float alpha = clamp(fade.x - fade.y * distance_to_eye, 0.0, 1.0);\n"
+    "    if (alpha <= 0.0) discard;\n"
+    "    colour = vec4(texture(lightmap, uv).rgb, alpha);\n"
+    "}\n";
+
+static const char impostor_vertex[] =
+    "#version 330 core\n"
+    "in vec3 position;\n"
+    "uniform mat4 matrix, texture_matrix;\n"
+    "uniform vec3 eye;\n"
+    "uniform float scale;\n"
+    "out vec3 stq;\n"
+    "void main() {\n"
+    "    stq = (texture_matrix * vec4(position, 1.0)).xyw;\n"
+    "    gl_Position = matrix * vec4((position - eye) * scale, 1.0);\n"
+    "}\n";
+
+/* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
+   them; the division brings them back. */
+static const char impostor_fragment[] =
+    "#version 330 core\n"
+    "uniform sampler2D atlas;\n"
+    "in vec3 stq;\n"
+    "out vec4 colour;\n"
+    "void main() {\n"
+    "    vec4 c = textureProj(atlas, stq);\n"
+    "    if (c.a < 0.5) discard;\n"
+    "    colour = vec4(c.rgb / c.a, 1.0);\n"
+    "}\n";
+
+static const char line_fragment[] =
+    "#version 330 core\n"
+    "uniform vec3 tint;\n"
+    "out vec4 colour;\n"
+    "void main() { colour = vec4(tint, 1.0); }\n";
+
+static GLuint compile(GLenum type, const char *source)
+{
+    GLuint shader = glCreateShader(type);
+    GLint ok = 0;
+    glShaderSource(shader, 1, &source, NULL);
+    glCompileShader(shader);
+    glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+    if (!ok) {
+        char log[512];
+        glGetShaderInfoLog(shader, sizeof log, NULL, log);
+        fprintf(stderr, "%s\n", log);
+    }
+    return shader;
+}
+
+static gl_program make_program(const char *vertex_source, const char *fragment_source)
+{
+    GLuint vertex = compile(GL_VERTEX_SHADER, vertex_source);
+    GLuint fragment = compile(GL_FRAGMENT_SHADER, fragment_source);
+    GLint linked = 0;
+    gl_program p;
+    p.id = glCreateProgram();
+    glAttachShader(p.id, vertex);
+    glAttachShader(p.id, fragment);
+    glBindAttribLocation(p.id, 0, "position");
+    glLinkProgram(p.id);
+    glDeleteShader(vertex);
+    glDeleteShader(fragment);
+    glGetProgramiv(p.id, GL_LINK_STATUS, &linked);
+    if (!linked) {
+        glDeleteProgram(p.id);
+        p.id = 0;
+    }
+    p.matrix = glGetUniformLocation(p.id, "matrix");
+    p.eye = glGetUniformLocation(p.id, "eye");
+    p.scale = glGetUniformLocation(p.id, "scale");
+    p.field = glGetUniformLocation(p.id, "field");
+    p.fade = glGetUniformLocation(p.id, "fade");
+    p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
+    p.tint = glGetUniformLocation(p.id, "tint");
+    return p;
+}
+
+/* ---- Buffers and textures ----------------------------------------------- */
+
+static void make_array(GLuint *array, GLuint *vertices, GLuint *indices)
+{
+    glGenVertexArrays(1, array);
+    glBindVertexArray(*array);
+    glGenBuffers(1, vertices);
+    glBindBuffer(GL_ARRAY_BUFFER, *vertices);
+    glGenBuffers(1, indices);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, *indices);
+    glEnableVertexAttribArray(0);
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
+}
+
+/* All chunks stand one after the other in one buffer: a draw names its chunk by the base vertex. */
+static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain *terrain,
+                                  const terrimp_terrain_info *info)
+{
+    uint32_t chunk, chunks = info->chunks_x * info->chunks_z;
+    size_t floats = (size_t)info->ground_vertex_count * 3;
+    terrimp_result result = TERRIMP_E_MEMORY;
+    uint16_t *indices;
+    float *vertices;
+    make_array(&g->ground_array, &g->ground_vertices, &g->ground_indices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(chunks * floats * sizeof *vertices), NULL,
+                 GL_STATIC_DRAW);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER,
+                 (GLsizeiptr)(info->ground_index_count * sizeof *indices), NULL, GL_STATIC_DRAW);
+    vertices = glMapBuffer(GL_ARRAY_BUFFER, GL_WRITE_ONLY);
+    indices = glMapBuffer(GL_ELEMENT_ARRAY_BUFFER, GL_WRITE_ONLY);
+    if (vertices && indices)
+        result = terrimp_terrain_fill_indices(terrain, indices, info->ground_index_count);
+    for (chunk = 0; result == TERRIMP_OK && chunk < chunks; chunk++)
+        result = terrimp_terrain_fill_ground(terrain, chunk, vertices + chunk * floats, floats);
+    glUnmapBuffer(GL_ARRAY_BUFFER);
+    glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
+    return result;
+}
+
+static terrimp_result fill_meshes(gl_terrain *g, const terrimp_terrain *terrain,
+                                  const terrimp_terrain_info *info)
+{
+    size_t floats = (size_t)info->mesh_vertex_count * 3;
+    terrimp_result result = TERRIMP_E_MEMORY;
+    uint16_t *indices;
+    float *vertices;
+    make_array(&g->mesh_array, &g->mesh_vertices, &g->mesh_indices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(floats * sizeof *vertices), NULL, GL_STATIC_DRAW);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(info->mesh_index_count * sizeof *indices),
+                 NULL, GL_STATIC_DRAW);
+    vertices = glMapBuffer(GL_ARRAY_BUFFER, GL_WRITE_ONLY);
+    indices = glMapBuffer(GL_ELEMENT_ARRAY_BUFFER, GL_WRITE_ONLY);
+    if (vertices && indices)
+        result = terrimp_terrain_fill_meshes(terrain, vertices, floats, indices,
+                                             info->mesh_index_count);
+    glUnmapBuffer(GL_ARRAY_BUFFER);
+    glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
+    return result;
+}
+
+static GLuint make_texture(GLint least, GLint most)
+{
+    GLuint texture;
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, least);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, most);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return texture;
+}
+
+/* Texel centres lie on the samples. */
+static void make_lightmap(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *rgb)
+{
+    float step_x = 1.0f / (field->spacing_x * (float)field->width);
+    float step_z = 1.0f / (field->spacing_z * (float)field->depth);
+    g->field[0] = step_x;
+    g->field[1] = step_z;
+    g->field[2] = 0.5f / (float)field->width - field->origin_x * step_x;
+    g->field[3] = 0.5f / (float)field->depth - field->origin_z * step_z;
+    g->lightmap = make_texture(GL_LINEAR_MIPMAP_LINEAR, GL_LINEAR);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, (GLsizei)field->width, (GLsizei)field->depth, 0,
+                 GL_RGB, GL_UNSIGNED_BYTE, rgb);
+    glGenerateMipmap(GL_TEXTURE_2D);
+}
+
+static int make_atlases(gl_terrain *g, GLsizei size)
+{
+    int i, complete = 1;
+    g->atlas_size = size;
+    glGenRenderbuffers(1, &g->atlas_depth);
+    glBindRenderbuffer(GL_RENDERBUFFER, g->atlas_depth);
+    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, size, size);
+    glGenFramebuffers(2, g->atlas_frame);
+    for (i = 0; i < 2; i++) {
+        g->atlas[i] = make_texture(GL_LINEAR, GL_LINEAR);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, size, size, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);
+        glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[i]);
+        glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, g->atlas[i],
+                               0);
+        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
+                                  g->atlas_depth);
+        complete &= glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+        glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
+        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    }
+    return complete;
+}
+
+static void set_field(const gl_terrain *g, const gl_program *p)
+{
+    glUseProgram(p->id);
+    glUniform4fv(p->field, 1, g->field);
+}
+
+static const char *fill(gl_terrain *g, const terrimp_terrain *terrain,
+                        const terrimp_heightfield *field, const uint8_t *lightmap,
+                        uint32_t atlas_size)
+{
+    terrimp_terrain_info info;
+    GLint limit = 0;
+    terrimp_result result = terrimp_terrain_get_info(terrain, &info);
+    if (result == TERRIMP_OK)
+        result = fill_ground(g, terrain, &info);
+    if (result == TERRIMP_OK)
+        result = fill_meshes(g, terrain, &info);
+    if (result != TERRIMP_OK)
+        return terrimp_result_text((int)result);
+    g->chunk_vertices = info.ground_vertex_count;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
+    if (field->width > (uint32_t)limit || field->depth > (uint32_t)limit)
+        return "the lightmap is larger than OpenGL's largest texture";
+    if (atlas_size > (uint32_t)limit)
+        return "the atlas is larger than OpenGL's largest texture";
+    make_lightmap(g, field, lightmap);
+    if (!make_atlases(g, (GLsizei)atlas_size))
+        return "the atlas cannot be rendered to";
+    g->ground = make_program(ground_vertex, ground_fragment);
+    g->fading = make_program(ground_vertex, fading_fragment);
+    g->impostor = make_program(impostor_vertex, impostor_fragment);
+    g->line = make_program(ground_vertex, line_fragment);
+    if (!g->ground.id || !g->fading.id || !g->impostor.id || !g->line.id)
+        return "a shader does not compile";
+    set_field(g, &g->ground);
+    set_field(g, &g->fading);
+    return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for the terrain";
+}
+
+const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_terrain *terrain,
+                            const terrimp_heightfield *field, const uint8_t *lightmap,
+                            uint32_t atlas_size)
+{
+    terrimp_heightfield resolved;
+    const char *trouble;
+    memset(g, 0, sizeof *g);
+    g->frame = frame;
+    g->target = GL_TO_NOTHING;
+    if (terrimp_heightfield_resolve(field, &resolved) != TERRIMP_OK)
+        return "the heightfield is wrong";
+    trouble = fill(g, terrain, &resolved, lightmap, atlas_size);
+    if (trouble)
+        gl_terrain_close(g);
+    return trouble;
+}
+
+void gl_terrain_close(gl_terrain *g)
+{
+    const GLuint arrays[2] = { g->ground_array, g->mesh_array };
+    const GLuint buffers[4] = { g->ground_vertices, g->ground_indices, g->mesh_vertices,
+                                g->mesh_indices };
+    glDeleteVertexArrays(2, arrays);
+    glDeleteBuffers(4, buffers);
+    glDeleteTextures(1, &g->lightmap);
+    glDeleteTextures(2, g->atlas);
+    glDeleteFramebuffers(2, g->atlas_frame);
+    glDeleteRenderbuffers(1, &g->atlas_depth);
+    glDeleteProgram(g->ground.id);
+    glDeleteProgram(g->fading.id);
+    glDeleteProgram(g->impostor.id);
+    glDeleteProgram(g->line.id);
+    memset(g, 0, sizeof *g);
+}
+
+/* ---- Drawing ------------------------------------------------------------ */
+
+/* out = a * b, column-major. */
+static void multiply(const float a[16], const float b[16], float out[16])
+{
+    int column, row, k;
+    for (column = 0; column < 4; column++)
+        for (row = 0; row < 4; row++) {
+            float sum = 0.0f;
+            for (k = 0; k < 4; k++)
+                sum += a[k * 4 + row] * b[column * 4 + k];
+            out[column * 4 + row] = sum;
+        }
+}
+
+/* The matrix for positions relative to the eye: the view only turns. */
+static void relative_matrix(const float view[16], const float projection[16], float out[16])
+{
+    float turn[16];
+    memcpy(turn, view, sizeof turn);
+    turn[12] = turn[13] = turn[14] = 0.0f;
+    multiply(projection, turn, out);
+}
+
+static void use_program(const gl_program *p, const float matrix[16], const float eye[3])
+{
+    glUseProgram(p->id);
+    glUniformMatrix4fv(p->matrix, 1, GL_FALSE, matrix);
+    glUniform3fv(p->eye, 1, eye);
+    glUniform1f(p->scale, 1.0f);
+}
+
+/* Sends the waiting ground draws; they all have one state. */
+static void flush(gl_terrain *g)
+{
+    gl_batch *b = &g->batch;
+    const gl_program *p = b->fade_end > 0.0f ? &g->fading : &g->ground;
+    if (!b->count)
+        return;
+    if (g->lines)
+        p = &g->line;
+    glUseProgram(p->id);
+    glBindVertexArray(g->ground_array);
+    glBindTexture(GL_TEXTURE_2D, g->lightmap);
+    glUniform1f(p->scale, 1.0f + b->depth_bias);
+    glUniform3f(p->tint, 0.05f, 0.10f, 0.25f);
+    if (p == &g->fading) {
+        float slope = 1.0f / (b->fade_end - b->fade_start);
+        glUniform2f(p->fade, b->fade_end * slope, slope);
+        glEnable(GL_BLEND);
+    }
+    glMultiDrawElementsBaseVertex(GL_TRIANGLES, b->counts, GL_UNSIGNED_SHORT, b->offsets,
+                                  b->count, b->base_vertices);
+    glDisable(GL_BLEND);
+    b->count = 0;
+}
+
+/* Turns to the frame, which is cleared the first time. */
+static void turn_to_frame(gl_terrain *g)
+{
+    if (g->target == GL_TO_FRAME)
+        return;
+    flush(g);
+    g->target = GL_TO_FRAME;
+    context_bind(g->frame);
+    glDisable(GL_SCISSOR_TEST);
+    if (!g->cleared) {
+        glClearColor((float)g->sky[0] / 255.0f, (float)g->sky[1] / 255.0f,
+                     (float)g->sky[2] / 255.0f, 1.0f);
+        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+        g->cleared = 1;
+    }
+    use_program(&g->line, g->camera_matrix, g->camera_eye);
+    use_program(&g->impostor, g->camera_matrix, g->camera_eye);
+    use_program(&g->fading, g->camera_matrix, g->camera_eye);
+    use_program(&g->ground, g->camera_matrix, g->camera_eye);
+}
+
+/* Turns to an atlas. It stays bound from capture to capture: a change of target costs a software
+   rasteriser a pass over all tiles. */
+static void turn_to_atlas(gl_terrain *g, int atlas)
+{
+    if (g->target == atlas)
+        return;
+    flush(g);
+    g->target = atlas;
+    glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[atlas]);
+    glEnable(GL_SCISSOR_TEST);
+    glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
+}
+
+static void begin_capture(void *user, const terrimp_capture_command *command)
+{
+    gl_terrain *g = (gl_terrain *)user;
+    const terrimp_rect *slot = &command->slot;
+    float matrix[16];
+    g->capturing = 1;
+    if (g->lines)
+        return;
+    turn_to_atlas(g, (int)command->atlas);
+    glViewport((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
+    glScissor((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    relative_matrix(command->view, command->projection, matrix);
+    use_program(&g->ground, matrix, command->eye);
+}
+
+static void end_capture(void *user, const terrimp_capture_command *command)
+{
+    gl_terrain *g = (gl_terrain *)user;
+    (void)command;
+    flush(g);
+    g->capturing = 0;
+}
+
+/* Where an index stands in the bound index buffer, as OpenGL wants it: a number in a pointer. */
+static const void *index_offset(uint32_t first_index)
+{
+    return (const void *)(uintptr_t)(first_index * sizeof(uint16_t));
+}
+
+/* Draws a range of the coarse meshes; the program has its own uniforms already. */
+static void draw_mesh(gl_terrain *g, const gl_program *p, GLuint texture, uint32_t base_vertex,
+                      uint32_t first_index, uint32_t index_count, float depth_bias)
+{
+    glBindVertexArray(g->mesh_array);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glUniform1f(p->scale, 1.0f + depth_bias);
+    glDrawElementsBaseVertex(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT,
+                             index_offset(first_index), (GLint)base_vertex);
+}
+
+static void draw_impostor(void *user, const terrimp_impostor_command *c)
+{
+    gl_terrain *g = (gl_terrain *)user;
+    const gl_program *p = g->lines ? &g->line : &g->impostor;
+    turn_to_frame(g);
+    flush(g);
+    glUseProgram(p->id);
+    glUniform3f(p->tint, 0.85f, 0.10f, 0.05f);
+    glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
+    draw_mesh(g, p, g->atlas[c->atlas], c->base_vertex, c->first_index, c->index_count,
+              c->depth_bias);
+}
+
+/* The floor only fills what would else be holes: its outlines would hide those that matter. */
+static void draw_floor(void *user, const terrimp_floor_command *c)
+{
+    gl_terrain *g = (gl_terrain *)user;
+    if (g->lines)
+        return;
+    turn_to_frame(g);
+    flush(g);
+    glUseProgram(g->ground.id);
+    draw_mesh(g, &g->ground, g->lightmap, c->base_vertex, c->first_index, c->index_count,
+              c->depth_bias);
+}
+
+static void draw_ground(void *user, const terrimp_ground_command *command)
+{
+    gl_terrain *g = (gl_terrain *)user;
+    gl_batch *b = &g->batch;
+    GLsizei i;
+    if (g->capturing && g->lines)
+        return;
+    if (!g->capturing)
+        turn_to_frame(g);
+    if (b->count == GL_BATCH || b->fade_start != command->fade_start
+        || b->fade_end != command->fade_end || b->depth_bias != command->depth_bias)
+        flush(g);
+    b->fade_start = command->fade_start;
+    b->fade_end = command->fade_end;
+    b->depth_bias = command->depth_bias;
+    i = b->count++;
+    b->counts[i] = (GLsizei)command->index_count;
+    b->offsets[i] = index_offset(command->first_index);
+    b->base_vertices[i] = (GLint)(command->node * g->chunk_vertices);
+}
+
+/* ---- A frame ------------------------------------------------------------ */
+
+terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
+                                const uint8_t sky[3])
+{
+    float view[16], projection[16];
+    terrimp_result result = terrimp_camera_matrices(camera, view, projection);
+    if (result != TERRIMP_OK)
+        return result;
+    relative_matrix(view, projection, g->camera_matrix);
+    memcpy(g->camera_eye, camera->eye, sizeof g->camera_eye);
+    memcpy(g->sky, sky, sizeof g->sky);
+    g->target = GL_TO_NOTHING;
+    g->cleared = 0;
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LEQUAL);
+    glEnable(GL_CULL_FACE);
+    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+    return TERRIMP_OK;
+}
+
+terrimp_callbacks gl_terrain_callbacks(gl_terrain *g)
+{
+    terrimp_callbacks callbacks;
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.user = g;
+    callbacks.begin_capture = begin_capture;
+    callbacks.end_capture = end_capture;
+    callbacks.draw_impostor = draw_impostor;
+    callbacks.draw_ground = draw_ground;
+    callbacks.draw_floor = draw_floor;
+    return callbacks;
+}
+
+void gl_terrain_end(gl_terrain *g)
+{
+    turn_to_frame(g);
+    flush(g);
+    glFinish();
+}
+
+terrimp_result gl_terrain_wireframe(gl_terrain *g, terrimp_view *view)
+{
+    terrimp_callbacks callbacks = gl_terrain_callbacks(g);
+    terrimp_result result;
+    turn_to_frame(g);
+    g->lines = 1;
+    glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
+    glEnable(GL_POLYGON_OFFSET_LINE);
+    glPolygonOffset(-1.0f, -8.0f);
+    result = terrimp_view_render(view, &callbacks);
+    gl_terrain_end(g);
+    glDisable(GL_POLYGON_OFFSET_LINE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    g->lines = 0;
+    return result;
+}
+
+int gl_terrain_read_atlas(const gl_terrain *g, int atlas, uint8_t *rgb)
+{
+    size_t count = (size_t)g->atlas_size * (size_t)g->atlas_size, i;
+    uint8_t *rgba = malloc(count * 4);
+    if (!rgba)
+        return 0;
+    glBindTexture(GL_TEXTURE_2D, g->atlas[atlas]);
+    glGetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+    for (i = 0; i < count * 3; i++) {
+        const uint8_t *texel = rgba + i / 3 * 4;
+        rgb[i] = (uint8_t)(texel[i % 3] + (255 - texel[3]) / 2);
+    }
+    free(rgba);
+    return 1;
+}

@@ -1,0 +1,15 @@
+/* A baked lightmap: what the ground looks like under the sun, one texel a sample, so that every way
+   of drawing the terrain is shaded alike. */
+#ifndef HOST_LIGHTMAP_H
+#define HOST_LIGHTMAP_H
+
+#include "terrimp.h"
+
+#include <stdint.h>
+
+/* Bakes rgb[depth][width][3], to be freed: grass, rock, snow and sea by height and slope, times the
+   light of the sun with soft shadows. Null when memory runs out or the field has
+   voids. */
+uint8_t *lightmap_bake(const terrimp_heightfield *field);
+
+#endif

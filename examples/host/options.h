@@ -1,0 +1,42 @@
+/* The command line of flyover. */
+#ifndef HOST_OPTIONS_H
+#define HOST_OPTIONS_H
+
+#include "dem.h"
+
+#include <stdint.h>
+#include <stdio.h>
+
+enum { OPTIONS_MAX_SAVED = 256 };
+
+/* Numbers that were not given are 0, texts are null: the program or the library has a default. */
+typedef struct options {
+    const char *mode;                  /* as written; default "impostor" */
+    int terrimp_mode;                  /* what it means to the library */
+    const char *dem, *path, *out, *stats;
+    dem_desc file;                     /* --format, --raw-size, --crop */
+    uint32_t terrain_size, seed;
+    uint32_t width, height;            /* of the picture, pixels */
+    float fov_degrees;
+    uint32_t frames;
+    float speed, fps;
+    float spacing[2], height_scale;
+    uint32_t chunk, atlas, max_captures;
+    float fade[2], max_angle_degrees, tolerance, texels;
+    uint32_t save_every;
+    uint32_t save_frames[OPTIONS_MAX_SAVED], save_frame_count;
+    uint8_t sky[3];
+    int wireframe, show_atlas, compare, help;
+    char error[256];                   /* one line, after a failure */
+} options;
+
+/* Reads the command line. Returns 1, or 0 with o->error. */
+int options_parse(options *o, int argc, char **argv);
+
+/* Prints every option with its default. */
+void options_print_help(FILE *file);
+
+/* Whether a frame's picture is to be saved. */
+int options_saves(const options *o, uint32_t frame);
+
+#endif
