@@ -1,0 +1,97 @@
+# terrimp.h needs no building; this builds its examples, tests and benchmarks.
+
+## make           builds the examples into build/; make NAME builds one program
+## make deps      installs what is missing, on Debian: a compiler, libpng, OpenGL without a window
+## make demo      flies over a terrain: pictures and a table of statistics, in build/demo/
+##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
+##                  ARGS='...'   more options for build/flyover
+## make test      runs every test
+## make bench     measures
+## make clean     removes build/
+##
+## With any of them: CC=clang, CFLAGS='...', CONFIG=release|debug|sanitize|coverage, and
+## GL=osmesa|egl, which windowless OpenGL; without it OSMesa where its header is, else EGL.
+
+CONFIG ?= release
+
+# What is asked for by name builds into a folder of its own, e.g. build/debug/egl.
+BUILD := build$(addprefix /,$(filter-out release,$(CONFIG)))$(addprefix /,$(GL))
+
+CONFIG_release  := -O2
+CONFIG_debug    := -O0 -g
+CONFIG_sanitize := -O1 -g -fsanitize=address,undefined -fno-sanitize-recover=all
+CONFIG_coverage := -O0 -g --coverage
+ifndef CONFIG_$(CONFIG)
+$(error CONFIG is release, debug, sanitize or coverage, not "$(CONFIG)")
+endif
+
+WARNINGS := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wdouble-promotion \
+            -Wcast-qual -Wundef -Wvla -Wstrict-prototypes -Wmissing-prototypes
+
+# The compiler is asked as late as a recipe runs, so that `make deps demo` sees what deps installed.
+has_header = $(shell $(CC) -E -include $(1) -x c /dev/null >/dev/null 2>&1 && echo yes)
+GL ?= $(if $(call has_header,GL/osmesa.h),osmesa,egl)
+GL_FLAGS_osmesa := -DHOST_OSMESA
+GL_LIBS_osmesa  := -lOSMesa
+GL_FLAGS_egl    := -DHOST_EGL
+GL_LIBS_egl     := -lEGL -lOpenGL
+
+# The benchmark compares with meshoptimizer where that is installed.
+BENCH_FLAGS = $(if $(call has_header,meshoptimizer.h),-DTERRIMP_HAVE_MESHOPT)
+BENCH_LIBS  = $(if $(call has_header,meshoptimizer.h),-lmeshoptimizer)
+
+EXAMPLES := $(patsubst examples/%.c,%,$(wildcard examples/*.c))
+BENCHES  := $(patsubst tests/%.c,%,$(wildcard tests/bench_*.c))
+TESTS    := unit unit_host render
+HOST     := $(patsubst examples/%.c,$(BUILD)/%.o,$(wildcard examples/host/*.c))
+DEPS     := $(filter deps,$(MAKECMDGOALS))
+
+all: $(EXAMPLES)
+
+$(EXAMPLES) $(BENCHES) $(TESTS): %: $(BUILD)/%
+
+help:
+	@sed -n 's/^## \{0,1\}//p' Makefile
+
+deps:
+	@sh tests/deps.sh
+
+demo: flyover
+	@mkdir -p build/demo
+	$(BUILD)/flyover --compare --frames 150 --save-every 30 --out build/demo \
+	    --stats build/demo/statistics.tsv $(addprefix --dem ,$(DEM)) $(ARGS)
+	@echo "Pictures: build/demo/*.png   Statistics, a line a frame: build/demo/statistics.tsv"
+
+test: | $(DEPS)
+	@sh tests/run.sh
+
+bench: $(BENCHES)
+	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
+
+clean:
+	rm -rf build
+
+# Every program is one source file of examples/ or tests/, and what it uses of examples/host/.
+vpath %.c examples tests
+
+$(BUILD)/%: $(BUILD)/%.o $(BUILD)/host.a
+	@echo "link    $@"
+	@$(CC) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) -lpng -lm -o $@
+
+$(BUILD)/host.a: $(HOST)
+	@rm -f $@
+	@ar rc $@ $^
+
+$(BUILD)/%.o: %.c | $(DEPS)
+	@mkdir -p $(@D)
+	@echo "compile $<"
+	@$(CC) -std=c99 $(WARNINGS) $(CONFIG_$(CONFIG)) $(GL_FLAGS_$(GL)) $(FLAGS) -I. -MMD -MP \
+	    $(CFLAGS) -c $< -o $@
+
+$(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
+$(BUILD)/bench_%: LIBS = $(BENCH_LIBS)
+
+-include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
+
+.PHONY: all help deps demo test bench clean $(EXAMPLES) $(BENCHES) $(TESTS)
+.SECONDARY:

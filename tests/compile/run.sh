@@ -1,0 +1,80 @@
+#!/bin/sh
+# Compiles the header as every host may, with warnings as errors, and runs what comes out:
+# each compiler that is here, each standard, each way to include and configure the library.
+
+cd "$(dirname "$0")/../.." || exit 1
+. tests/check.sh
+here=tests/compile
+work=build/test/compile
+mkdir -p $work
+
+c_strict="-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wdouble-promotion
+          -Wcast-qual -Wundef -Wvla -Wstrict-prototypes -Wmissing-prototypes -Wc++-compat -Werror"
+cpp_strict="-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror"
+
+# builds_and_runs "compiler and flags" sources...
+builds_and_runs()
+{
+    command=$1
+    shift
+    for source in "$@"; do
+        set -- "$@" $here/$source
+        shift
+    done
+    $command -I. "$@" -o $work/program -lm && $work/program
+}
+
+# ways "name" "compiler and flags": every way to include and configure the library. A library that
+# is private to a file and half used has unused functions, and this is no fault.
+ways()
+{
+    check "$1: included several times"      builds_and_runs "$2" twice.c
+    check "$1: inside extern C"             builds_and_runs "$2" extern_c.c
+    check "$1: after macros like windows.h" builds_and_runs "$2" windows.c
+    check "$1: without malloc"              builds_and_runs "$2" no_malloc.c
+    check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c
+    check "$1: private to each of two files" \
+        builds_and_runs "$2 -Wno-unused-function" static_a.c static_b.c
+    check "$1: every macro replaced" builds_and_runs "$2 -Wno-unused-function" custom.c
+}
+
+compilers() # C compiler, C++ compiler
+{
+    if ! command -v "$1" > /dev/null; then
+        skip "$1: it is not installed"
+        return
+    fi
+    for standard in c99 c11 c17; do
+        check "$1 $standard" builds_and_runs "$1 -O0 -std=$standard $c_strict" plain.c
+    done
+    check "$1 c99 -O2" builds_and_runs "$1 -O2 -std=c99 $c_strict" plain.c
+    ways "$1 c99" "$1 -O0 -std=c99 $c_strict"
+
+    if ! command -v "$2" > /dev/null; then
+        skip "$2: it is not installed"
+        return
+    fi
+    for standard in c++98 c++11 c++17 c++20; do
+        check "$2 $standard" builds_and_runs "$2 -x c++ -O0 -std=$standard $cpp_strict" plain.c
+    done
+    check "$2 c++98 -O2" builds_and_runs "$2 -x c++ -O2 -std=c++98 $cpp_strict" plain.c
+    ways "$2 c++98" "$2 -x c++ -O0 -std=c++98 $cpp_strict"
+}
+
+compilers gcc g++
+compilers clang clang++
+
+if command -v tcc > /dev/null; then
+    check "tcc" builds_and_runs "tcc -Wall -Werror" plain.c
+    check "tcc: in two files" builds_and_runs "tcc -Wall -Werror" unit_a.c unit_b.c
+else
+    skip "tcc: it is not installed"
+fi
+
+echo 'int main(void) { return 0; }' > $work/probe.c
+if gcc -m32 $work/probe.c -o $work/probe > /dev/null 2>&1; then
+    check "gcc -m32" builds_and_runs "gcc -m32 -O2 -std=c99 $c_strict" plain.c
+else
+    skip "32 bits: gcc has no libraries for it"
+fi
+check_report

@@ -1,0 +1,11 @@
+#define TERRIMP_STATIC
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+
+#include "use.h"
+#include "unit_b.h"
+
+int use_terrimp_in_b(void)
+{
+    return use_terrimp();
+}

@@ -1,0 +1,131 @@
+#!/bin/sh
+# Runs the examples as their reader would, and looks at what they say.
+
+cd "$(dirname "$0")/.." || exit 1
+. tests/check.sh
+CC=${CC:-cc}
+work=build/test/examples
+rm -rf $work
+mkdir -p $work/pictures
+
+# ---- minimal: no graphics, one command
+
+build_line() # source: the command in its first comment
+{
+    sed -n 's/^ *Build: *cc //p' "$1" | head -n 1 | sed "s|-o |-o $work/|"
+}
+
+minimal_runs()
+{
+    $CC $(build_line examples/minimal.c) && $work/minimal > $work/minimal.txt
+}
+
+# Its lines: "frame N", a line for each capture, "N impostors, N chunks of ground".
+captures_in_frames() # first last
+{
+    awk -v first="$1" -v last="$2" '$1 == "frame" { frame = $2 }
+        $1 == "capture" && frame >= first && frame <= last { n++ }
+        END { print n + 0 }' $work/minimal.txt
+}
+
+minimal_captures_first()
+{
+    early=$(captures_in_frames 0 0)
+    late=$(captures_in_frames 1 7)
+    echo "minimal: $early captures in frame 0, $late in the 7 frames after it"
+    [ "$early" -gt 0 ] && [ "$late" -lt "$early" ]
+}
+
+# Each frame draws something, and no impostor more often than the 64 chunks that there are.
+minimal_draws_all()
+{
+    awk '$2 == "impostors," { frames++; bad += $1 + $3 < 1 || $1 > 64 }
+        END { exit bad || frames != 8 }' $work/minimal.txt
+}
+
+minimal_repeats()
+{
+    $work/minimal | cmp - $work/minimal.txt
+}
+
+check "minimal builds with the command in its first comment, and runs" minimal_runs
+check "minimal captures in its first frame and hardly any later" minimal_captures_first
+check "minimal draws something in each of its 8 frames" minimal_draws_all
+check "minimal prints the same again" minimal_repeats
+
+# ---- flyover: the pictures are looked at by tests/render.c, here it is its manners
+
+fly()
+{
+    build/flyover "$@" > $work/out.txt 2> $work/err.txt
+}
+
+# Bad input: one line that says why, and exit code 2.
+refuses() # options...
+{
+    fly --frames 1 --size 64x48 --terrain-size 129 "$@"
+    code=$?
+    [ $code -eq 2 ] && [ "$(wc -l < $work/err.txt)" -eq 1 ] && return
+    echo "flyover $*: code $code"
+    head -n 3 $work/err.txt
+    false
+}
+
+flies_quietly()
+{
+    fly --frames 3 --size 160x120 --terrain-size 257 --save-every 1 --out $work/pictures \
+        --stats $work/statistics.tsv || { cat $work/err.txt; return 1; }
+    [ ! -s $work/err.txt ] || { echo "on standard error:"; head -n 3 $work/err.txt; }
+}
+
+# A line a frame (and at most one of column names), each with the same number of columns, >= 8.
+statistics_are_a_table()
+{
+    awk -F '\t' 'NR == 1 { columns = NF } NF != columns || NF < 8 { exit 1 }
+        $1 ~ /^[0-9]+$/ { frames++ } END { exit frames != 3 || NR > 4 }' $work/statistics.tsv
+}
+
+pictures_are_png()
+{
+    count=0
+    for picture in $work/pictures/*.png; do
+        [ "$(head -c 4 "$picture" | tail -c 3)" = PNG ] || return 1
+        count=$((count + 1))
+    done
+    [ $count -ge 3 ]
+}
+
+says_key_value_lines()
+{
+    grep -qE '^ms_median [0-9.]+' $work/out.txt || { cat $work/out.txt; false; }
+}
+
+# Options that README.md speaks of and flyover does not know.
+unknown_options()
+{
+    build/flyover --help | grep -oE -e '--[a-z][a-z-]+' | sort -u > $work/options
+    grep -oE -e '(^|[^-a-z])--[a-z][a-z-]+' README.md | sed 's/^[^-]//' | sort -u |
+        comm -23 - $work/options
+}
+
+check "make builds every example" make -s all
+if [ -x build/flyover ]; then
+    check "flyover flies over its own terrain" prints_nothing flies_quietly
+    check "flyover writes a line of statistics a frame" statistics_are_a_table
+    check "flyover saves the pictures that were asked for" pictures_are_png
+    check "flyover ends with a summary" says_key_value_lines
+    head -c 100 Makefile > $work/short.hgt
+    : > $work/empty.pgm
+    check "README.md names options that flyover has" prints_nothing unknown_options
+    check "flyover refuses an unknown option" refuses --no-such-option
+    check "flyover refuses a missing file" refuses --dem $work/missing.hgt
+    check "flyover refuses a .hgt of a wrong length" refuses --dem $work/short.hgt
+    check "flyover refuses an empty file" refuses --dem $work/empty.pgm
+    check "flyover refuses a size of nothing" refuses --size 0x0
+    check "flyover refuses a number that is none" refuses --fov wide
+    check "flyover refuses an option without its value" refuses --frames
+    check "flyover refuses a mode that it lacks" refuses --mode best
+else
+    check "there is a flyover" false
+fi
+check_report
