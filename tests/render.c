@@ -1,0 +1,944 @@
+/* Draws terrain through OpenGL without a window and judges the pictures: no holes, close to the
+   full mesh, the same every time, nothing outside of its slot.
+   Build:  make GL=osmesa render  or  make GL=egl render
+   Real tiles are looked for in ../shared/data, or in the directory TERRIMP_DATA. A picture that
+   breaks a law is kept in build/test/. */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+
+#include "check.h"
+
+#include "examples/host/context.h"
+#include "examples/host/dem.h"
+#include "examples/host/flight.h"
+#include "examples/host/gl_terrain.h"
+#include "examples/host/image.h"
+#include "examples/host/lightmap.h"
+#include "examples/host/procedural.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DEGREE 0.017453293f
+
+/* Colours that no terrain has, to clear with, and a sky that differs from terrain as skies do. */
+static const uint8_t magenta[3] = { 255, 0, 255 };
+static const uint8_t green[3] = { 0, 255, 0 };
+static const uint8_t light_blue[3] = { 0xa8, 0xc8, 0xe8 };
+
+static void *allocate(size_t bytes)
+{
+    void *memory = malloc(bytes);
+    if (!memory) {
+        fprintf(stderr, "out of memory\n");
+        exit(2);
+    }
+    return memory;
+}
+
+/* What no test can go on without. */
+static void need(const char *trouble)
+{
+    if (trouble) {
+        fprintf(stderr, "render: %s\n", trouble);
+        exit(2);
+    }
+}
+
+static void need_ok(terrimp_result result)
+{
+    need(result == TERRIMP_OK ? NULL : terrimp_result_text((int)result));
+}
+
+/* ---- A terrain on the screen -------------------------------------------- */
+
+typedef struct scene {
+    const char *name;
+    dem dem;                      /* owns the samples */
+    terrimp_heightfield field;
+    float height_range;           /* [wu] */
+    terrimp_terrain *terrain;
+    terrimp_terrain_info info;
+    float fov;                    /* vertical [rad] */
+    int width, height;            /* of its pictures */
+    size_t pixels;
+    context context;
+    gl_terrain gl;
+} scene;
+
+enum { ATLAS = 2048 };
+
+static void scene_build(scene *s, const char *name, uint32_t chunk_quads)
+{
+    terrimp_terrain_desc desc;
+    float low, high;
+    memset(&desc, 0, sizeof desc);
+    desc.field = s->field;
+    desc.chunk_quads = chunk_quads;
+    s->name = name;
+    need_ok(terrimp_terrain_create(&desc, NULL, &s->terrain));
+    need_ok(terrimp_terrain_get_info(s->terrain, &s->info));
+    need_ok(terrimp_heightfield_bounds(&s->field, 0, 0, s->field.width, s->field.depth, &low,
+                                       &high));
+    s->height_range = high - low;
+}
+
+static void scene_show(scene *s, int width, int height, float fov_degrees, uint32_t atlas)
+{
+    uint8_t *lightmap = lightmap_bake(&s->field);
+    need(lightmap ? NULL : "no lightmap");
+    s->width = width;
+    s->height = height;
+    s->pixels = (size_t)width * (size_t)height;
+    s->fov = fov_degrees * DEGREE;
+    need(context_open(&s->context, width, height));
+    need(gl_terrain_open(&s->gl, &s->context, s->terrain, &s->field, lightmap, atlas));
+    free(lightmap);
+}
+
+static void scene_close(scene *s)
+{
+    gl_terrain_close(&s->gl);
+    context_close(&s->context);
+    terrimp_terrain_destroy(s->terrain);
+    dem_free(&s->dem);
+    memset(s, 0, sizeof *s);
+}
+
+/* Hills and valleys: 512 x 512 units, 128 high, 16 x 16 chunks. */
+static void open_hills(scene *s, int width, int height, float fov_degrees)
+{
+    enum { SIDE = 513 };
+    memset(s, 0, sizeof *s);
+    s->dem.samples = procedural_terrain(SIDE, SIDE, 1);
+    need(s->dem.samples ? NULL : "no memory for the terrain");
+    s->dem.width = s->dem.depth = SIDE;
+    s->dem.format = TERRIMP_FORMAT_U16;
+    s->dem.spacing_x = s->dem.spacing_z = 1.0f;
+    s->field = dem_heightfield(&s->dem);
+    s->field.height_scale = 0.5f * PROCEDURAL_HEIGHT_SCALE;
+    scene_build(s, "hills", 32);
+    scene_show(s, width, height, fov_degrees, ATLAS);
+}
+
+/* Adds a lattice of random heights, bilinear between its points. */
+static void add_octave(float *heights, uint32_t side, uint32_t step, float amplitude)
+{
+    uint32_t lattice_side = side / step + 2, x, z;
+    float *lattice = (float *)allocate(sizeof(float) * lattice_side * lattice_side);
+    for (x = 0; x < lattice_side * lattice_side; x++)
+        lattice[x] = random_float(0.0f, amplitude);
+    for (z = 0; z < side; z++)
+        for (x = 0; x < side; x++) {
+            const float *at = lattice + z / step * lattice_side + x / step;
+            float u = (float)(x % step) / (float)step, v = (float)(z % step) / (float)step;
+            float a = at[0] + (at[1] - at[0]) * u;
+            float b = at[lattice_side] + (at[lattice_side + 1] - at[lattice_side]) * u;
+            heights[z * side + x] += a + (b - a) * v;
+        }
+    free(lattice);
+}
+
+/* Noise with slopes of 45 degrees everywhere, the worst for coarse meshes: 256 x 256 units,
+   16 x 16 chunks. */
+static void open_rough(scene *s, int width, int height, float fov_degrees)
+{
+    enum { SIDE = 257 };
+    uint32_t step;
+    float *heights = (float *)calloc(SIDE * SIDE, sizeof *heights);
+    need(heights ? NULL : "out of memory");
+    check_state = 12345u;
+    for (step = 64; step; step /= 2)
+        add_octave(heights, SIDE, step, 0.6f * (float)step);
+    memset(s, 0, sizeof *s);
+    s->dem.samples = heights;
+    s->dem.width = s->dem.depth = SIDE;
+    s->dem.format = TERRIMP_FORMAT_F32;
+    s->dem.spacing_x = s->dem.spacing_z = 1.0f;
+    s->field = dem_heightfield(&s->dem);
+    scene_build(s, "rough", 16);
+    scene_show(s, width, height, fov_degrees, ATLAS);
+}
+
+/* A real tile, or a part of it. Returns 0 when it is not there. */
+static int open_tile(scene *s, const char *file, const dem_desc *part)
+{
+    const char *directory = getenv("TERRIMP_DATA");
+    char path[1024];
+    size_t bytes, filled;
+    void *scratch;
+    FILE *probe;
+    memset(s, 0, sizeof *s);
+    snprintf(path, sizeof path, "%s/%s", directory ? directory : "../shared/data", file);
+    probe = fopen(path, "rb");
+    if (!probe)
+        return 0;
+    fclose(probe);
+    if (!dem_load(&s->dem, path, part))
+        need(s->dem.error);
+    s->field = dem_heightfield(&s->dem);
+    bytes = terrimp_heightfield_fill_voids_scratch_bytes(s->dem.width, s->dem.depth);
+    scratch = allocate(bytes);
+    need_ok(terrimp_heightfield_fill_voids(&s->field, s->dem.samples, scratch, bytes, &filled));
+    free(scratch);
+    s->field.has_no_data = 0;
+    scene_build(s, file, 0);
+    return 1;
+}
+
+static terrimp_view *open_view(const scene *s, const terrimp_view_desc *desc)
+{
+    terrimp_view_desc settings;
+    terrimp_view *view;
+    memset(&settings, 0, sizeof settings);
+    if (desc)
+        settings = *desc;
+    if (!settings.atlas_size)
+        settings.atlas_size = (uint32_t)s->gl.atlas_size;
+    need_ok(terrimp_view_create(s->terrain, &settings, NULL, &view));
+    return view;
+}
+
+static terrimp_view *open_full_view(const scene *s)
+{
+    terrimp_view_desc settings;
+    memset(&settings, 0, sizeof settings);
+    settings.mode = TERRIMP_MODE_FULL;
+    return open_view(s, &settings);
+}
+
+static uint8_t *open_picture(const scene *s)
+{
+    return (uint8_t *)allocate(s->pixels * 3);
+}
+
+/* ---- A frame ------------------------------------------------------------ */
+
+/* Updates the view for a pose. Returns the camera to draw with: its clip distances are those that
+   the update asks for, like a host's would be. */
+static terrimp_camera aim(const scene *s, terrimp_view *view, const flight_pose *pose,
+                          terrimp_stats *stats)
+{
+    float up = tanf(0.5f * s->fov), right = up * (float)s->width / (float)s->height;
+    terrimp_camera camera;
+    int i;
+    memset(&camera, 0, sizeof camera);
+    for (i = 0; i < 3; i++) {
+        camera.eye[i] = pose->eye[i];
+        camera.forward[i] = pose->target[i] - pose->eye[i];
+    }
+    camera.fov_y_rad = s->fov;
+    camera.width_px = (uint32_t)s->width;
+    camera.height_px = (uint32_t)s->height;
+    camera.z_far = terrimp_box_farthest(&s->info.box, camera.eye) * 1.2f;
+    camera.z_near = camera.z_far / 8192.0f;
+    need_ok(terrimp_view_update(view, &camera));
+    need_ok(terrimp_view_get_stats(view, stats));
+    camera.z_near = fmaxf(camera.z_near, stats->z_near / sqrtf(1.0f + up * up + right * right));
+    if (stats->z_far > camera.z_near)
+        camera.z_far = stats->z_far * 1.01f;
+    return camera;
+}
+
+/* Stands between a view and its callbacks: notes what passes, and may hold captures back. */
+typedef struct tap {
+    terrimp_callbacks to;
+    int hold_captures;
+    int capturing;
+    uint64_t hash;                /* FNV-1a of all commands and their order */
+    terrimp_capture_command *captures; /* null: not wanted */
+    size_t capture_count;
+} tap;
+
+static void note(tap *t, char kind, const void *command, size_t bytes)
+{
+    const uint8_t *byte = (const uint8_t *)command;
+    t->hash = (t->hash ^ (uint8_t)kind) * 1099511628211u;
+    while (bytes--)
+        t->hash = (t->hash ^ *byte++) * 1099511628211u;
+}
+
+static void tap_begin_capture(void *user, const terrimp_capture_command *command)
+{
+    tap *t = (tap *)user;
+    note(t, 'b', command, sizeof *command);
+    t->capturing = 1;
+    if (t->captures)
+        t->captures[t->capture_count++] = *command;
+    if (!t->hold_captures)
+        t->to.begin_capture(t->to.user, command);
+}
+
+static void tap_end_capture(void *user, const terrimp_capture_command *command)
+{
+    tap *t = (tap *)user;
+    note(t, 'e', command, sizeof *command);
+    t->capturing = 0;
+    if (!t->hold_captures)
+        t->to.end_capture(t->to.user, command);
+}
+
+static void tap_draw_impostor(void *user, const terrimp_impostor_command *command)
+{
+    tap *t = (tap *)user;
+    note(t, 'i', command, sizeof *command);
+    t->to.draw_impostor(t->to.user, command);
+}
+
+static void tap_draw_ground(void *user, const terrimp_ground_command *command)
+{
+    tap *t = (tap *)user;
+    note(t, 'g', command, sizeof *command);
+    if (!t->capturing || !t->hold_captures)
+        t->to.draw_ground(t->to.user, command);
+}
+
+static void tap_draw_floor(void *user, const terrimp_floor_command *command)
+{
+    tap *t = (tap *)user;
+    note(t, 'f', command, sizeof *command);
+    t->to.draw_floor(t->to.user, command);
+}
+
+static tap tap_open(scene *s)
+{
+    tap t;
+    memset(&t, 0, sizeof t);
+    t.to = gl_terrain_callbacks(&s->gl);
+    t.hash = 14695981039346656037u;
+    return t;
+}
+
+/* Draws what the view's last update decided. */
+static void draw(scene *s, terrimp_view *view, const terrimp_camera *camera, tap *t,
+                 const uint8_t sky[3], uint8_t *rgb)
+{
+    terrimp_callbacks callbacks;
+    callbacks.user = t;
+    callbacks.begin_capture = tap_begin_capture;
+    callbacks.end_capture = tap_end_capture;
+    callbacks.draw_impostor = tap_draw_impostor;
+    callbacks.draw_ground = tap_draw_ground;
+    callbacks.draw_floor = t->to.draw_floor ? tap_draw_floor : NULL;
+    need_ok(gl_terrain_begin(&s->gl, camera, sky));
+    need_ok(terrimp_view_render(view, &callbacks));
+    gl_terrain_end(&s->gl);
+    context_read(&s->context, rgb);
+}
+
+/* Updates and draws. */
+static terrimp_stats draw_pose(scene *s, terrimp_view *view, const flight_pose *pose,
+                               const uint8_t sky[3], uint8_t *rgb)
+{
+    terrimp_stats stats;
+    terrimp_camera camera = aim(s, view, pose, &stats);
+    tap t = tap_open(s);
+    draw(s, view, &camera, &t, sky, rgb);
+    return stats;
+}
+
+static void keep_picture(const scene *s, const char *what, size_t frame, const uint8_t *rgb)
+{
+    char path[256];
+    snprintf(path, sizeof path, "build/test/render_%s_%s_%03u.png", s->name, what,
+             (unsigned)frame);
+    if (!image_write_png(path, rgb, s->width, s->height))
+        fprintf(stderr, "see %s\n", path);
+}
+
+/* ---- Flights ------------------------------------------------------------ */
+
+/* A pose at a place of the terrain (0..1 along x and z), so high over its ground, looking along a
+   heading (from +x towards +z) and down. */
+static flight_pose pose_at(const scene *s, float u, float v, float clearance, float heading_degrees,
+                           float down_degrees)
+{
+    const terrimp_box *box = &s->info.box;
+    float heading = heading_degrees * DEGREE, down = down_degrees * DEGREE, ground;
+    flight_pose pose;
+    pose.eye[0] = box->min[0] + u * (box->max[0] - box->min[0]);
+    pose.eye[2] = box->min[2] + v * (box->max[2] - box->min[2]);
+    need_ok(terrimp_heightfield_height(&s->field, pose.eye[0], pose.eye[2], &ground));
+    pose.eye[1] = ground + clearance;
+    pose.target[0] = pose.eye[0] + clearance * cosf(down) * cosf(heading);
+    pose.target[1] = pose.eye[1] - clearance * sinf(down);
+    pose.target[2] = pose.eye[2] + clearance * cosf(down) * sinf(heading);
+    return pose;
+}
+
+enum { WILD_FRAMES = 24 };
+
+/* All that is hard: a glide, sharp turns, teleports, and a dive through the fade band. `reach` is
+   the height from which only terrain is in sight, for a field of view of 40 degrees. */
+static void wild_flight(const scene *s, float reach, flight_pose poses[WILD_FRAMES])
+{
+    int i;
+    check_state = 4711u;
+    for (i = 0; i < 8; i++) {
+        float t = 0.3f + 0.012f * (float)i;
+        poses[i] = pose_at(s, t, t, reach, 45.0f, 50.0f);
+    }
+    for (; i < 14; i++)
+        poses[i] = pose_at(s, 0.5f, 0.5f, reach, (float)random_range(0, 359), 55.0f);
+    poses[i++] = pose_at(s, 0.70f, 0.30f, 0.8f * reach, 135.0f, 50.0f);
+    poses[i++] = pose_at(s, 0.30f, 0.72f, 0.5f * reach, -40.0f, 50.0f);
+    for (; i < WILD_FRAMES; i++) {
+        float t = (float)(i - 16) / 7.0f;
+        poses[i] = pose_at(s, 0.4f + 0.1f * t, 0.5f, reach * (1.0f - 0.85f * t), 20.0f, 50.0f);
+    }
+}
+
+/* ---- Measures ----------------------------------------------------------- */
+
+static int same_pixel(const uint8_t *a, const uint8_t *b)
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static size_t count_different(const uint8_t *a, const uint8_t *b, size_t pixels)
+{
+    size_t i, count = 0;
+    for (i = 0; i < pixels; i++)
+        count += (size_t)!same_pixel(a + i * 3, b + i * 3);
+    return count;
+}
+
+static size_t count_colour(const uint8_t *rgb, const uint8_t colour[3], size_t pixels)
+{
+    size_t i, count = 0;
+    for (i = 0; i < pixels; i++)
+        count += (size_t)same_pixel(rgb + i * 3, colour);
+    return count;
+}
+
+/* Over the pixels where either picture shows terrain. */
+static double psnr(const scene *s, const uint8_t *a, const uint8_t *b)
+{
+    return image_psnr(image_mean_square(a, b, s->pixels, light_blue));
+}
+
+/* Whether a pixel of the colour lies within r columns and rows of (x, y). */
+static int is_near_colour(const scene *s, const uint8_t *rgb, const uint8_t colour[3], int x, int y,
+                          int r)
+{
+    int i, j;
+    for (j = y < r ? 0 : y - r; j <= y + r && j < s->height; j++)
+        for (i = x < r ? 0 : x - r; i <= x + r && i < s->width; i++)
+            if (same_pixel(rgb + (j * s->width + i) * 3, colour))
+                return 1;
+    return 0;
+}
+
+/* How many pixels of sky one picture has farther than r pixels from any of the other's. */
+static size_t stray_sky(const scene *s, const uint8_t *from, const uint8_t *to, int r)
+{
+    size_t count = 0;
+    int x, y;
+    for (y = 0; y < s->height; y++)
+        for (x = 0; x < s->width; x++)
+            count += same_pixel(from + (y * s->width + x) * 3, magenta)
+                     && !is_near_colour(s, to, magenta, x, y, r);
+    return count;
+}
+
+/* ---- No holes ----------------------------------------------------------- */
+
+/* Draws one pose before two colours. The pixels that tell them apart are those that one can see
+   through, wholly or a little. */
+static size_t see_through(scene *s, terrimp_view *view, const flight_pose *pose, int floor,
+                          uint8_t *a, uint8_t *b, terrimp_stats *stats)
+{
+    terrimp_camera camera = aim(s, view, pose, stats);
+    tap t = tap_open(s);
+    if (!floor)
+        t.to.draw_floor = NULL;
+    draw(s, view, &camera, &t, magenta, a);
+    t.hold_captures = 1;
+    draw(s, view, &camera, &t, green, b);
+    return count_different(a, b, s->pixels);
+}
+
+/* The wild flight: the full picture proves that there is only terrain in sight. */
+static void check_full_covers(scene *s, float reach)
+{
+    terrimp_view *view = open_full_view(s);
+    uint8_t *picture = open_picture(s);
+    flight_pose poses[WILD_FRAMES];
+    size_t i;
+    wild_flight(s, reach, poses);
+    for (i = 0; i < WILD_FRAMES; i++) {
+        draw_pose(s, view, &poses[i], magenta, picture);
+        CHECK(count_colour(picture, magenta, s->pixels) == 0);
+    }
+    free(picture);
+    terrimp_view_destroy(view);
+}
+
+/* The same with impostors; returns how many pixels one can see through. Halfway all pictures are
+   thrown away: they are made anew then. */
+static size_t holes_of_impostors(scene *s, float reach, const char *what, int floor,
+                                 const terrimp_view_desc *settings)
+{
+    terrimp_view *view = open_view(s, settings);
+    uint8_t *a = open_picture(s), *b = open_picture(s);
+    flight_pose poses[WILD_FRAMES];
+    uint32_t captures = 0, waiting = 0;
+    terrimp_stats stats;
+    size_t i, holes, all = 0;
+    wild_flight(s, reach, poses);
+    for (i = 0; i < WILD_FRAMES; i++) {
+        if (i == 6)
+            terrimp_view_invalidate(view);
+        holes = see_through(s, view, &poses[i], floor, a, b, &stats);
+        if (holes && !all && floor)
+            keep_picture(s, "holes", i, a);
+        all += holes;
+        captures += stats.captures;
+        waiting += stats.waiting;
+    }
+    printf("  %s, %s: %u pictures made, %u waited for, %u pixels are holes\n", s->name, what,
+           (unsigned)captures, (unsigned)waiting, (unsigned)all);
+    CHECK(captures > 0);
+    free(a);
+    free(b);
+    terrimp_view_destroy(view);
+    return all;
+}
+
+static terrimp_view_desc fade_between(float start, float end)
+{
+    terrimp_view_desc settings;
+    memset(&settings, 0, sizeof settings);
+    settings.fade_start = start;
+    settings.fade_end = end;
+    return settings;
+}
+
+/* Settings that strain refreshes, fades and the atlas. */
+static void check_strained(scene *s, float reach)
+{
+    terrimp_view_desc waits, wide = fade_between(0.5f * reach, 2.5f * reach);
+    terrimp_view_desc stale = fade_between(0.01f * reach, 0.02f * reach);
+    memset(&waits, 0, sizeof waits);
+    waits.max_captures = 5;
+    stale.max_angle_rad = 0.3f;
+    stale.tolerance_px = 10.0f;
+    CHECK(holes_of_impostors(s, reach, "5 pictures a frame", 1, &waits) == 0);
+    CHECK(holes_of_impostors(s, reach, "wide fade band", 1, &wide) == 0);
+    CHECK(holes_of_impostors(s, reach, "stale pictures", 1, &stale) == 0);
+}
+
+static void no_hole_in_hills(void)
+{
+    scene s;
+    open_hills(&s, 480, 384, 40.0f);
+    check_full_covers(&s, 100.0f);
+    CHECK(holes_of_impostors(&s, 100.0f, "default settings", 1, NULL) == 0);
+    check_strained(&s, 100.0f);
+    holes_of_impostors(&s, 100.0f, "without the floor, for information", 0, NULL);
+    scene_close(&s);
+}
+
+static void no_hole_in_rough_terrain(void)
+{
+    scene s;
+    open_rough(&s, 480, 384, 40.0f);
+    check_full_covers(&s, 45.0f);
+    CHECK(holes_of_impostors(&s, 45.0f, "default settings", 1, NULL) == 0);
+    check_strained(&s, 45.0f);
+    holes_of_impostors(&s, 45.0f, "without the floor, for information", 0, NULL);
+    scene_close(&s);
+}
+
+static void no_hole_in_a_real_tile(void)
+{
+    static const dem_desc part = { 0, 0, 0, 300, 300, 577, 577 };
+    scene s;
+    if (!open_tile(&s, "N42E001.hgt", &part)) {
+        SKIP("there is no N42E001.hgt");
+        return;
+    }
+    scene_show(&s, 480, 384, 40.0f, ATLAS);
+    check_full_covers(&s, 8000.0f);
+    CHECK(holes_of_impostors(&s, 8000.0f, "default settings", 1, NULL) == 0);
+    holes_of_impostors(&s, 8000.0f, "without the floor, for information", 0, NULL);
+    scene_close(&s);
+}
+
+/* ---- Silhouettes -------------------------------------------------------- */
+
+enum { ROUND_FRAMES = 12, STRAY = 2 };
+
+/* All round the horizon, low and then higher, with sky in every picture. */
+static void round_flight(const scene *s, flight_pose poses[ROUND_FRAMES])
+{
+    int i;
+    for (i = 0; i < ROUND_FRAMES; i++) {
+        float t = (float)i / (float)ROUND_FRAMES;
+        poses[i] = pose_at(s, 0.5f + 0.3f * cosf(6.28f * t), 0.5f + 0.3f * sinf(6.28f * t),
+                           s->height_range * (0.1f + 0.8f * t), 77.0f * (float)i, 8.0f + 12.0f * t);
+    }
+}
+
+/* Where one picture shows sky, so does the other nearby. */
+static void check_silhouettes(scene *s)
+{
+    terrimp_view *view = open_view(s, NULL), *full = open_full_view(s);
+    uint8_t *a = open_picture(s), *b = open_picture(s);
+    flight_pose poses[ROUND_FRAMES];
+    size_t i, cut = 0, added = 0, sky = 0;
+    round_flight(s, poses);
+    for (i = 0; i < ROUND_FRAMES; i++) {
+        size_t cut_here, added_here;
+        draw_pose(s, view, &poses[i], magenta, a);
+        draw_pose(s, full, &poses[i], magenta, b);
+        cut_here = stray_sky(s, a, b, STRAY);
+        added_here = stray_sky(s, b, a, STRAY);
+        if (cut_here + added_here) {
+            keep_picture(s, "silhouette", i, a);
+            keep_picture(s, "silhouette_full", i, b);
+        }
+        cut += cut_here;
+        added += added_here;
+        sky += count_colour(b, magenta, s->pixels);
+    }
+    printf("  %s: sky more than %d px from where it should be: %u pixels, terrain: %u, of %u of "
+           "sky\n", s->name, STRAY, (unsigned)cut, (unsigned)added, (unsigned)sky);
+    CHECK(sky > 1000);
+    CHECK(cut == 0);
+    CHECK(added == 0);
+    free(a);
+    free(b);
+    terrimp_view_destroy(view);
+    terrimp_view_destroy(full);
+}
+
+static void silhouettes_stand_where_they_should(void)
+{
+    scene s;
+    open_hills(&s, 640, 512, 60.0f);
+    check_silhouettes(&s);
+    scene_close(&s);
+    open_rough(&s, 640, 512, 60.0f);
+    check_silhouettes(&s);
+    scene_close(&s);
+}
+
+/* ---- Likeness ----------------------------------------------------------- */
+
+/* Draws poses with impostors and in full; returns the least PSNR. With `fresh` every picture is
+   made anew for each pose. */
+static double worst_likeness(scene *s, const char *what, const terrimp_view_desc *settings,
+                             const flight_pose *poses, size_t count, int fresh, double floor_db)
+{
+    terrimp_view *view = open_view(s, settings), *full = open_full_view(s);
+    uint8_t *a = open_picture(s), *b = open_picture(s);
+    double worst = 99.0, sum = 0.0;
+    size_t i;
+    for (i = 0; i < count; i++) {
+        double likeness;
+        if (fresh)
+            terrimp_view_invalidate(view);
+        draw_pose(s, view, &poses[i], light_blue, a);
+        draw_pose(s, full, &poses[i], light_blue, b);
+        likeness = psnr(s, a, b);
+        if (likeness < floor_db) {
+            keep_picture(s, what, i, a);
+            keep_picture(s, "full", i, b);
+        }
+        sum += likeness;
+        worst = likeness < worst ? likeness : worst;
+    }
+    printf("  %s, %s: PSNR over terrain at least %.2f dB, mean %.2f, of %u frames\n", s->name, what,
+           worst, sum / (double)count, (unsigned)count);
+    free(a);
+    free(b);
+    terrimp_view_destroy(view);
+    terrimp_view_destroy(full);
+    return worst;
+}
+
+/* Poses of all heights and directions, the last two straight down and level. */
+enum { SAMPLE_POSES = 5 };
+static void sample_poses(const scene *s, flight_pose poses[SAMPLE_POSES])
+{
+    float h = s->height_range;
+    poses[0] = pose_at(s, 0.15f, 0.20f, 0.2f * h, 50.0f, 8.0f);
+    poses[1] = pose_at(s, 0.80f, 0.30f, 1.0f * h, 160.0f, 20.0f);
+    poses[2] = pose_at(s, 0.50f, 0.95f, 3.0f * h, -90.0f, 35.0f);
+    poses[3] = pose_at(s, 0.45f, 0.50f, 5.0f * h, 10.0f, 89.0f);
+    poses[4] = pose_at(s, 0.60f, 0.65f, 0.1f * h, 225.0f, 0.0f);
+}
+
+static double flight_likeness(scene *s, float step, size_t frames, double floor_db)
+{
+    flight f;
+    double worst;
+    if (!flight_circle(&f, &s->field, frames, step))
+        need(f.error);
+    worst = worst_likeness(s, "flight", NULL, f.poses, f.count, 0, floor_db);
+    flight_free(&f);
+    return worst;
+}
+
+static void a_real_tile_looks_like_the_full_mesh(void)
+{
+    static const dem_desc whole; /* all zero */
+    flight_pose poses[SAMPLE_POSES];
+    scene s;
+    if (!open_tile(&s, "N42E001.hgt", &whole)) {
+        SKIP("there is no N42E001.hgt");
+        return;
+    }
+    scene_show(&s, 1280, 1024, 60.0f, 4096);
+    sample_poses(&s, poses);
+    CHECK(worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, 38.0) >= 38.0);
+    CHECK(flight_likeness(&s, 250.0f, 12, 36.0) >= 36.0);
+    scene_close(&s);
+}
+
+static void hills_look_like_the_full_mesh(void)
+{
+    flight_pose poses[SAMPLE_POSES];
+    terrimp_view_desc wide, coarse;
+    double sharp, blurred;
+    scene s;
+    open_hills(&s, 640, 512, 60.0f);
+    sample_poses(&s, poses);
+    sharp = worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, 30.0);
+    CHECK(sharp >= 30.0);
+    CHECK(flight_likeness(&s, 3.0f, 12, 30.0) >= 30.0);
+    wide = fade_between(1.0f, 3000.0f);
+    CHECK(worst_likeness(&s, "wide_fade_band", &wide, poses, SAMPLE_POSES, 1, 36.0) >= 36.0);
+    memset(&coarse, 0, sizeof coarse); /* the measure measures: what is bad gets less */
+    coarse.texels_per_px = 0.1f;
+    blurred = worst_likeness(&s, "a tenth of the texels", &coarse, poses, SAMPLE_POSES, 1, 0.0);
+    CHECK(blurred < sharp - 3.0);
+    scene_close(&s);
+}
+
+/* ---- Commands and pixels are repeatable --------------------------------- */
+
+enum { REPEAT_FRAMES = 10 };
+
+/* Everything anew, then a flight. Notes the commands and all pictures. */
+static uint64_t fly_once(uint8_t *pictures[REPEAT_FRAMES])
+{
+    flight_pose poses[WILD_FRAMES];
+    terrimp_camera camera;
+    terrimp_stats stats;
+    terrimp_view *view;
+    scene s;
+    tap t;
+    int i;
+    open_hills(&s, 320, 256, 40.0f);
+    view = open_view(&s, NULL);
+    wild_flight(&s, 60.0f, poses);
+    t = tap_open(&s);
+    for (i = 0; i < REPEAT_FRAMES; i++) {
+        pictures[i] = open_picture(&s);
+        camera = aim(&s, view, &poses[i * 2], &stats);
+        draw(&s, view, &camera, &t, light_blue, pictures[i]);
+    }
+    terrimp_view_destroy(view);
+    scene_close(&s);
+    return t.hash;
+}
+
+static void the_same_flight_gives_the_same_commands_and_pixels(void)
+{
+    uint8_t *first[REPEAT_FRAMES], *second[REPEAT_FRAMES];
+    int i;
+    CHECK(fly_once(first) == fly_once(second));
+    for (i = 0; i < REPEAT_FRAMES; i++) {
+        CHECK(memcmp(first[i], second[i], 320 * 256 * 3) == 0);
+        free(first[i]);
+        free(second[i]);
+    }
+}
+
+/* The run over OSMesa leaves a picture for the run over EGL, which compares: run.sh keeps the
+   order. */
+static void both_systems_draw_the_same_picture(void)
+{
+    static const char path[] = "build/test/render_osmesa.png";
+    flight_pose poses[SAMPLE_POSES];
+    terrimp_view *view;
+    uint8_t *picture;
+    scene s;
+    open_hills(&s, 640, 512, 60.0f);
+    view = open_view(&s, NULL);
+    picture = open_picture(&s);
+    sample_poses(&s, poses);
+    draw_pose(&s, view, &poses[1], light_blue, picture);
+#ifdef HOST_OSMESA
+    CHECK(image_write_png(path, picture, s.width, s.height) == NULL);
+#else
+    {
+        uint8_t *other;
+        int width, height;
+        if (image_read_png(path, &other, &width, &height))
+            SKIP("the OSMesa run has left no picture to compare with");
+        else {
+            CHECK(width == s.width && height == s.height);
+            printf("  OSMesa and EGL: PSNR %.2f dB\n", psnr(&s, picture, other));
+            CHECK(psnr(&s, picture, other) >= 50.0);
+            free(other);
+        }
+    }
+#endif
+    free(picture);
+    terrimp_view_destroy(view);
+    scene_close(&s);
+}
+
+/* ---- Slots of the atlas ------------------------------------------------- */
+
+static void paint_atlas(const scene *s, int atlas)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, s->gl.atlas_frame[atlas]);
+    glDisable(GL_SCISSOR_TEST);
+    glClearColor(1.0f, 0.0f, 1.0f, 1.0f);
+    glClear(GL_COLOR_BUFFER_BIT);
+}
+
+static void read_atlas(const scene *s, int atlas, uint8_t *rgba)
+{
+    glBindTexture(GL_TEXTURE_2D, s->gl.atlas[atlas]);
+    glGetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+}
+
+/* Counts for every texel of an atlas the captures whose slot it lies in. */
+static void count_slots(const scene *s, const tap *t, uint32_t atlas, uint8_t *covered)
+{
+    uint32_t side = (uint32_t)s->gl.atlas_size, x, y;
+    size_t i;
+    memset(covered, 0, (size_t)side * side);
+    for (i = 0; i < t->capture_count; i++) {
+        const terrimp_rect *r = &t->captures[i].slot;
+        if (t->captures[i].atlas != atlas)
+            continue;
+        CHECK(r->width > 0 && r->height > 0);
+        CHECK(r->x + r->width <= side && r->y + r->height <= side);
+        for (y = r->y; y < r->y + r->height; y++)
+            for (x = r->x; x < r->x + r->width; x++)
+                covered[(size_t)y * side + x]++;
+    }
+}
+
+/* Texels that break a law: in two slots, drawn to outside of slots, not drawn to inside. */
+static size_t count_strays(const uint8_t *rgba, const uint8_t *covered, size_t texels)
+{
+    size_t i, strays = 0;
+    for (i = 0; i < texels; i++) {
+        int painted = same_pixel(rgba + i * 4, magenta) && rgba[i * 4 + 3] == 255;
+        strays += covered[i] > 1 || painted != !covered[i];
+    }
+    return strays;
+}
+
+static void captures_keep_to_their_slots(void)
+{
+    size_t texels = (size_t)ATLAS * ATLAS;
+    uint8_t *rgba = (uint8_t *)allocate(texels * 4), *covered = (uint8_t *)allocate(texels);
+    flight_pose poses[WILD_FRAMES];
+    uint8_t *picture;
+    terrimp_view *view;
+    uint32_t frame, atlas;
+    scene s;
+    open_hills(&s, 640, 512, 40.0f);
+    picture = open_picture(&s);
+    view = open_view(&s, NULL);
+    wild_flight(&s, 60.0f, poses);
+    for (frame = 0; frame < WILD_FRAMES; frame += 4) {
+        tap t = tap_open(&s);
+        terrimp_stats stats;
+        terrimp_camera camera = aim(&s, view, &poses[frame], &stats);
+        t.captures = (terrimp_capture_command *)allocate(sizeof *t.captures
+                                                         * (stats.captures + 1));
+        paint_atlas(&s, 0);
+        paint_atlas(&s, 1);
+        draw(&s, view, &camera, &t, light_blue, picture);
+        CHECK(t.capture_count == stats.captures && stats.captures > 0);
+        for (atlas = 0; atlas < 2; atlas++) {
+            count_slots(&s, &t, atlas, covered);
+            read_atlas(&s, (int)atlas, rgba);
+            CHECK(count_strays(rgba, covered, texels) == 0);
+        }
+        free(t.captures);
+    }
+    free(rgba);
+    free(covered);
+    free(picture);
+    terrimp_view_destroy(view);
+    scene_close(&s);
+}
+
+/* What lies between the slots does not show: not through the filter at their rims, nor where a
+   mesh reaches beyond its picture. */
+static void frames_show_nothing_from_outside_of_the_slots(void)
+{
+    size_t texels = (size_t)ATLAS * ATLAS, i;
+    uint8_t *rgba = (uint8_t *)allocate(texels * 4), *covered = (uint8_t *)allocate(texels);
+    flight_pose poses[SAMPLE_POSES];
+    uint8_t *a, *b;
+    terrimp_camera camera;
+    terrimp_stats stats;
+    terrimp_view *view;
+    scene s;
+    tap t;
+    uint32_t atlas, p;
+    open_hills(&s, 640, 512, 60.0f);
+    a = open_picture(&s);
+    b = open_picture(&s);
+    view = open_view(&s, NULL);
+    sample_poses(&s, poses);
+    for (p = 0; p < SAMPLE_POSES; p++) {
+        size_t different;
+        terrimp_view_invalidate(view);
+        camera = aim(&s, view, &poses[p], &stats);
+        t = tap_open(&s);
+        t.captures = (terrimp_capture_command *)allocate(sizeof *t.captures
+                                                         * (stats.captures + 1));
+        draw(&s, view, &camera, &t, light_blue, a);
+        for (atlas = 0; atlas < 2; atlas++) {
+            count_slots(&s, &t, atlas, covered);
+            read_atlas(&s, (int)atlas, rgba);
+            for (i = 0; i < texels; i++)
+                if (!covered[i])
+                    memcpy(rgba + i * 4, "\xff\x00\xff\xff", 4);
+            glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, ATLAS, ATLAS, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+        }
+        t.hold_captures = 1;
+        t.capture_count = 0;
+        draw(&s, view, &camera, &t, light_blue, b);
+        different = count_different(a, b, s.pixels);
+        if (different)
+            keep_picture(&s, "outside_of_slots", p, b);
+        printf("  pose %u: %u pixels from outside of the slots\n", p, (unsigned)different);
+        CHECK(different == 0);
+        free(t.captures);
+    }
+    free(rgba);
+    free(covered);
+    free(a);
+    free(b);
+    terrimp_view_destroy(view);
+    scene_close(&s);
+}
+
+int main(void)
+{
+    setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
+    RUN(no_hole_in_hills);
+    RUN(no_hole_in_rough_terrain);
+    RUN(no_hole_in_a_real_tile);
+    RUN(silhouettes_stand_where_they_should);
+    RUN(hills_look_like_the_full_mesh);
+    RUN(a_real_tile_looks_like_the_full_mesh);
+    RUN(the_same_flight_gives_the_same_commands_and_pixels);
+    RUN(both_systems_draw_the_same_picture);
+    RUN(captures_keep_to_their_slots);
+    RUN(frames_show_nothing_from_outside_of_the_slots);
+    return check_report();
+}
