@@ -9,16 +9,14 @@
 
 #define SIDE 257
 
-typedef struct counts {
-    int impostors, ground, in_capture;
-} counts;
-
 static uint16_t samples[SIDE][SIDE];
+static int capturing, impostors, chunks_of_ground;
 
 /* In an engine: bind the atlas, viewport and scissor to the slot, clear it, set the matrices. */
 static void begin_capture(void *user, const terrimp_capture_command *c)
 {
-    ((counts *)user)->in_capture = 1;
+    (void)user;
+    capturing = 1;
     printf("  capture   chunk %2u -> atlas %u, %u x %u texels at (%u, %u)\n", c->node, c->atlas,
            c->slot.width, c->slot.height, c->slot.x, c->slot.y);
 }
@@ -26,36 +24,33 @@ static void begin_capture(void *user, const terrimp_capture_command *c)
 /* In an engine: bind the frame buffer and the camera's matrices again. */
 static void end_capture(void *user, const terrimp_capture_command *c)
 {
-    ((counts *)user)->in_capture = 0;
-    (void)c;
+    (void)user, (void)c;
+    capturing = 0;
 }
 
-/* In an engine: draw the indices over the chunk's mesh, textured with the atlas. */
+/* In an engine: draw the indices over the chunk's coarse mesh, textured with the atlas. */
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
-    ((counts *)user)->impostors++;
-    (void)c;
+    (void)user, (void)c;
+    impostors++;
 }
 
 /* In an engine: draw the indices over the chunk's vertices, with the ground's own shading. */
 static void draw_ground(void *user, const terrimp_ground_command *c)
 {
-    counts *drawn = (counts *)user;
-    if (!drawn->in_capture)
-        drawn->ground++;
-    (void)c;
+    (void)user, (void)c;
+    chunks_of_ground += !capturing;
 }
 
 int main(void)
 {
-    int x, z, frame;
-    counts drawn = {0, 0, 0};
     terrimp_terrain_desc desc = {0};
     terrimp_view_desc settings = {0};
     terrimp_camera camera = {0};
     terrimp_callbacks callbacks = {0};
     terrimp_terrain *terrain = NULL;
     terrimp_view *view = NULL;
+    int x, z, frame;
 
     for (z = 0; z < SIDE; z++)
         for (x = 0; x < SIDE; x++)
@@ -69,24 +64,19 @@ int main(void)
         terrimp_view_create(terrain, &settings, NULL, &view) != TERRIMP_OK)
         return 1;
 
-    callbacks.user = &drawn;
-    callbacks.begin_capture = begin_capture;
-    callbacks.end_capture = end_capture;
-    callbacks.draw_impostor = draw_impostor;
-    callbacks.draw_ground = draw_ground;
+    callbacks.begin_capture = begin_capture, callbacks.end_capture = end_capture;
+    callbacks.draw_impostor = draw_impostor, callbacks.draw_ground = draw_ground;
     camera.eye[0] = 128.0f, camera.eye[1] = 60.0f;
     camera.forward[1] = -0.3f, camera.forward[2] = 1.0f;
     camera.width_px = 640, camera.height_px = 480;
     camera.z_near = 1.0f, camera.z_far = 1000.0f;
-    for (frame = 0; frame < 8; frame++) {
-        drawn.impostors = drawn.ground = 0;
+    for (frame = 0; frame < 8; frame++, camera.eye[2] += 1.0f) {
+        impostors = chunks_of_ground = 0;
         printf("frame %d\n", frame);
         if (terrimp_view_update(view, &camera) != TERRIMP_OK ||
             terrimp_view_render(view, &callbacks) != TERRIMP_OK)
             return 1;
-        printf("  %d impostors, %d chunks of ground\n", drawn.impostors,
-               drawn.ground);
-        camera.eye[2] += 1.0f;
+        printf("  %d impostors, %d chunks of ground\n", impostors, chunks_of_ground);
     }
     terrimp_view_destroy(view);
     terrimp_terrain_destroy(terrain);
