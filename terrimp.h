@@ -111,8 +111,10 @@
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
        A picture shows a hidden slope with the ridge before it smeared over it once the eye has
        moved; max_angle_rad bounds how far that goes. What moves on the terrain belongs into the
-       host's own draws, not into captures. All impostors are level-0 chunks, so cost
-       grows with the number of chunks in sight.
+       host's own draws, not into captures. All impostors are level-0 chunks, so cost grows with
+       the number of chunks in sight. Ground fades by blending, and only whole chunks are sorted:
+       in the fade band a hidden slope can shine faintly through the ridge of its own chunk. From
+       beside the terrain no floor is drawn, since it would show below the border.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -1056,7 +1058,8 @@ typedef struct terrimp_impostor_command {
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain and has no gap. It comes after the impostors and shows only where none
    of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
-   terrain in truth too: no holes are left. Vertices, indices, depth bias: as for impostors. */
+   terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
+   border: there it is not drawn.) Vertices, indices, depth bias: as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
