@@ -65,8 +65,9 @@ demo: flyover
 test: | $(DEPS)
 	@sh tests/run.sh
 
-bench: $(BENCHES)
+bench: $(BENCHES) flyover
 	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
+	@BUILD=$(BUILD) sh tests/bench_frames.sh
 
 clean:
 	rm -rf build

@@ -83,17 +83,23 @@ static void scene_build(scene *s, const char *name, uint32_t chunk_quads)
     s->height_range = high - low;
 }
 
-static void scene_show(scene *s, int width, int height, float fov_degrees, uint32_t atlas)
+/* Fills the buffers of OpenGL; a view has to have atlases of the same size. */
+static void scene_fill(scene *s, uint32_t atlas)
 {
     uint8_t *lightmap = lightmap_bake(&s->field);
     need(lightmap ? NULL : "no lightmap");
+    need(gl_terrain_open(&s->gl, &s->context, s->terrain, &s->field, lightmap, atlas));
+    free(lightmap);
+}
+
+static void scene_show(scene *s, int width, int height, float fov_degrees, uint32_t atlas)
+{
     s->width = width;
     s->height = height;
     s->pixels = (size_t)width * (size_t)height;
     s->fov = fov_degrees * DEGREE;
     need(context_open(&s->context, width, height));
-    need(gl_terrain_open(&s->gl, &s->context, s->terrain, &s->field, lightmap, atlas));
-    free(lightmap);
+    scene_fill(s, atlas);
 }
 
 static void scene_close(scene *s)
@@ -193,8 +199,7 @@ static terrimp_view *open_view(const scene *s, const terrimp_view_desc *desc)
     memset(&settings, 0, sizeof settings);
     if (desc)
         settings = *desc;
-    if (!settings.atlas_size)
-        settings.atlas_size = (uint32_t)s->gl.atlas_size;
+    settings.atlas_size = (uint32_t)s->gl.atlas_size;
     need_ok(terrimp_view_create(s->terrain, &settings, NULL, &view));
     return view;
 }
@@ -366,7 +371,7 @@ static flight_pose pose_at(const scene *s, float u, float v, float clearance, fl
     return pose;
 }
 
-enum { WILD_FRAMES = 24 };
+enum { WILD_FRAMES = 18 };
 
 /* All that is hard: a glide, sharp turns, teleports, and a dive through the fade band. `reach` is
    the height from which only terrain is in sight, for a field of view of 40 degrees. */
@@ -374,16 +379,16 @@ static void wild_flight(const scene *s, float reach, flight_pose poses[WILD_FRAM
 {
     int i;
     check_state = 4711u;
-    for (i = 0; i < 8; i++) {
+    for (i = 0; i < 6; i++) {
         float t = 0.3f + 0.012f * (float)i;
         poses[i] = pose_at(s, t, t, reach, 45.0f, 50.0f);
     }
-    for (; i < 14; i++)
+    for (; i < 10; i++)
         poses[i] = pose_at(s, 0.5f, 0.5f, reach, (float)random_range(0, 359), 55.0f);
     poses[i++] = pose_at(s, 0.70f, 0.30f, 0.8f * reach, 135.0f, 50.0f);
     poses[i++] = pose_at(s, 0.30f, 0.72f, 0.5f * reach, -40.0f, 50.0f);
     for (; i < WILD_FRAMES; i++) {
-        float t = (float)(i - 16) / 7.0f;
+        float t = (float)(i - 12) / 5.0f;
         poses[i] = pose_at(s, 0.4f + 0.1f * t, 0.5f, reach * (1.0f - 0.85f * t), 20.0f, 50.0f);
     }
 }
@@ -444,18 +449,23 @@ static size_t stray_sky(const scene *s, const uint8_t *from, const uint8_t *to, 
 /* ---- No holes ----------------------------------------------------------- */
 
 /* Draws one pose before two colours. The pixels that tell them apart are those that one can see
-   through, wholly or a little. */
-static size_t see_through(scene *s, terrimp_view *view, const flight_pose *pose, int floor,
-                          uint8_t *a, uint8_t *b, terrimp_stats *stats)
+   through, wholly or a little. Without the floor there may be some: seams receives how many. */
+static size_t see_through(scene *s, terrimp_view *view, const flight_pose *pose, uint8_t *a,
+                          uint8_t *b, terrimp_stats *stats, size_t *seams)
 {
     terrimp_camera camera = aim(s, view, pose, stats);
     tap t = tap_open(s);
-    if (!floor)
-        t.to.draw_floor = NULL;
+    size_t holes;
     draw(s, view, &camera, &t, magenta, a);
     t.hold_captures = 1;
     draw(s, view, &camera, &t, green, b);
-    return count_different(a, b, s->pixels);
+    holes = count_different(a, b, s->pixels);
+    if (seams) {
+        t.to.draw_floor = NULL;
+        draw(s, view, &camera, &t, magenta, b);
+        *seams += count_colour(b, magenta, s->pixels);
+    }
+    return holes;
 }
 
 /* The wild flight: the full picture proves that there is only terrain in sight. */
@@ -474,23 +484,22 @@ static void check_full_covers(scene *s, float reach)
     terrimp_view_destroy(view);
 }
 
-/* The same with impostors; returns how many pixels one can see through. Halfway all pictures are
-   thrown away: they are made anew then. */
-static size_t holes_of_impostors(scene *s, float reach, const char *what, int floor,
-                                 const terrimp_view_desc *settings)
+/* The same with impostors. Halfway all pictures are thrown away: they are made anew then. */
+static void check_impostors_cover(scene *s, float reach, const char *what,
+                                  const terrimp_view_desc *settings)
 {
     terrimp_view *view = open_view(s, settings);
     uint8_t *a = open_picture(s), *b = open_picture(s);
     flight_pose poses[WILD_FRAMES];
     uint32_t captures = 0, waiting = 0;
+    size_t i, holes, all = 0, seams = 0;
     terrimp_stats stats;
-    size_t i, holes, all = 0;
     wild_flight(s, reach, poses);
     for (i = 0; i < WILD_FRAMES; i++) {
-        if (i == 6)
+        if (i == 4)
             terrimp_view_invalidate(view);
-        holes = see_through(s, view, &poses[i], floor, a, b, &stats);
-        if (holes && !all && floor)
+        holes = see_through(s, view, &poses[i], a, b, &stats, settings ? NULL : &seams);
+        if (holes && !all)
             keep_picture(s, "holes", i, a);
         all += holes;
         captures += stats.captures;
@@ -498,11 +507,13 @@ static size_t holes_of_impostors(scene *s, float reach, const char *what, int fl
     }
     printf("  %s, %s: %u pictures made, %u waited for, %u pixels are holes\n", s->name, what,
            (unsigned)captures, (unsigned)waiting, (unsigned)all);
+    if (!settings)
+        printf("  %s: without the floor %u would be\n", s->name, (unsigned)seams);
+    CHECK(all == 0);
     CHECK(captures > 0);
     free(a);
     free(b);
     terrimp_view_destroy(view);
-    return all;
 }
 
 static terrimp_view_desc fade_between(float start, float end)
@@ -514,39 +525,35 @@ static terrimp_view_desc fade_between(float start, float end)
     return settings;
 }
 
-/* Settings that strain refreshes, fades and the atlas. */
-static void check_strained(scene *s, float reach)
-{
-    terrimp_view_desc waits, wide = fade_between(0.5f * reach, 2.5f * reach);
-    terrimp_view_desc stale = fade_between(0.01f * reach, 0.02f * reach);
-    memset(&waits, 0, sizeof waits);
-    waits.max_captures = 5;
-    stale.max_angle_rad = 0.3f;
-    stale.tolerance_px = 10.0f;
-    CHECK(holes_of_impostors(s, reach, "5 pictures a frame", 1, &waits) == 0);
-    CHECK(holes_of_impostors(s, reach, "wide fade band", 1, &wide) == 0);
-    CHECK(holes_of_impostors(s, reach, "stale pictures", 1, &stale) == 0);
-}
-
 static void no_hole_in_hills(void)
 {
+    terrimp_view_desc waits, wide = fade_between(50.0f, 250.0f);
     scene s;
     open_hills(&s, 480, 384, 40.0f);
+    memset(&waits, 0, sizeof waits);
+    waits.max_captures = 5;
     check_full_covers(&s, 100.0f);
-    CHECK(holes_of_impostors(&s, 100.0f, "default settings", 1, NULL) == 0);
-    check_strained(&s, 100.0f);
-    holes_of_impostors(&s, 100.0f, "without the floor, for information", 0, NULL);
+    check_impostors_cover(&s, 100.0f, "default settings", NULL);
+    check_impostors_cover(&s, 100.0f, "5 pictures a frame", &waits);
+    check_impostors_cover(&s, 100.0f, "wide fade band", &wide);
     scene_close(&s);
 }
 
 static void no_hole_in_rough_terrain(void)
 {
+    terrimp_view_desc stale = fade_between(0.5f, 1.0f), small;
     scene s;
     open_rough(&s, 480, 384, 40.0f);
+    stale.max_angle_rad = 0.3f;
+    stale.tolerance_px = 10.0f;
+    memset(&small, 0, sizeof small);
+    small.max_impostors = 100;
     check_full_covers(&s, 45.0f);
-    CHECK(holes_of_impostors(&s, 45.0f, "default settings", 1, NULL) == 0);
-    check_strained(&s, 45.0f);
-    holes_of_impostors(&s, 45.0f, "without the floor, for information", 0, NULL);
+    check_impostors_cover(&s, 45.0f, "default settings", NULL);
+    check_impostors_cover(&s, 45.0f, "stale pictures", &stale);
+    gl_terrain_close(&s.gl);
+    scene_fill(&s, 256);
+    check_impostors_cover(&s, 45.0f, "small atlas", &small);
     scene_close(&s);
 }
 
@@ -560,14 +567,13 @@ static void no_hole_in_a_real_tile(void)
     }
     scene_show(&s, 480, 384, 40.0f, ATLAS);
     check_full_covers(&s, 8000.0f);
-    CHECK(holes_of_impostors(&s, 8000.0f, "default settings", 1, NULL) == 0);
-    holes_of_impostors(&s, 8000.0f, "without the floor, for information", 0, NULL);
+    check_impostors_cover(&s, 8000.0f, "default settings", NULL);
     scene_close(&s);
 }
 
 /* ---- Silhouettes -------------------------------------------------------- */
 
-enum { ROUND_FRAMES = 12, STRAY = 2 };
+enum { ROUND_FRAMES = 8, STRAY = 2 };
 
 /* All round the horizon, low and then higher, with sky in every picture. */
 static void round_flight(const scene *s, flight_pose poses[ROUND_FRAMES])
@@ -626,6 +632,11 @@ static void silhouettes_stand_where_they_should(void)
 
 /* ---- Likeness ----------------------------------------------------------- */
 
+/* What pictures must reach at least, [dB] of PSNR over the pixels of terrain. */
+#define FIRST_DB 38.0
+#define FLIGHT_DB 36.0
+#define HILLS_DB 36.0
+
 /* Draws poses with impostors and in full; returns the least PSNR. With `fresh` every picture is
    made anew for each pose. */
 static double worst_likeness(scene *s, const char *what, const terrimp_view_desc *settings,
@@ -658,16 +669,17 @@ static double worst_likeness(scene *s, const char *what, const terrimp_view_desc
     return worst;
 }
 
-/* Poses of all heights and directions, the last two straight down and level. */
+/* Poses of all heights and directions: low over the ground, straight down, level; then two from
+   where most of the terrain is in sight, the far ridges a pixel or two high. */
 enum { SAMPLE_POSES = 5 };
 static void sample_poses(const scene *s, flight_pose poses[SAMPLE_POSES])
 {
     float h = s->height_range;
     poses[0] = pose_at(s, 0.15f, 0.20f, 0.2f * h, 50.0f, 8.0f);
-    poses[1] = pose_at(s, 0.80f, 0.30f, 1.0f * h, 160.0f, 20.0f);
-    poses[2] = pose_at(s, 0.50f, 0.95f, 3.0f * h, -90.0f, 35.0f);
-    poses[3] = pose_at(s, 0.45f, 0.50f, 5.0f * h, 10.0f, 89.0f);
-    poses[4] = pose_at(s, 0.60f, 0.65f, 0.1f * h, 225.0f, 0.0f);
+    poses[1] = pose_at(s, 0.45f, 0.50f, 5.0f * h, 10.0f, 89.0f);
+    poses[2] = pose_at(s, 0.60f, 0.65f, 0.1f * h, 225.0f, 0.0f);
+    poses[3] = pose_at(s, 0.80f, 0.30f, 1.0f * h, 160.0f, 20.0f);
+    poses[4] = pose_at(s, 0.50f, 0.95f, 3.0f * h, -90.0f, 35.0f);
 }
 
 static double flight_likeness(scene *s, float step, size_t frames, double floor_db)
@@ -692,8 +704,8 @@ static void a_real_tile_looks_like_the_full_mesh(void)
     }
     scene_show(&s, 1280, 1024, 60.0f, 4096);
     sample_poses(&s, poses);
-    CHECK(worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, 38.0) >= 38.0);
-    CHECK(flight_likeness(&s, 250.0f, 12, 36.0) >= 36.0);
+    CHECK(worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, FIRST_DB) >= FIRST_DB);
+    CHECK(flight_likeness(&s, 500.0f, 12, FLIGHT_DB) >= FLIGHT_DB);
     scene_close(&s);
 }
 
@@ -705,21 +717,22 @@ static void hills_look_like_the_full_mesh(void)
     scene s;
     open_hills(&s, 640, 512, 60.0f);
     sample_poses(&s, poses);
-    sharp = worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, 30.0);
-    CHECK(sharp >= 30.0);
-    CHECK(flight_likeness(&s, 3.0f, 12, 30.0) >= 30.0);
+    sharp = worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, HILLS_DB);
+    CHECK(sharp >= HILLS_DB);
+    CHECK(flight_likeness(&s, 3.0f, 12, HILLS_DB) >= HILLS_DB);
     wide = fade_between(1.0f, 3000.0f);
-    CHECK(worst_likeness(&s, "wide_fade_band", &wide, poses, SAMPLE_POSES, 1, 36.0) >= 36.0);
+    CHECK(worst_likeness(&s, "wide_fade_band", &wide, poses, SAMPLE_POSES, 1, FLIGHT_DB)
+          >= FLIGHT_DB);
     memset(&coarse, 0, sizeof coarse); /* the measure measures: what is bad gets less */
     coarse.texels_per_px = 0.1f;
     blurred = worst_likeness(&s, "a tenth of the texels", &coarse, poses, SAMPLE_POSES, 1, 0.0);
-    CHECK(blurred < sharp - 3.0);
+    CHECK(blurred < HILLS_DB - 5.0);
     scene_close(&s);
 }
 
 /* ---- Commands and pixels are repeatable --------------------------------- */
 
-enum { REPEAT_FRAMES = 10 };
+enum { REPEAT_FRAMES = 8 };
 
 /* Everything anew, then a flight. Notes the commands and all pictures. */
 static uint64_t fly_once(uint8_t *pictures[REPEAT_FRAMES])
@@ -770,7 +783,7 @@ static void both_systems_draw_the_same_picture(void)
     view = open_view(&s, NULL);
     picture = open_picture(&s);
     sample_poses(&s, poses);
-    draw_pose(&s, view, &poses[1], light_blue, picture);
+    draw_pose(&s, view, &poses[3], light_blue, picture);
 #ifdef HOST_OSMESA
     CHECK(image_write_png(path, picture, s.width, s.height) == NULL);
 #else
