@@ -87,8 +87,8 @@ echo "Machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2> /dev/null | h
      "$(getconf _NPROCESSORS_ONLN) processors"
 echo "Renderer: $(value renderer)"
 echo "Frames: $frames of 1280x1024 for each scene, drawn with impostors and in full in turn."
-echo "Times are medians; the mean ratio has the first frame and all captures in it. PSNR [dB] is over"
-echo "terrain pixels, against full; triangles, draws and captures are means of a frame."
+echo "Times are medians; the mean ratio has the first frame and all captures in it. PSNR [dB] is"
+echo "over terrain pixels, against full; triangles, draws and captures are means of a frame."
 
 heading "scene"
 measure "procedural 2049 x 2049, circle at 80 units/s, as Hess" --speed 80
