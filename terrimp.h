@@ -1009,7 +1009,7 @@ typedef struct terrimp_view_desc {
                                [Limits: 0.05..100] [Default 0 -> 1] */
     float texels_per_px;    /* sharpness of a picture when it is made
                                [Limits: 0.1..8] [Default 0 -> 2] */
-    uint32_t atlas_size;    /* texels along the side of each of the two atlases, exactly
+    uint32_t atlas_size;    /* texels along the side of each of the host's two atlas textures
                                [Limits: 64..32768] [Default 0 -> 4096] */
     uint32_t max_impostors; /* pictures kept at most [Limits: 1..65535] [Default 0 -> 2048] */
     uint32_t max_captures;  /* pictures made in one frame at most; the most urgent go first, and a
