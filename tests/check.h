@@ -9,6 +9,11 @@
 static int check_passed, check_failed, check_skipped;
 static int check_bad; /* failed checks within the running test */
 
+#ifndef CHECK_SEED
+#define CHECK_SEED 2463534242u /* -DCHECK_SEED=n tests with other numbers */
+#endif
+static uint32_t check_state = CHECK_SEED;
+
 /* Notes a failed condition and goes on; at most three lines a test. */
 #define CHECK(condition)                                                                 \
     do {                                                                                 \
@@ -16,10 +21,12 @@ static int check_bad; /* failed checks within the running test */
             fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, __func__, #condition); \
     } while (0)
 
-/* Runs one test function; its name says the behaviour. */
+/* Runs one test function; its name says the behaviour. Each starts with the same random numbers,
+   whatever ran before it. */
 #define RUN(test)                                                    \
     do {                                                             \
         check_bad = 0;                                               \
+        check_state = CHECK_SEED;                                    \
         test();                                                      \
         if (check_bad)                                               \
             fprintf(stderr, "FAILED %s (%d)\n", #test, check_bad);   \
@@ -30,7 +37,6 @@ static int check_bad; /* failed checks within the running test */
 /* A test that cannot run here says why and counts as skipped. */
 #define SKIP(why) (printf("skipped %s: %s\n", __func__, why), check_skipped++, check_passed--)
 
-static uint32_t check_state = 2463534242u;
 
 /* Uniform 32-bit numbers (Marsaglia's xorshift), the same on every machine. */
 static uint32_t random_bits(void)

@@ -195,7 +195,7 @@ static void coarse_mesh_covers_the_tile_one_to_one_within_budget_and_reports_its
         border = t->mesh.border_vertex_count;
         CHECK(t->mesh.surface_index_count <= 3 * t->budget);
         CHECK(t->mesh.surface_index_count == 3 * (2 * t->mesh.vertex_count - border - 2));
-        if (most > 2 * t->budget && cols > 8 && rows > 8 && round % SIMP_KINDS < 3)
+        if (most > 2 * t->budget && cols > 16 && rows > 16 && round % SIMP_KINDS < 3)
             CHECK(t->mesh.surface_index_count / 3 + 1 >= t->budget);
         simp_check_errors(t);
         simp_free(t);
