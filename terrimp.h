@@ -40,8 +40,9 @@
        >>config       compile-time switches, version
        >>basics       result codes, boxes
        >>heightfield  a view of the caller's samples; heights, normals, rays, filling of voids
-       >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>camera       the frame's camera, culling, the frustum fitted to a box
+       >>geomipmap    levels, errors, crack-free index patterns, selection, morphing
+       >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
        >>atlas        first-fit decreasing height packing; two atlases in turn
        >>terrain      building, the per-frame decision, the draw commands
@@ -129,6 +130,7 @@
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
        de Boer  W. H. de Boer, Fast Terrain Rendering Using Geometrical MipMapping, 2000
+       Wagner   D. Wagner, Terrain Geomorphing in the Vertex Shader, in ShaderX2, 2003
        FFDH     E. G. Coffman, M. R. Garey, D. S. Johnson, R. E. Tarjan, Performance Bounds for
                 Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980 */
 
@@ -363,6 +365,348 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
                                                        const float direction[3],
                                                        float max_distance, terrimp_ray_hit *hit);
 
+/* ==== Camera ============================================================= >>camera */
+
+/* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
+typedef struct terrimp_camera {
+    float eye[3];           /* [wu] */
+    float forward[3];       /* (required) viewing direction, any length > 0 */
+    float up[3];            /* [Default 0,0,0 -> 0,1,0]; along forward: another one is chosen */
+    float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
+    uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
+    uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
+    float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
+    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near].
+                               What is drawn may need more: see terrimp_stats.z_far */
+    int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
+} terrimp_camera;
+
+/* Writes the effective camera: defaults filled in, forward and up orthonormal.
+
+   camera     in
+   out        may be camera
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits */
+TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
+                                                  terrimp_camera *out);
+
+/* View and projection matrix, for column vectors, column-major.
+
+   view          [16] out, world to eye space (x right, y up, looking along -z)
+   projection    [16] out, eye space to clip space
+   Errors        those of terrimp_camera_resolve */
+TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
+                                                   float projection[16]);
+
+/* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
+   height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
+
+   Errors     those of terrimp_camera_resolve
+   Source     de Boer 2000, equations 1a to 1c: K = C * tolerance */
+TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
+
+/* The six planes of a viewing volume. A point p is inside plane i when
+   dot(plane[i].xyz, p - eye) + plane[i].w >= 0: relative to the eye, so that huge worlds keep
+   precision. */
+typedef struct terrimp_frustum {
+    float eye[3];
+    float plane[6][4]; /* left, right, down, up, near, far; normals need not be unit */
+} terrimp_frustum;
+
+enum {
+    TERRIMP_PLANES_ALL = 0x3f, /* start with this mask at the root of a hierarchy */
+    TERRIMP_PLANES_OUTSIDE = -1
+};
+
+/* The planes of a camera. Errors: those of terrimp_camera_resolve. */
+TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
+                                                  terrimp_frustum *frustum);
+
+/* Tests a box against the planes of a mask (bit i: plane i), for use down a hierarchy: a child of a
+   box inside a plane need not be tested against it again.
+
+   frustum, box   not null
+   returns    TERRIMP_PLANES_OUTSIDE when the box is outside of one of the planes, else the mask of
+              the planes that still cross it; 0: wholly inside. A box near an edge of the frustum
+              may be reported as crossing though it is outside: never the other way round.
+   Source     de Boer 2000, section 2.2 */
+TERRIMP_API int terrimp_frustum_test(const terrimp_frustum *frustum, const terrimp_box *box,
+                                     int mask);
+
+/* Distances from a point to the closest (0 inside) and to the farthest point of a box [wu]. No
+   pointer may be null. */
+TERRIMP_API float terrimp_box_distance(const terrimp_box *box, const float point[3]);
+TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point[3]);
+
+/* A perspective frustum fitted to a box: the camera of a capture. Its sides are tangents, that is
+   offsets along right and up at distance 1 along forward; left and down are the smaller ones. */
+typedef struct terrimp_capture {
+    float eye[3];
+    float right[3], up[3], forward[3]; /* orthonormal */
+    float z_near, z_far;               /* [wu] along forward */
+    float tan_left, tan_right, tan_down, tan_up;
+} terrimp_capture;
+
+/* Fits a frustum with its apex at the eye and its axis through the middle of the box around the
+   box's eight corners, as tightly as the axis allows.
+
+   box        any extents >= 0, flat ones too
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE when a minimum exceeds its maximum; E_INSIDE when the
+              eye is in the box; E_BEHIND when a corner is not in front of the eye
+   Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
+              axis) is useless, -z is up. */
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture);
+
+/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
+TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
+                                                    int depth_zero_to_one, float view[16],
+                                                    float projection[16]);
+
+/* ==== Geomipmap ========================================================== >>geomipmap */
+
+/* Geometrical mipmapping alone: a quadtree of nodes over a heightfield. A node of level L covers
+   (chunk_quads << L)^2 quads of the field and is always drawn as chunk_quads x chunk_quads quads,
+   every 2^L-th sample; vertices beyond the last column or row stand on it. So one shared index
+   buffer serves every node. Nodes are numbered level by level from the finest up, each level row by
+   row; the last one is the root.
+
+   How to use it: init, build (both once), then select each frame: it lists the nodes to draw. */
+
+/* --- patterns: the shared index buffer --- */
+
+/* Borders of a node, and the bit that a pattern has for each where the neighbour is one level
+   coarser: there the node leaves out its odd border vertices, which the neighbour lacks. */
+enum {
+    TERRIMP_SIDE_Z0 = 0, /* towards -z */
+    TERRIMP_SIDE_Z1,
+    TERRIMP_SIDE_X0,     /* towards -x */
+    TERRIMP_SIDE_X1,
+    TERRIMP_SIDE_COUNT,
+    TERRIMP_PATTERN_COUNT = 16 /* bit i of a pattern: side i is coarse */
+};
+
+/* How the index buffer is made. */
+typedef enum terrimp_form {
+    TERRIMP_FORM_LIST = 0, /* triangle lists */
+    TERRIMP_FORM_STRIP,    /* each pattern is one triangle strip */
+    TERRIMP_FORM_STITCHED, /* lists for morphing: odd vertices of coarse borders are kept, on the
+                              neighbour's edge, and triangles of no area close what rounding could
+                              open. To leave a vertex out changes the triangles beside it, which
+                              shows where these have not morphed: the one pop that morphing cannot
+                              prevent otherwise */
+    TERRIMP_FORM_COUNT
+} terrimp_form;
+
+/* Where a pattern stands in the index buffer. */
+typedef struct terrimp_pattern {
+    uint32_t first_index, index_count;
+    uint32_t triangle_count; /* without those of no area */
+} terrimp_pattern;
+
+/* The place of a pattern. Vertex (column i, row j) of a node has index j * (chunk_quads + 1) + i.
+
+   chunk_quads  quads along a node's side [Limits: even, 4..128]
+   form         terrimp_form
+   pattern      [Limits: < TERRIMP_PATTERN_COUNT]
+   Errors       E_NULL; E_RANGE */
+TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, uint32_t pattern,
+                                                terrimp_pattern *found);
+
+/* Indices of all patterns together; 0 when an argument is outside its limits. */
+TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form);
+
+/* Fills the shared index buffer, once: it never changes. Counter-clockwise seen from above, in an
+   order for vertex caches that hold 16 vertices and more: columns of up to 14 quads, the first row
+   of each fetched ahead by triangles of no area. With a cache of 16 entries (FIFO) 0.60 vertices
+   are transformed for each triangle at chunk_quads 16, 0.55 at 64.
+
+   indices     [terrimp_pattern_index_count] out
+   Errors      E_NULL; E_RANGE; E_CAPACITY
+   Source      de Boer 2000, section 2.3.2 (borders); Wagner 2003 (strips with degenerate joins) */
+TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
+                                                size_t capacity);
+
+/* --- the quadtree and its errors --- */
+
+#define TERRIMP_GEOMIP_LEVELS 17u /* 65537 samples in chunks of 4 quads have 15 */
+
+/* What is kept of a node. */
+typedef struct terrimp_geomip_node {
+    float low, high; /* [wu] of its samples */
+    float error;     /* [wu] largest vertical distance of a sample to the drawn triangles, whatever
+                        the pattern; at least that of its children. 0 at level 0, where a coarse
+                        side takes its error from the neighbour */
+    float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
+} terrimp_geomip_node;
+
+/* The quadtree: what init fills in. Read-only once built, for any number of views and threads. */
+typedef struct terrimp_geomip {
+    terrimp_heightfield field; /* resolved; its samples outlive the tree */
+    uint32_t chunk_quads;
+    uint32_t level_count, node_count;
+    uint32_t level_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* node (x, z) of a level is number
+                                                         level_first + z * level_x + x */
+    uint32_t level_x[TERRIMP_GEOMIP_LEVELS], level_z[TERRIMP_GEOMIP_LEVELS];
+    uint32_t scratch_count;     /* floats that building a node needs */
+    terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
+} terrimp_geomip;
+
+/* Lays the quadtree out; nodes is left NULL for the caller to set.
+
+   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64]
+   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
+TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
+                                               uint32_t chunk_quads, terrimp_geomip *tree);
+
+/* Finds heights, error and rms of one node, from the samples alone: different nodes may be built at
+   the same time by threads with scratch arrays of their own.
+
+   scratch    [scratch_count]
+   Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
+   Cost       O(samples of the node) */
+TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree, uint32_t node,
+                                                     float *scratch);
+
+/* Ends the building: parents hold what their children hold. Errors: E_NULL. */
+TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree);
+
+/* Builds all nodes and finishes. Errors: those of build_node.
+   Cost: O(samples * levels); about 1.5 s for 4097 x 4097 samples in chunks of 64 */
+TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch);
+
+/* The box of a node. Errors: E_NULL; E_RANGE. */
+TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
+                                              terrimp_box *box);
+
+/* --- selection --- */
+
+/* What a node has to fulfil to be drawn as it is. */
+typedef enum terrimp_geomip_rule {
+    TERRIMP_GEOMIP_DEFAULT = 0, /* same as PICTURE */
+    TERRIMP_GEOMIP_PICTURE,  /* rms error and size on the screen together are small: triangles go
+                                where the picture gains most; no promise for a single sample */
+    TERRIMP_GEOMIP_BOUND,    /* no sample in view is drawn more than tolerance_px from its place */
+    TERRIMP_GEOMIP_DISTANCE, /* the same promise by distance alone, at the steepest angle */
+    TERRIMP_GEOMIP_RULE_COUNT
+} terrimp_geomip_rule;
+
+/* A node to draw. */
+typedef struct terrimp_geomip_draw {
+    uint32_t node, level;
+    uint32_t x, z;       /* column and row among the nodes of its level */
+    uint32_t pattern;
+    float error_px;      /* by the rule, <= tolerance_px; 0 at level 0 */
+    float morph;         /* 0: as it is .. 1: the shape of its parent; 0 without morphing */
+    float side[TERRIMP_SIDE_COUNT];        /* the same for odd vertices of each border */
+    float side_coarse[TERRIMP_SIDE_COUNT]; /* of a coarser neighbour: for even border vertices; 0
+                                              where the neighbour is not coarser */
+} terrimp_geomip_draw;
+
+/* Working memory of one node in one view. */
+typedef struct terrimp_geomip_mark {
+    float measure;  /* square of error over tolerance: from 1 on the node is split */
+    uint32_t next;  /* in the list of its level */
+    uint32_t frame; /* when it was written */
+} terrimp_geomip_mark;
+
+/* One camera's settings and arrays. Zero it, set what is required; select does the rest. */
+typedef struct terrimp_geomip_view {
+    int rule;           /* terrimp_geomip_rule */
+    float tolerance_px; /* [Limits: 0.01..1000] [Default 0 -> 1] */
+    float morph_ratio;  /* above 1: nodes morph; fully split at a distance that many times smaller
+                           than where the split begins [Limits: 1..4] [Default 0 -> 1: they do
+                           not morph] */
+    float hysteresis;   /* without morphing: a split node stays split until its error is below
+                           tolerance / (1 + hysteresis) [Limits: 0..1] */
+    float *distances;             /* (required) [node_count] */
+    terrimp_geomip_mark *marks;   /* (required) [node_count] zero before the first frame */
+    terrimp_geomip_draw *draws;   /* (required) [draw_capacity] out: front to back */
+    uint32_t draw_capacity;
+    uint32_t draw_count;          /* out */
+    uint32_t triangle_count;      /* out: of these draws */
+    uint32_t draws_needed;        /* out: draw_count, or more when draw_capacity is too small */
+    float distances_for[5];       /* private: what distances was made for */
+    uint32_t frame;               /* private */
+} terrimp_geomip_view;
+
+/* The distance at which each node stops being drawn as it is, squared: de Boer's D_n^2 for its
+   parent's level. Called by select when settings, screen or field of view have changed; here for
+   hosts that select by themselves.
+
+   pixel_factor  K [Limits: > 0]
+   distances     [node_count] out: D^2, at most 1e30. A parent's D is at least morph_ratio times
+                 that of each child.
+   Errors        E_NULL; E_RANGE; E_NOT_FINITE
+   Source        de Boer 2000, equations 1, 1a to 1c and 2 */
+TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
+                                                    float tolerance_px, float morph_ratio,
+                                                    float pixel_factor, float *distances);
+
+/* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
+   level, those outside of the camera's view are left out.
+
+   view       in: settings and arrays; out: draws, draw_count, triangle_count
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
+              before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
+   Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples
+   Source     de Boer 2000, sections 2.2 and 2.3.1 */
+TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
+                                                 terrimp_geomip_view *view,
+                                                 const terrimp_camera *camera);
+
+/* --- vertices and morphing --- */
+
+/* A node's vertex: what it moves by when its factors are 1. */
+typedef struct terrimp_geomip_vertex {
+    float height;    /* [wu] */
+    float move;      /* [wu] odd vertices: to the parent's shape; even ones on a border: from there
+                        to the shape of the parent's parent */
+    float beside[2]; /* [wu] what is added to move where the border vertices that an odd vertex
+                        stands between move themselves: those of a border along x, along z */
+} terrimp_geomip_vertex;
+
+/* Which factors of a draw a vertex of the grid follows: each 0 or 1, the same for every node.
+
+   y = height + (self * morph + dot(odd, side) + dot(even, side_coarse))
+              * (move + beside[0] * (weight beside[Z0] * side_coarse[Z0] + the same of Z1)
+                      + beside[1] * (weight beside[X0] * side_coarse[X0] + the same of X1)) */
+typedef struct terrimp_geomip_weights {
+    uint8_t odd[TERRIMP_SIDE_COUNT], even[TERRIMP_SIDE_COUNT];
+    uint8_t beside[TERRIMP_SIDE_COUNT];
+    uint8_t self, unused[3];
+} terrimp_geomip_weights;
+
+/* Fills the vertices of a node of any level, row by row.
+
+   xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
+   Errors     E_NULL (also when both are NULL); E_RANGE */
+TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
+                                                        float *xyz,
+                                                        terrimp_geomip_vertex *vertices);
+
+/* Fills the weights of the grid. Errors: E_NULL; E_RANGE.
+
+   weights    [(chunk_quads + 1)^2] out */
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
+                                                       terrimp_geomip_weights *weights);
+
+/* Morphs a node's vertices on the CPU, for hosts without shaders. Vertices that neighbours share
+   come out equal, bit for bit.
+
+   draw       from select
+   vertices   [(chunk_quads + 1)^2] of that node
+   heights    out: the height of vertex k at heights[k * stride] [wu]
+   stride     [Limits: >= 1] 3 to write into xyz + 1
+   Errors     E_NULL; E_RANGE
+   Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
+              tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
+              way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
+                                                const terrimp_geomip_draw *draw,
+                                                const terrimp_geomip_vertex *vertices,
+                                                float *heights, size_t stride);
+
 /* ==== Simplifier ========================================================= >>simplifier */
 
 /* Largest number of samples along one side of a tile that the simplifier takes. */
@@ -565,103 +909,6 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
    Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
                                               float *work);
-
-/* ==== Camera ============================================================= >>camera */
-
-/* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
-typedef struct terrimp_camera {
-    float eye[3];           /* [wu] */
-    float forward[3];       /* (required) viewing direction, any length > 0 */
-    float up[3];            /* [Default 0,0,0 -> 0,1,0]; along forward: another one is chosen */
-    float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
-    uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
-    uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
-    float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near].
-                               What is drawn may need more: see terrimp_stats.z_far */
-    int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
-} terrimp_camera;
-
-/* Writes the effective camera: defaults filled in, forward and up orthonormal.
-
-   camera     in
-   out        may be camera
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits */
-TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
-                                                  terrimp_camera *out);
-
-/* View and projection matrix, for column vectors, column-major.
-
-   view          [16] out, world to eye space (x right, y up, looking along -z)
-   projection    [16] out, eye space to clip space
-   Errors        those of terrimp_camera_resolve */
-TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
-                                                   float projection[16]);
-
-/* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
-   height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-
-   Errors     those of terrimp_camera_resolve
-   Source     de Boer 2000, equations 1a to 1c: K = C * tolerance */
-TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
-
-/* The six planes of a viewing volume. A point p is inside plane i when
-   dot(plane[i].xyz, p - eye) + plane[i].w >= 0: relative to the eye, so that huge worlds keep
-   precision. */
-typedef struct terrimp_frustum {
-    float eye[3];
-    float plane[6][4]; /* left, right, down, up, near, far; normals need not be unit */
-} terrimp_frustum;
-
-enum {
-    TERRIMP_PLANES_ALL = 0x3f, /* start with this mask at the root of a hierarchy */
-    TERRIMP_PLANES_OUTSIDE = -1
-};
-
-/* The planes of a camera. Errors: those of terrimp_camera_resolve. */
-TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
-                                                  terrimp_frustum *frustum);
-
-/* Tests a box against the planes of a mask (bit i: plane i), for use down a hierarchy: a child of a
-   box inside a plane need not be tested against it again.
-
-   frustum, box   not null
-   returns    TERRIMP_PLANES_OUTSIDE when the box is outside of one of the planes, else the mask of
-              the planes that still cross it; 0: wholly inside. A box near an edge of the frustum
-              may be reported as crossing though it is outside: never the other way round.
-   Source     de Boer 2000, section 2.2 */
-TERRIMP_API int terrimp_frustum_test(const terrimp_frustum *frustum, const terrimp_box *box,
-                                     int mask);
-
-/* Distances from a point to the closest (0 inside) and to the farthest point of a box [wu]. No
-   pointer may be null. */
-TERRIMP_API float terrimp_box_distance(const terrimp_box *box, const float point[3]);
-TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point[3]);
-
-/* A perspective frustum fitted to a box: the camera of a capture. Its sides are tangents, that is
-   offsets along right and up at distance 1 along forward; left and down are the smaller ones. */
-typedef struct terrimp_capture {
-    float eye[3];
-    float right[3], up[3], forward[3]; /* orthonormal */
-    float z_near, z_far;               /* [wu] along forward */
-    float tan_left, tan_right, tan_down, tan_up;
-} terrimp_capture;
-
-/* Fits a frustum with its apex at the eye and its axis through the middle of the box around the
-   box's eight corners, as tightly as the axis allows.
-
-   box        any extents >= 0, flat ones too
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE when a minimum exceeds its maximum; E_INSIDE when the
-              eye is in the box; E_BEHIND when a corner is not in front of the eye
-   Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
-              axis) is useless, -z is up. */
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture);
-
-/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
-TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
-                                                    int depth_zero_to_one, float view[16],
-                                                    float projection[16]);
 
 /* ==== Impostor =========================================================== >>impostor */
 
@@ -2399,6 +2646,1428 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
         !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, ray.start[2], &place.z))
         return TERRIMP_E_MISS;
     return terrimpi_ray_walk(&f, &ray, place, hit);
+}
+
+/* ==== Camera ============================================================= >>impl-camera */
+/* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
+
+TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
+{
+    terrimp_camera c;
+    float right[3];
+    if (!camera || !out)
+        return TERRIMP_E_NULL;
+    c = *camera;
+    if (!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) || !terrimpi_finite3(c.up) ||
+        !terrimpi_finite(c.fov_y_rad) || !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far))
+        return TERRIMP_E_NOT_FINITE;
+    if (c.fov_y_rad == 0.0f)
+        c.fov_y_rad = 1.0471976f;
+    if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
+        c.up[1] = 1.0f;
+    if (c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u || c.width_px > 65536u ||
+        c.height_px < 1u || c.height_px > 65536u || c.z_near <= 0.0f || c.z_far <= c.z_near ||
+        !terrimpi_normalize(c.forward))
+        return TERRIMP_E_RANGE;
+    terrimpi_basis(c.forward, c.up, right);
+    *out = c;
+    return TERRIMP_OK;
+}
+
+/* Column-major view matrix of an eye and its orthonormal axes. */
+static void terrimpi_view_matrix(const float eye[3], const float right[3], const float up[3],
+                                 const float forward[3], float m[16])
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        m[i * 4 + 0] = right[i];
+        m[i * 4 + 1] = up[i];
+        m[i * 4 + 2] = -forward[i];
+        m[i * 4 + 3] = 0.0f;
+    }
+    m[12] = -terrimpi_dot(right, eye);
+    m[13] = -terrimpi_dot(up, eye);
+    m[14] = terrimpi_dot(forward, eye);
+    m[15] = 1.0f;
+}
+
+/* Column-major perspective matrix of a frustum whose sides are tangents. */
+static void terrimpi_projection_matrix(float left, float right, float down, float up, float z_near,
+                                       float z_far, int depth_zero_to_one, float m[16])
+{
+    memset(m, 0, 16 * sizeof m[0]);
+    m[0] = 2.0f / (right - left);
+    m[5] = 2.0f / (up - down);
+    m[8] = (right + left) / (right - left);
+    m[9] = (up + down) / (up - down);
+    m[11] = -1.0f;
+    if (depth_zero_to_one) {
+        m[10] = -z_far / (z_far - z_near);
+        m[14] = -z_far * z_near / (z_far - z_near);
+    } else {
+        m[10] = -(z_far + z_near) / (z_far - z_near);
+        m[14] = -2.0f * z_far * z_near / (z_far - z_near);
+    }
+}
+
+/* Half the height and width of a resolved camera's screen at distance 1. */
+static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x, float *tan_y)
+{
+    *tan_y = TERRIMP_TANF(camera->fov_y_rad * 0.5f);
+    *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
+}
+
+TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
+                                                   float projection[16])
+{
+    terrimp_camera c;
+    terrimp_result result;
+    float right[3], tan_x, tan_y;
+    if (!view || !projection)
+        return TERRIMP_E_NULL;
+    result = terrimp_camera_resolve(camera, &c);
+    if (result != TERRIMP_OK)
+        return result;
+    terrimpi_cross(c.forward, c.up, right);
+    terrimpi_view_matrix(c.eye, right, c.up, c.forward, view);
+    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
+    terrimpi_projection_matrix(-tan_x, tan_x, -tan_y, tan_y, c.z_near, c.z_far,
+                               c.depth_zero_to_one, projection);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
+{
+    terrimp_camera c;
+    terrimp_result result;
+    float tan_x, tan_y;
+    if (!factor)
+        return TERRIMP_E_NULL;
+    result = terrimp_camera_resolve(camera, &c);
+    if (result != TERRIMP_OK)
+        return result;
+    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
+    *factor = (float)c.height_px / (2.0f * tan_y);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
+                                                  terrimp_frustum *frustum)
+{
+    terrimp_camera c;
+    terrimp_result result;
+    float right[3], tan_x, tan_y;
+    int i;
+    if (!frustum)
+        return TERRIMP_E_NULL;
+    result = terrimp_camera_resolve(camera, &c);
+    if (result != TERRIMP_OK)
+        return result;
+    terrimpi_cross(c.forward, c.up, right);
+    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
+    for (i = 0; i < 3; i++) {
+        frustum->eye[i] = c.eye[i];
+        frustum->plane[0][i] = right[i] + c.forward[i] * tan_x;
+        frustum->plane[1][i] = c.forward[i] * tan_x - right[i];
+        frustum->plane[2][i] = c.up[i] + c.forward[i] * tan_y;
+        frustum->plane[3][i] = c.forward[i] * tan_y - c.up[i];
+        frustum->plane[4][i] = c.forward[i];
+        frustum->plane[5][i] = -c.forward[i];
+    }
+    for (i = 0; i < 4; i++)
+        frustum->plane[i][3] = 0.0f;
+    frustum->plane[4][3] = -c.z_near;
+    frustum->plane[5][3] = c.z_far;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API int terrimp_frustum_test(const terrimp_frustum *frustum, const terrimp_box *box,
+                                     int mask)
+{
+    int i, k, crossing = 0;
+    for (i = 0; i < 6; i++) {
+        const float *plane = frustum->plane[i];
+        float most = plane[3], least = plane[3]; /* over the box's corners */
+        if (!(mask & (1 << i)))
+            continue;
+        for (k = 0; k < 3; k++) {
+            float a = plane[k] * (box->min[k] - frustum->eye[k]);
+            float b = plane[k] * (box->max[k] - frustum->eye[k]);
+            most += terrimpi_max(a, b);
+            least += terrimpi_min(a, b);
+        }
+        if (most < 0.0f)
+            return TERRIMP_PLANES_OUTSIDE;
+        if (least < 0.0f)
+            crossing |= 1 << i;
+    }
+    return crossing;
+}
+
+TERRIMP_API float terrimp_box_distance(const terrimp_box *box, const float point[3])
+{
+    float d[3];
+    int i;
+    for (i = 0; i < 3; i++)
+        d[i] = terrimpi_max(0.0f,
+                            terrimpi_max(box->min[i] - point[i], point[i] - box->max[i]));
+    return terrimpi_length(d);
+}
+
+TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point[3])
+{
+    float d[3];
+    int i;
+    for (i = 0; i < 3; i++)
+        d[i] = terrimpi_max(point[i] - box->min[i], box->max[i] - point[i]);
+    return terrimpi_length(d);
+}
+
+/* Corner i of a box (bit k of i: the maximum along axis k), relative to a point. */
+static void terrimpi_box_corner(const terrimp_box *box, int i, const float point[3],
+                                float corner[3])
+{
+    int k;
+    for (k = 0; k < 3; k++)
+        corner[k] = ((i >> k) & 1 ? box->max[k] : box->min[k]) - point[k];
+}
+
+static terrimp_result terrimpi_check_box(const terrimp_box *box)
+{
+    int i;
+    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max))
+        return TERRIMP_E_NOT_FINITE;
+    for (i = 0; i < 3; i++)
+        if (box->min[i] > box->max[i])
+            return TERRIMP_E_RANGE;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture)
+{
+    static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
+    terrimp_capture c;
+    terrimp_result result;
+    float slope = 1.0f; /* of the steepest ray to a corner: its length over its depth */
+    int i;
+    if (!box || !eye || !capture)
+        return TERRIMP_E_NULL;
+    result = terrimpi_check_box(box);
+    if (result != TERRIMP_OK)
+        return result;
+    if (!terrimpi_finite3(eye))
+        return TERRIMP_E_NOT_FINITE;
+    if (terrimp_box_distance(box, eye) <= 0.0f)
+        return TERRIMP_E_INSIDE;
+    for (i = 0; i < 3; i++) {
+        c.eye[i] = eye[i];
+        c.forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
+    }
+    if (!terrimpi_normalize(c.forward))
+        return TERRIMP_E_INSIDE;
+    memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
+    terrimpi_basis(c.forward, c.up, c.right);
+    c.z_near = c.z_far = 0.0f;
+    c.tan_left = c.tan_right = c.tan_down = c.tan_up = 0.0f;
+    for (i = 0; i < 8; i++) {
+        float p[3], length, z, x, y;
+        terrimpi_box_corner(box, i, eye, p);
+        z = terrimpi_dot(c.forward, p);
+        length = terrimpi_length(p);
+        /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
+        if (!(z > 0.001f * length))
+            return TERRIMP_E_BEHIND;
+        slope = terrimpi_max(slope, length / z);
+        x = terrimpi_dot(c.right, p) / z;
+        y = terrimpi_dot(c.up, p) / z;
+        c.z_near = i ? terrimpi_min(c.z_near, z) : z;
+        c.z_far = i ? terrimpi_max(c.z_far, z) : z;
+        c.tan_left = i ? terrimpi_min(c.tan_left, x) : x;
+        c.tan_right = i ? terrimpi_max(c.tan_right, x) : x;
+        c.tan_down = i ? terrimpi_min(c.tan_down, y) : y;
+        c.tan_up = i ? terrimpi_max(c.tan_up, y) : y;
+    }
+    /* A hair's breadth, so that rounding leaves no corner outside and a flat box has a volume. */
+    c.z_near *= 1.0f - 1e-6f * slope;
+    c.z_far *= 1.0f + 1e-6f * slope;
+    terrimpi_widen(&c.tan_left, &c.tan_right, slope);
+    terrimpi_widen(&c.tan_down, &c.tan_up, slope);
+    *capture = c;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
+                                                    int depth_zero_to_one, float view[16],
+                                                    float projection[16])
+{
+    if (!capture || !view || !projection)
+        return TERRIMP_E_NULL;
+    terrimpi_view_matrix(capture->eye, capture->right, capture->up, capture->forward, view);
+    terrimpi_projection_matrix(capture->tan_left, capture->tan_right, capture->tan_down,
+                               capture->tan_up, capture->z_near, capture->z_far,
+                               depth_zero_to_one, projection);
+    return TERRIMP_OK;
+}
+
+/* ==== Geomipmap ========================================================== >>impl-geomipmap */
+/* Based on: de Boer 2000 (errors, distances, patterns, morphing); Wagner 2003 (strips, factors of
+   the borders).
+
+   Positions on the lattice of a level are (column, row) of the heightfield, cut off at its last
+   column and row. All that two nodes share is computed from such positions, never from a node, so
+   that both get the same floats. */
+
+#define TERRIMPI_MIP_COLUMN 14u      /* 14 + 2 vertices: what a cache of 16 can hold of two rows */
+#define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
+                                          the cache is lost, and ACMR is 0.99 */
+#define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
+#define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
+
+/* ---- patterns ---- */
+
+static int terrimpi_mip_quads_fit(uint32_t quads)
+{
+    return quads >= 4u && quads <= 128u && quads % 2u == 0;
+}
+
+static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
+{
+    uint32_t most = TERRIMPI_MIP_COLUMN;
+    if (form == TERRIMP_FORM_STITCHED)
+        most = TERRIMPI_MIP_STITCH_COLUMN;
+    return (quads + most - 1u) / most;
+}
+
+/* First quad of a column: columns are as equally wide as can be. */
+static uint32_t terrimpi_mip_column(uint32_t quads, int form, uint32_t column)
+{
+    return quads * column / terrimpi_mip_columns(quads, form);
+}
+
+static uint32_t terrimpi_mip_coarse_sides(uint32_t pattern)
+{
+    return (pattern & 1u) + (pattern >> 1 & 1u) + (pattern >> 2 & 1u) + (pattern >> 3 & 1u);
+}
+
+/* Each border vertex that is left out takes one triangle with it. */
+static uint32_t terrimpi_mip_triangles(uint32_t quads, uint32_t pattern)
+{
+    return 2u * quads * quads - quads / 2u * terrimpi_mip_coarse_sides(pattern);
+}
+
+static uint32_t terrimpi_mip_indices(uint32_t quads, int form, uint32_t pattern)
+{
+    uint32_t column, ahead = 0, triangles = terrimpi_mip_triangles(quads, pattern);
+    if (form == TERRIMP_FORM_STITCHED) /* plus one for each odd border vertex, not minus one */
+        triangles += quads * terrimpi_mip_coarse_sides(pattern);
+    if (form == TERRIMP_FORM_STRIP) /* each row: its zigzag and two indices to join the next */
+        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads, form)) - 1u;
+    for (column = 0; column < terrimpi_mip_columns(quads, form); column++)
+        ahead += (terrimpi_mip_column(quads, form, column + 1u) -
+                  terrimpi_mip_column(quads, form, column) + 2u) / 2u;
+    return 3u * (triangles + ahead);
+}
+
+TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, uint32_t pattern,
+                                                terrimp_pattern *found)
+{
+    uint32_t i, first = 0;
+    if (!found)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_mip_quads_fit(chunk_quads) || pattern >= TERRIMP_PATTERN_COUNT || form < 0 ||
+        form >= (int)TERRIMP_FORM_COUNT)
+        return TERRIMP_E_RANGE;
+    for (i = 0; i < pattern; i++)
+        first += terrimpi_mip_indices(chunk_quads, form, i);
+    found->first_index = first;
+    found->index_count = terrimpi_mip_indices(chunk_quads, form, pattern);
+    found->triangle_count =
+        terrimpi_mip_triangles(chunk_quads, form == TERRIMP_FORM_STITCHED ? 0 : pattern);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form)
+{
+    terrimp_pattern last;
+    if (terrimp_pattern_find(chunk_quads, form, TERRIMP_PATTERN_COUNT - 1u, &last) != TERRIMP_OK)
+        return 0;
+    return last.first_index + last.index_count;
+}
+
+/* Writes one pattern. */
+typedef struct terrimpi_mip_writer {
+    uint32_t quads, pattern;
+    int form;
+    uint16_t *start, *out;
+} terrimpi_mip_writer;
+
+static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
+{
+    return (int)(w->pattern >> side & 1u);
+}
+
+/* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
+   towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
+   edge. */
+static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
+{
+    if (w->form != TERRIMP_FORM_STITCHED) {
+        if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
+            i += i & 1u;
+        if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
+            i -= i & 1u;
+        if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
+            j += j & 1u;
+        if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
+            j -= j & 1u;
+    }
+    return (uint16_t)(j * (w->quads + 1u) + i);
+}
+
+static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b, uint16_t c)
+{
+    if (a == b || b == c || c == a)
+        return;
+    *w->out++ = a;
+    *w->out++ = b;
+    *w->out++ = c;
+}
+
+/* After quad (i, j): what stitches its borders to a neighbour's edge, two quads long. */
+static void terrimpi_mip_stitch(terrimpi_mip_writer *w, uint32_t i, uint32_t j)
+{
+    uint16_t at = (uint16_t)(j * (w->quads + 1u) + i), row = (uint16_t)(w->quads + 1u);
+    if (i == 0 && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
+        terrimpi_mip_triangle(w, (uint16_t)(at + row), at, (uint16_t)(at - row));
+    at = (uint16_t)(at + 1u);
+    if (i + 1u == w->quads && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
+        terrimpi_mip_triangle(w, (uint16_t)(at - row), at, (uint16_t)(at + row));
+    if (j == 0 && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
+        terrimpi_mip_triangle(w, (uint16_t)(at - 1u), at, (uint16_t)(at + 1u));
+    at = (uint16_t)(at + row);
+    if (j + 1u == w->quads && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
+        terrimpi_mip_triangle(w, (uint16_t)(at + 1u), at, (uint16_t)(at - 1u));
+}
+
+/* A column of quads as a list. Rows run from +x to -x, so that a quad's diagonal needs no vertex
+   that has just been pushed out of a cache of 16. */
+static void terrimpi_mip_list_column(terrimpi_mip_writer *w, uint32_t from, uint32_t to)
+{
+    uint32_t i, j;
+    for (i = to + 1u; i-- > from;) { /* fetch row 0, two vertices a triangle */
+        *w->out++ = terrimpi_mip_index(w, i, 0);
+        if (i > from)
+            i--;
+        *w->out++ = terrimpi_mip_index(w, i, 0);
+        *w->out++ = terrimpi_mip_index(w, i, 0);
+    }
+    for (j = 0; j < w->quads; j++)
+        for (i = to; i-- > from;) {
+            uint16_t a = terrimpi_mip_index(w, i, j), b = terrimpi_mip_index(w, i, j + 1u);
+            uint16_t c = terrimpi_mip_index(w, i + 1u, j + 1u);
+            terrimpi_mip_triangle(w, a, c, terrimpi_mip_index(w, i + 1u, j));
+            terrimpi_mip_triangle(w, a, b, c);
+            if (w->form == TERRIMP_FORM_STITCHED)
+                terrimpi_mip_stitch(w, i, j);
+        }
+}
+
+/* One zigzag between rows j and k of a column (k == j fetches the row), joined to what was written
+   before: an odd number of indices, so that each row's first triangle winds the right way. */
+static void terrimpi_mip_strip_row(terrimpi_mip_writer *w, uint32_t from, uint32_t to, uint32_t j,
+                                   uint32_t k)
+{
+    uint32_t i;
+    if (w->out != w->start) {
+        *w->out = w->out[-1];
+        w->out++;
+    }
+    *w->out++ = terrimpi_mip_index(w, to, j);
+    for (i = to + 1u; i-- > from;) {
+        *w->out++ = terrimpi_mip_index(w, i, j);
+        *w->out++ = terrimpi_mip_index(w, i, k);
+    }
+}
+
+static void terrimpi_mip_fill_pattern(terrimpi_mip_writer *w)
+{
+    uint32_t column, j;
+    w->start = w->out;
+    for (column = 0; column < terrimpi_mip_columns(w->quads, w->form); column++) {
+        uint32_t from = terrimpi_mip_column(w->quads, w->form, column);
+        uint32_t to = terrimpi_mip_column(w->quads, w->form, column + 1u);
+        if (w->form != TERRIMP_FORM_STRIP) {
+            terrimpi_mip_list_column(w, from, to);
+            continue;
+        }
+        terrimpi_mip_strip_row(w, from, to, 0, 0);
+        for (j = 0; j < w->quads; j++)
+            terrimpi_mip_strip_row(w, from, to, j, j + 1u);
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
+                                                size_t capacity)
+{
+    terrimpi_mip_writer w;
+    uint32_t count = terrimp_pattern_index_count(chunk_quads, form);
+    if (!indices)
+        return TERRIMP_E_NULL;
+    if (count == 0)
+        return TERRIMP_E_RANGE;
+    if (capacity < count)
+        return TERRIMP_E_CAPACITY;
+    w.quads = chunk_quads;
+    w.form = form;
+    w.out = indices;
+    for (w.pattern = 0; w.pattern < TERRIMP_PATTERN_COUNT; w.pattern++)
+        terrimpi_mip_fill_pattern(&w);
+    return TERRIMP_OK;
+}
+
+/* ---- the quadtree ---- */
+
+TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
+                                               uint32_t chunk_quads, terrimp_geomip *tree)
+{
+    terrimp_geomip t;
+    terrimp_result result;
+    uint32_t x, z, level;
+    if (!field || !tree)
+        return TERRIMP_E_NULL;
+    memset(&t, 0, sizeof t);
+    result = terrimp_heightfield_resolve(field, &t.field);
+    if (result != TERRIMP_OK)
+        return result;
+    t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
+    if (!terrimpi_mip_quads_fit(t.chunk_quads))
+        return TERRIMP_E_RANGE;
+    x = (t.field.width - 2u) / t.chunk_quads + 1u;
+    z = (t.field.depth - 2u) / t.chunk_quads + 1u;
+    for (level = 0;; level++) {
+        TERRIMP_ASSERT(level < TERRIMP_GEOMIP_LEVELS);
+        t.level_x[level] = x;
+        t.level_z[level] = z;
+        t.level_first[level + 1u] = t.level_first[level] + x * z;
+        if (x == 1u && z == 1u)
+            break;
+        x = (x + 1u) / 2u;
+        z = (z + 1u) / 2u;
+    }
+    t.level_count = level + 1u;
+    t.node_count = t.level_first[t.level_count];
+    t.scratch_count = t.field.width + 2u * (t.chunk_quads + 1u);
+    *tree = t;
+    return TERRIMP_OK;
+}
+
+/* A node by its place. */
+typedef struct terrimpi_mip_place {
+    uint32_t level, x, z;
+} terrimpi_mip_place;
+
+static uint32_t terrimpi_mip_number(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
+{
+    return t->level_first[level] + z * t->level_x[level] + x;
+}
+
+static terrimpi_mip_place terrimpi_mip_place_of(const terrimp_geomip *t, uint32_t node)
+{
+    terrimpi_mip_place p;
+    p.level = 0;
+    while (node >= t->level_first[p.level + 1u])
+        p.level++;
+    node -= t->level_first[p.level];
+    p.x = node % t->level_x[p.level];
+    p.z = node / t->level_x[p.level];
+    return p;
+}
+
+/* Column and row of lattice position (i, j) of a level. */
+static uint32_t terrimpi_mip_col(const terrimp_geomip *t, uint32_t level, uint32_t i)
+{
+    uint32_t last = t->field.width - 1u;
+    return i > (last >> level) ? last : i << level;
+}
+
+static uint32_t terrimpi_mip_row(const terrimp_geomip *t, uint32_t level, uint32_t j)
+{
+    uint32_t last = t->field.depth - 1u;
+    return j > (last >> level) ? last : j << level;
+}
+
+static void terrimpi_mip_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
+{
+    const terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, p.level, p.x, p.z)];
+    const terrimp_heightfield *f = &t->field;
+    uint32_t quads = t->chunk_quads;
+    box->min[0] = terrimpi_line(f->origin_x, f->spacing_x,
+                                terrimpi_mip_col(t, p.level, p.x * quads));
+    box->max[0] = terrimpi_line(f->origin_x, f->spacing_x,
+                                terrimpi_mip_col(t, p.level, (p.x + 1u) * quads));
+    box->min[1] = node->low;
+    box->max[1] = node->high;
+    box->min[2] = terrimpi_line(f->origin_z, f->spacing_z,
+                                terrimpi_mip_row(t, p.level, p.z * quads));
+    box->max[2] = terrimpi_line(f->origin_z, f->spacing_z,
+                                terrimpi_mip_row(t, p.level, (p.z + 1u) * quads));
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
+                                              terrimp_box *box)
+{
+    if (!tree || !box || !tree->nodes)
+        return TERRIMP_E_NULL;
+    if (node >= tree->node_count)
+        return TERRIMP_E_RANGE;
+    terrimpi_mip_box(tree, terrimpi_mip_place_of(tree, node), box);
+    return TERRIMP_OK;
+}
+
+/* The place next to a node beyond a side; returns 0 where the terrain ends. */
+static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, int side,
+                               terrimpi_mip_place *beyond)
+{
+    if (side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1)
+        p.z += side == TERRIMP_SIDE_Z1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
+    else
+        p.x += side == TERRIMP_SIDE_X1 ? 1u : (uint32_t)-1;
+    *beyond = p;
+    return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
+}
+
+/* ---- errors ---- */
+
+/* What the samples of a node are found to miss. */
+typedef struct terrimpi_mip_misses {
+    float most, squares;
+    float count;
+} terrimpi_mip_misses;
+
+/* Notes how far `count` samples are from a straight line. */
+static void terrimpi_mip_run(const float *height, uint32_t count, float start, float slope,
+                             terrimpi_mip_misses *misses)
+{
+    float most = misses->most, squares = 0.0f;
+    uint32_t k;
+    for (k = 0; k < count; k++) {
+        float miss = height[k] - (start + slope * (float)k);
+        squares += miss * miss;
+        miss = miss < 0.0f ? -miss : miss;
+        most = miss > most ? miss : most;
+    }
+    misses->most = most;
+    misses->squares += squares;
+}
+
+/* Compares one row of samples, `down` of `deep` rows below the lattice row `upper`, with the
+   triangles between that and the row `lower`. */
+static void terrimpi_mip_row_misses(const float *upper, const float *lower, const float *row,
+                                    uint32_t span, uint32_t step, uint32_t down, uint32_t deep,
+                                    terrimpi_mip_misses *misses)
+{
+    float v = (float)down / (float)deep;
+    uint32_t at, i = 0;
+    for (at = 0; at < span; at += step, i++) {
+        float a = upper[i], b = upper[i + 1u], c = lower[i], d = lower[i + 1u];
+        uint32_t wide = terrimpi_min_u32(step, span - at);
+        uint32_t left = down * wide / deep + 1u; /* samples up to the diagonal */
+        float one = 1.0f / (float)wide, u = (float)left * one;
+        left = terrimpi_min_u32(left, wide);
+        terrimpi_mip_run(row + at, left, a + v * (c - a), (d - c) * one, misses);
+        terrimpi_mip_run(row + at + left, wide - left, a + v * (d - b) + u * (b - a),
+                         (b - a) * one, misses);
+    }
+    terrimpi_mip_run(row + span, 1, upper[i] + v * (lower[i] - upper[i]), 0.0f, misses);
+    misses->count += (float)span + 1.0f;
+}
+
+/* Compares all samples of a node with its triangles in pattern 0. */
+static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_place p,
+                                      float *scratch, terrimpi_mip_misses *misses)
+{
+    uint32_t quads = t->chunk_quads, j, z;
+    uint32_t x0 = terrimpi_mip_col(t, p.level, p.x * quads);
+    uint32_t span = terrimpi_mip_col(t, p.level, (p.x + 1u) * quads) - x0;
+    float *upper = scratch, *lower = upper + quads + 1u, *row = lower + quads + 1u;
+    for (j = p.z * quads; j < (p.z + 1u) * quads; j++) {
+        uint32_t z0 = terrimpi_mip_row(t, p.level, j), z1 = terrimpi_mip_row(t, p.level, j + 1u);
+        if (z1 == z0)
+            break;
+        terrimpi_heightfield_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
+        terrimpi_heightfield_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
+        for (z = z0; z <= z1; z++) { /* lattice rows twice: which weighs next to nothing in rms */
+            terrimpi_heightfield_tile(&t->field, x0, z, span + 1u, 1, 1, row);
+            terrimpi_mip_row_misses(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
+                                    misses);
+        }
+    }
+}
+
+/* Compares the samples in a triangle, counter-clockwise, with it. */
+static void terrimpi_mip_triangle_misses(const terrimp_geomip *t, uint32_t corner[3][2],
+                                         terrimpi_mip_misses *misses)
+{
+    uint32_t x0 = terrimpi_min_u32(corner[0][0], terrimpi_min_u32(corner[1][0], corner[2][0]));
+    uint32_t x1 = terrimpi_max_u32(corner[0][0], terrimpi_max_u32(corner[1][0], corner[2][0]));
+    uint32_t z0 = terrimpi_min_u32(corner[0][1], terrimpi_min_u32(corner[1][1], corner[2][1]));
+    uint32_t z1 = terrimpi_max_u32(corner[0][1], terrimpi_max_u32(corner[1][1], corner[2][1]));
+    uint32_t x, z, k;
+    float height[3];
+    for (k = 0; k < 3u; k++)
+        height[k] = terrimpi_sample(&t->field, corner[k][0], corner[k][1]);
+    for (z = z0; z <= z1; z++)
+        for (x = x0; x <= x1; x++) {
+            int64_t part[3], all; /* twice the areas opposite the corners */
+            float miss;
+            for (k = 0; k < 3u; k++) {
+                const uint32_t *a = corner[(k + 1u) % 3u], *b = corner[(k + 2u) % 3u];
+                part[k] = ((int64_t)b[1] - a[1]) * ((int64_t)x - a[0]) -
+                          ((int64_t)b[0] - a[0]) * ((int64_t)z - a[1]);
+            }
+            all = part[0] + part[1] + part[2];
+            if (all == 0 || part[0] < 0 || part[1] < 0 || part[2] < 0)
+                continue;
+            miss = terrimpi_sample(&t->field, x, z) - height[0];
+            miss -= ((height[1] - height[0]) * (float)part[1] +
+                     (height[2] - height[0]) * (float)part[2]) / (float)all;
+            misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
+        }
+}
+
+/* Compares with the triangles that stand along a border only when it is coarse. A block of 2 x 2
+   quads has two of them. */
+static void terrimpi_mip_border_misses(const terrimp_geomip *t, terrimpi_mip_place p, int side,
+                                       terrimpi_mip_misses *misses)
+{
+    static const uint8_t triangles[TERRIMP_SIDE_COUNT][2][3][2] = {
+        {{{0, 0}, {1, 1}, {2, 0}}, {{1, 1}, {2, 1}, {2, 0}}},
+        {{{1, 1}, {0, 2}, {2, 2}}, {{0, 1}, {0, 2}, {1, 1}}},
+        {{{0, 0}, {0, 2}, {1, 1}}, {{0, 2}, {1, 2}, {1, 1}}},
+        {{{1, 1}, {2, 2}, {2, 0}}, {{1, 0}, {1, 1}, {2, 0}}}};
+    uint32_t quads = t->chunk_quads, at, k, c, corner[3][2];
+    for (at = 0; at < quads; at += 2u) {
+        uint32_t i = side == TERRIMP_SIDE_X0 ? 0 : side == TERRIMP_SIDE_X1 ? quads - 2u : at;
+        uint32_t j = side == TERRIMP_SIDE_Z0 ? 0 : side == TERRIMP_SIDE_Z1 ? quads - 2u : at;
+        for (k = 0; k < 2u; k++) {
+            for (c = 0; c < 3u; c++) {
+                const uint8_t *offset = triangles[side][k][c];
+                corner[c][0] = terrimpi_mip_col(t, p.level, p.x * quads + i + offset[0]);
+                corner[c][1] = terrimpi_mip_row(t, p.level, p.z * quads + j + offset[1]);
+            }
+            terrimpi_mip_triangle_misses(t, corner, misses);
+        }
+    }
+}
+
+static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_mip_place p)
+{
+    terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, 0, p.x, p.z)];
+    uint32_t quads = t->chunk_quads;
+    terrimpi_scan scan;
+    terrimp_result result;
+    scan.skip_voids = 0;
+    result = terrimpi_scan_tile(&t->field, p.x * quads, p.z * quads, quads + 1u, quads + 1u, 1,
+                                &scan);
+    if (result != TERRIMP_OK)
+        return result;
+    node->low = terrimpi_world_height(&t->field, scan.low);
+    node->high = terrimpi_world_height(&t->field, scan.high);
+    node->error = node->rms = 0.0f;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree, uint32_t node,
+                                                     float *scratch)
+{
+    terrimpi_mip_place p, beyond;
+    terrimpi_mip_misses misses;
+    int side;
+    if (!tree || !scratch || !tree->nodes)
+        return TERRIMP_E_NULL;
+    if (node >= tree->node_count)
+        return TERRIMP_E_RANGE;
+    p = terrimpi_mip_place_of(tree, node);
+    if (p.level == 0)
+        return terrimpi_mip_build_leaf(tree, p);
+    memset(&misses, 0, sizeof misses);
+    terrimpi_mip_inner_misses(tree, p, scratch, &misses);
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        if (terrimpi_mip_beyond(tree, p, side, &beyond))
+            terrimpi_mip_border_misses(tree, p, side, &misses);
+    tree->nodes[node].error = misses.most;
+    tree->nodes[node].rms = TERRIMP_SQRTF(misses.squares / misses.count);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree)
+{
+    uint32_t level, x, z;
+    if (!tree || !tree->nodes)
+        return TERRIMP_E_NULL;
+    for (level = 1; level < tree->level_count; level++)
+        for (z = 0; z < tree->level_z[level - 1u]; z++)
+            for (x = 0; x < tree->level_x[level - 1u]; x++) {
+                const terrimp_geomip_node *child =
+                    &tree->nodes[terrimpi_mip_number(tree, level - 1u, x, z)];
+                terrimp_geomip_node *node =
+                    &tree->nodes[terrimpi_mip_number(tree, level, x / 2u, z / 2u)];
+                int first = x % 2u == 0 && z % 2u == 0;
+                node->low = first ? child->low : terrimpi_min(node->low, child->low);
+                node->high = first ? child->high : terrimpi_max(node->high, child->high);
+                node->error = terrimpi_max(node->error, child->error);
+            }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch)
+{
+    uint32_t node;
+    if (!tree)
+        return TERRIMP_E_NULL;
+    for (node = 0; node < tree->node_count; node++) {
+        terrimp_result result = terrimp_geomip_build_node(tree, node, scratch);
+        if (result != TERRIMP_OK)
+            return result;
+    }
+    return terrimp_geomip_build_finish(tree);
+}
+
+/* ---- distances ---- */
+
+/* D of one node, squared, before its children have a say. */
+static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint32_t node, int rule,
+                                   float tolerance_px, float pixel_factor)
+{
+    const terrimp_geomip_node *n = &t->nodes[node];
+    float d;
+    if (level == 0)
+        return 0.0f;
+    if (rule == TERRIMP_GEOMIP_BOUND || rule == TERRIMP_GEOMIP_DISTANCE) {
+        /* Rounding of heights and of the error itself, so that the bound is one. */
+        float size = terrimpi_max(terrimpi_abs(n->low), terrimpi_abs(n->high));
+        d = n->error > 0.0f ? n->error + 5e-7f * size : 0.0f;
+        d *= pixel_factor / tolerance_px;
+        d *= d;
+    } else {
+        /* The picture's error is its area times the square of the displacement. All nodes cost the
+           same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
+           is equal over all nodes where rms * quad / d^2 is. */
+        float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
+        d = n->rms * pixel_factor * (quad * pixel_factor) /
+            (tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
+    }
+    return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
+}
+
+static void terrimpi_mip_distances(const terrimp_geomip *t, int rule, float tolerance_px,
+                                   float morph_ratio, float pixel_factor, float *distances)
+{
+    uint32_t level, x, z;
+    for (level = 0; level < t->level_count; level++) {
+        for (x = t->level_first[level]; x < t->level_first[level + 1u]; x++)
+            distances[x] = terrimpi_mip_distance(t, level, x, rule, tolerance_px, pixel_factor);
+        if (level == 0)
+            continue;
+        for (z = 0; z < t->level_z[level - 1u]; z++)
+            for (x = 0; x < t->level_x[level - 1u]; x++) {
+                float least = distances[terrimpi_mip_number(t, level - 1u, x, z)];
+                float *d = &distances[terrimpi_mip_number(t, level, x / 2u, z / 2u)];
+                least = terrimpi_min(least * morph_ratio * morph_ratio, TERRIMPI_MIP_MOST);
+                *d = terrimpi_max(*d, least);
+            }
+    }
+}
+
+/* Checks the settings that selection and distances share. */
+static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
+                                         float morph_ratio)
+{
+    if (!t || !t->nodes)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_finite(tolerance_px) || !terrimpi_finite(morph_ratio))
+        return TERRIMP_E_NOT_FINITE;
+    return rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || tolerance_px < 0.01f ||
+                   tolerance_px > 1000.0f || morph_ratio < 1.0f || morph_ratio > 4.0f
+               ? TERRIMP_E_RANGE
+               : TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
+                                                    float tolerance_px, float morph_ratio,
+                                                    float pixel_factor, float *distances)
+{
+    terrimp_result result = terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio);
+    if (result != TERRIMP_OK)
+        return result;
+    if (!distances)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_finite(pixel_factor))
+        return TERRIMP_E_NOT_FINITE;
+    if (!(pixel_factor > 0.0f))
+        return TERRIMP_E_RANGE;
+    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
+    return TERRIMP_OK;
+}
+
+/* ---- selection ---- */
+
+/* One frame's selection. A point r from the eye, at depth z = forward . r, that is moved by e along
+   y appears K e |forward x (y x r)| / (z z') pixels off, z' being its depth after the move. With p
+   and q the parts of r along and across the horizontal heading, and forward = (heading * level,
+   steep), the product's length is sqrt(p^2 + (steep q)^2). */
+typedef struct terrimpi_mip_frame {
+    const terrimp_geomip *tree;
+    terrimp_geomip_view *view;
+    terrimp_frustum frustum;
+    float eye[3], forward[3];
+    float heading[2];          /* x, z; unit length */
+    float level, steep;
+    float along, across;       /* largest tangents on the screen, in the direction in which y is
+                                  seen there, and across it */
+    float cos2;                /* square of the cosine between forward and the screen's corner */
+    int exact;                 /* BOUND */
+    uint32_t first[TERRIMP_GEOMIP_LEVELS]; /* lists of marks; ends with node_count */
+} terrimpi_mip_frame;
+
+/* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
+   at its edge may be drawn that far outside. */
+static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera, float margin)
+{
+    float right[3], seen[3], aside[3], tan_x, tan_y;
+    terrimpi_cross(camera->forward, camera->up, right);
+    terrimpi_camera_tangents(camera, &tan_x, &tan_y);
+    tan_x += margin;
+    tan_y += margin;
+    memcpy(f->eye, camera->eye, sizeof f->eye);
+    memcpy(f->forward, camera->forward, sizeof f->forward);
+    f->steep = f->forward[1];
+    f->level = TERRIMP_SQRTF(f->forward[0] * f->forward[0] + f->forward[2] * f->forward[2]);
+    if (f->level > 1e-6f) {
+        f->heading[0] = f->forward[0] / f->level;
+        f->heading[1] = f->forward[2] / f->level;
+    } else { /* straight up or down: any heading will do */
+        f->heading[0] = 1.0f;
+        f->heading[1] = 0.0f;
+    }
+    seen[0] = -f->steep * f->heading[0];
+    seen[1] = f->level;
+    seen[2] = -f->steep * f->heading[1];
+    terrimpi_cross(f->forward, seen, aside);
+    f->along = tan_x * terrimpi_abs(terrimpi_dot(seen, right)) +
+               tan_y * terrimpi_abs(terrimpi_dot(seen, camera->up));
+    f->across = tan_x * terrimpi_abs(terrimpi_dot(aside, right)) +
+                tan_y * terrimpi_abs(terrimpi_dot(aside, camera->up));
+    f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
+}
+
+/* Square of the distance from the eye to the closest point of a box. */
+static float terrimpi_mip_distance2(const terrimp_box *box, const float eye[3])
+{
+    float sum = 0.0f;
+    int k;
+    for (k = 0; k < 3; k++) {
+        float d = terrimpi_max(box->min[k] - eye[k], eye[k] - box->max[k]);
+        sum += d > 0.0f ? d * d : 0.0f;
+    }
+    return sum;
+}
+
+/* A bound of |p| / z over what the screen shows of a box whose depths are within z_min..z_max and
+   whose highest point (looking down; else the lowest) is `top` above (below) the eye. Since
+   z = level p - steep y, p / z is (1 + steep y / z) / level. */
+static float terrimpi_mip_stretch(const terrimpi_mip_frame *f, float p_min, float p_max, float top,
+                                  float z_min, float z_max)
+{
+    float steep = terrimpi_abs(f->steep), most = f->level + steep * f->along, behind;
+    if (f->level > 1e-3f)
+        most = terrimpi_min(most, (1.0f + steep * top / (top > 0.0f ? z_min : z_max)) / f->level);
+    most = terrimpi_min(most, p_max / z_min);
+    behind = terrimpi_min(steep * f->along - f->level, -p_min / z_min);
+    return terrimpi_max(terrimpi_max(most, behind), 0.0f);
+}
+
+/* What D^2 is to be multiplied with: the square of the most pixels that a vertical error of
+   K^-1 shows as anywhere in a box. It changes continuously with the camera, and never grows from a
+   box to a part of it. */
+static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
+                                      float distance2)
+{
+    float c[3], h[3], p, p_half, q_most, z, z2, far2 = 0.0f, a, b;
+    int k;
+    for (k = 0; k < 3; k++) {
+        float low = box->min[k] - f->eye[k], high = box->max[k] - f->eye[k];
+        c[k] = 0.5f * (low + high);
+        h[k] = 0.5f * (high - low);
+        far2 += terrimpi_max(low * low, high * high);
+    }
+    z = terrimpi_dot(f->forward, c);
+    for (k = 0; k < 3; k++)
+        z -= terrimpi_abs(f->forward[k]) * h[k];
+    p = f->heading[0] * c[0] + f->heading[1] * c[2];
+    p_half = terrimpi_abs(f->heading[0]) * h[0] + terrimpi_abs(f->heading[1]) * h[2];
+    q_most = terrimpi_abs(f->heading[1] * c[0] - f->heading[0] * c[2]) +
+             terrimpi_abs(f->heading[1]) * h[0] + terrimpi_abs(f->heading[0]) * h[2];
+    z2 = terrimpi_max(z > 0.0f ? z * z : 0.0f, distance2 * f->cos2);
+    a = terrimpi_mip_stretch(f, p - p_half, p + p_half,
+                             f->steep <= 0.0f ? c[1] + h[1] : h[1] - c[1], TERRIMP_SQRTF(z2),
+                             TERRIMP_SQRTF(far2));
+    b = terrimpi_min(f->across * f->across, q_most * q_most / z2) * f->steep * f->steep;
+    return (a * a + b) / z2 * 1.00001f; /* more than all rounding here */
+}
+
+/* Square of a node's error over the tolerance, when it is drawn as it is. */
+static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node)
+{
+    float d2, measure, split2 = f->view->distances[node];
+    terrimp_box box;
+    if (!(split2 > 0.0f))
+        return 0.0f;
+    terrimpi_mip_box(f->tree, p, &box);
+    d2 = terrimpi_mip_distance2(&box, f->eye);
+    measure = f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2) : split2 / d2;
+    return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
+}
+
+/* Raises a node's measure, and enters the node into the list of its level. */
+static void terrimpi_mip_raise(terrimpi_mip_frame *f, uint32_t level, uint32_t node, float measure)
+{
+    terrimp_geomip_mark *mark = &f->view->marks[node];
+    if (mark->frame != f->view->frame) {
+        mark->frame = f->view->frame;
+        mark->measure = 0.0f;
+        mark->next = f->first[level];
+        f->first[level] = node;
+    }
+    mark->measure = terrimpi_max(mark->measure, measure);
+}
+
+/* The measure that a node was given in this frame; less than 1: not split. */
+static float terrimpi_mip_marked(const terrimpi_mip_frame *f, uint32_t node)
+{
+    const terrimp_geomip_mark *mark = &f->view->marks[node];
+    return mark->frame == f->view->frame ? mark->measure : 0.0f;
+}
+
+/* Marks the nodes whose own error asks for a split, and those that are close to it. Measures never
+   grow towards the leaves, so what lies below an unsplit node asks for nothing. */
+static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
+{
+    const terrimp_geomip *t = f->tree;
+    terrimpi_mip_place stack[3u * TERRIMP_GEOMIP_LEVELS + 1u];
+    uint32_t depth = 1, i;
+    float stay = 1.0f + f->view->hysteresis;
+    float worth = 1.0f / (f->view->morph_ratio * f->view->morph_ratio);
+    stack[0].level = t->level_count - 1u;
+    stack[0].x = stack[0].z = 0;
+    while (depth > 0) {
+        terrimpi_mip_place p = stack[--depth];
+        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
+        const terrimp_geomip_mark *mark = &f->view->marks[node];
+        float measure = p.level == 0 ? 0.0f : terrimpi_mip_measure(f, p, node);
+        if (mark->frame == f->view->frame - 1u && mark->measure >= 1.0f && worth >= 1.0f)
+            measure *= stay * stay;
+        if (measure < worth)
+            continue;
+        terrimpi_mip_raise(f, p.level, node, measure);
+        if (measure < 1.0f || p.level == 1u)
+            continue;
+        p.level--;
+        for (i = 0; i < 4u; i++) {
+            terrimpi_mip_place child = p;
+            child.x = p.x * 2u + (i & 1u);
+            child.z = p.z * 2u + (i >> 1);
+            if (child.x < t->level_x[p.level] && child.z < t->level_z[p.level])
+                stack[depth++] = child;
+        }
+    }
+}
+
+/* Sees to it that neighbours differ by one level at most. A node that is split has children beside
+   the neighbours of its own level, which have to exist: their parents are split. What is raised is
+   always one level up, so one pass from the finest level to the root settles everything. The parent
+   of a node that is raised needs no care: it is also the parent of the raising node's parent, or a
+   neighbour's parent to that, and so measures morph_ratio^2 times more; as all parents do of their
+   children, which lets nodes cease to morph before they split. */
+static void terrimpi_mip_balance(terrimpi_mip_frame *f)
+{
+    const terrimp_geomip *t = f->tree;
+    uint32_t level, node;
+    int side;
+    for (level = 1; level + 1u < t->level_count; level++)
+        for (node = f->first[level]; node != t->node_count; node = f->view->marks[node].next) {
+            terrimpi_mip_place p, beyond;
+            p.level = level;
+            p.x = (node - t->level_first[level]) % t->level_x[level];
+            p.z = (node - t->level_first[level]) / t->level_x[level];
+            for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+                if (terrimpi_mip_beyond(t, p, side, &beyond))
+                    terrimpi_mip_raise(f, level + 1u,
+                                       terrimpi_mip_number(t, level + 1u, beyond.x / 2u,
+                                                           beyond.z / 2u),
+                                       f->view->marks[node].measure);
+        }
+}
+
+/* How far a node has morphed into the shape of its parent, from the parent's measure: from 1 where
+   the parent splits to 0 at morph_ratio times less distance, linear in the distance. */
+static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_place p)
+{
+    float ratio = f->view->morph_ratio, measure;
+    if (!(ratio > 1.0f) || p.level + 1u >= f->tree->level_count)
+        return 0.0f;
+    measure = terrimpi_mip_marked(
+        f, terrimpi_mip_number(f->tree, p.level + 1u, p.x / 2u, p.z / 2u));
+    if (measure >= ratio * ratio)
+        return 0.0f;
+    return measure > 1.0f ? (ratio / TERRIMP_SQRTF(measure) - 1.0f) / (ratio - 1.0f) : 1.0f;
+}
+
+/* What a node's side needs: whether the neighbour is coarser, and the factors of the border. With a
+   neighbour of the same level the larger fraction holds for both; a coarser neighbour dictates. */
+static void terrimpi_mip_side(const terrimpi_mip_frame *f, terrimpi_mip_place p, int side,
+                              terrimp_geomip_draw *draw)
+{
+    const terrimp_geomip *t = f->tree;
+    terrimpi_mip_place beyond, parent;
+    draw->side[side] = draw->morph;
+    draw->side_coarse[side] = 0.0f;
+    if (!terrimpi_mip_beyond(t, p, side, &beyond))
+        return;
+    parent.level = p.level + 1u;
+    parent.x = beyond.x / 2u;
+    parent.z = beyond.z / 2u;
+    if (parent.x == p.x / 2u && parent.z == p.z / 2u)
+        return; /* a sibling, or its children: the same fraction, or 0 */
+    if (terrimpi_mip_marked(f, terrimpi_mip_number(t, parent.level, parent.x, parent.z)) < 1.0f) {
+        draw->pattern |= 1u << side;
+        draw->side_coarse[side] = terrimpi_mip_fraction(f, parent);
+        draw->side[side] = 1.0f; /* left out, or in stitched patterns on the neighbour's edge */
+    } else {
+        draw->side[side] = terrimpi_max(draw->morph, terrimpi_mip_fraction(f, beyond));
+    }
+}
+
+static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node)
+{
+    terrimp_geomip_view *v = f->view;
+    terrimp_geomip_draw *draw;
+    int side;
+    if (v->draws_needed++ >= v->draw_capacity)
+        return;
+    draw = &v->draws[v->draws_needed - 1u];
+    draw->node = node;
+    draw->level = p.level;
+    draw->x = p.x;
+    draw->z = p.z;
+    draw->pattern = 0;
+    draw->error_px = 0.0f;
+    if (p.level > 0)
+        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, p, node));
+    draw->morph = terrimpi_mip_fraction(f, p);
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        terrimpi_mip_side(f, p, side, draw);
+    v->triangle_count += terrimpi_mip_triangles(f->tree->chunk_quads, draw->pattern);
+}
+
+/* Walks down to the nodes that are not split, children closest to the eye first, and leaves out
+   what the frustum does not meet. */
+static void terrimpi_mip_collect(terrimpi_mip_frame *f)
+{
+    const terrimp_geomip *t = f->tree;
+    struct {
+        terrimpi_mip_place place;
+        int mask;
+    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
+    uint32_t depth = 1, i;
+    f->view->draws_needed = f->view->triangle_count = 0;
+    stack[0].place.level = t->level_count - 1u;
+    stack[0].place.x = stack[0].place.z = 0;
+    stack[0].mask = TERRIMP_PLANES_ALL;
+    while (depth > 0) {
+        terrimpi_mip_place p;
+        terrimp_box box;
+        uint32_t node, closest = 0;
+        top = stack[--depth];
+        p = top.place;
+        node = terrimpi_mip_number(t, p.level, p.x, p.z);
+        if (top.mask) {
+            terrimpi_mip_box(t, p, &box);
+            top.mask = terrimp_frustum_test(&f->frustum, &box, top.mask);
+            if (top.mask == TERRIMP_PLANES_OUTSIDE)
+                continue;
+        }
+        if (p.level == 0 || terrimpi_mip_marked(f, node) < 1.0f) {
+            terrimpi_mip_emit(f, p, node);
+            continue;
+        }
+        p.level--;
+        p.x *= 2u;
+        p.z *= 2u;
+        if (f->eye[0] >= terrimpi_line(t->field.origin_x, t->field.spacing_x,
+                                       terrimpi_mip_col(t, p.level, (p.x + 1u) * t->chunk_quads)))
+            closest |= 1u;
+        if (f->eye[2] >= terrimpi_line(t->field.origin_z, t->field.spacing_z,
+                                       terrimpi_mip_row(t, p.level, (p.z + 1u) * t->chunk_quads)))
+            closest |= 2u;
+        for (i = 4u; i-- > 0;) { /* the last one pushed is the first one visited */
+            terrimpi_mip_place child = p;
+            child.x += (closest ^ i) & 1u;
+            child.z += (closest ^ i) >> 1;
+            if (child.x >= t->level_x[p.level] || child.z >= t->level_z[p.level])
+                continue;
+            stack[depth].place = child;
+            stack[depth].mask = top.mask;
+            depth++;
+        }
+    }
+}
+
+/* Remakes the distances when what they depend on has changed. */
+static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
+{
+    terrimp_geomip_view *v = f->view;
+    float wanted[5];
+    wanted[0] = (float)v->rule;
+    wanted[1] = v->tolerance_px;
+    wanted[2] = v->morph_ratio;
+    wanted[3] = v->rule == TERRIMP_GEOMIP_DISTANCE ? pixel_factor / f->cos2 : pixel_factor;
+    wanted[4] = 1.0f;
+    if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
+        return;
+    memcpy(v->distances_for, wanted, sizeof wanted);
+    terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
+                           v->distances);
+}
+
+/* Fills in a view's defaults, in a copy, and checks it. */
+static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
+                                                terrimp_geomip_view *view)
+{
+    if (view->rule == TERRIMP_GEOMIP_DEFAULT)
+        view->rule = TERRIMP_GEOMIP_PICTURE;
+    if (view->tolerance_px == 0.0f)
+        view->tolerance_px = 1.0f;
+    if (view->morph_ratio == 0.0f)
+        view->morph_ratio = 1.0f;
+    if (!view->distances || !view->marks || !view->draws)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_finite(view->hysteresis))
+        return TERRIMP_E_NOT_FINITE;
+    if (view->hysteresis < 0.0f || view->hysteresis > 1.0f)
+        return TERRIMP_E_RANGE;
+    return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
+                                                 terrimp_geomip_view *view,
+                                                 const terrimp_camera *camera)
+{
+    terrimpi_mip_frame f;
+    terrimp_geomip_view v;
+    terrimp_camera c;
+    terrimp_result result;
+    float pixel_factor;
+    uint32_t level;
+    if (!tree || !view)
+        return TERRIMP_E_NULL;
+    result = terrimp_camera_resolve(camera, &c);
+    if (result != TERRIMP_OK)
+        return result;
+    v = *view;
+    result = terrimpi_mip_view_resolve(tree, &v);
+    if (result != TERRIMP_OK)
+        return result;
+    terrimp_camera_frustum(&c, &f.frustum);
+    terrimp_camera_pixel_factor(&c, &pixel_factor);
+    f.tree = tree;
+    f.view = &v;
+    f.exact = v.rule == TERRIMP_GEOMIP_BOUND;
+    for (level = 0; level < tree->level_count; level++)
+        f.first[level] = tree->node_count;
+    terrimpi_mip_aim(&f, &c, v.tolerance_px / pixel_factor);
+    terrimpi_mip_refresh(&f, pixel_factor);
+    v.frame = v.frame + 1u == 0 ? 1u : v.frame + 1u; /* 0 is what fresh marks say */
+    terrimpi_mip_mark_errors(&f);
+    terrimpi_mip_balance(&f);
+    terrimpi_mip_collect(&f);
+    view->frame = v.frame;
+    memcpy(view->distances_for, v.distances_for, sizeof v.distances_for);
+    view->draws_needed = v.draws_needed;
+    result = v.draws_needed > v.draw_capacity ? TERRIMP_E_CAPACITY : TERRIMP_OK;
+    view->draw_count = result == TERRIMP_OK ? v.draws_needed : 0;
+    view->triangle_count = result == TERRIMP_OK ? v.triangle_count : 0;
+    return result;
+}
+
+/* ---- vertices and morphing ---- */
+
+/* Height on the edge from a to b, k of n steps along it; exact at its ends. */
+static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
+{
+    return k == 0 ? a : k == n ? b : a + (b - a) * ((float)k / (float)n);
+}
+
+/* Height of the triangles of a level at a sample. */
+static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
+{
+    const terrimp_heightfield *f = &t->field;
+    uint32_t i = x >> level, j = z >> level;
+    uint32_t x0 = terrimpi_mip_col(t, level, i), x1 = terrimpi_mip_col(t, level, i + 1u);
+    uint32_t z0 = terrimpi_mip_row(t, level, j), z1 = terrimpi_mip_row(t, level, j + 1u);
+    float a = terrimpi_sample(f, x0, z0), d = terrimpi_sample(f, x1, z1), b, c, u, v;
+    uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
+    right = x - x0;
+    down = z - z0;
+    if (wide == 0 || deep == 0 || right * deep == down * wide) /* an edge of the far sides, or the
+                                                                  diagonal */
+        return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
+                         : terrimpi_mip_between(a, d, right, wide);
+    b = terrimpi_sample(f, x1, z0);
+    c = terrimpi_sample(f, x0, z1);
+    if (right == 0)
+        return terrimpi_mip_between(a, c, down, deep);
+    if (down == 0)
+        return terrimpi_mip_between(a, b, right, wide);
+    u = (float)right / (float)wide;
+    v = (float)down / (float)deep;
+    return u < v ? a + v * (c - a) + u * (d - c) : a + u * (b - a) + v * (d - b);
+}
+
+/* How far a vertex of a level's lattice is below the triangles of `above` levels up. */
+static float terrimpi_mip_move(const terrimp_geomip *t, uint32_t level, uint32_t i, uint32_t j,
+                               uint32_t above)
+{
+    uint32_t x = terrimpi_mip_col(t, level, i), z = terrimpi_mip_row(t, level, j);
+    return terrimpi_mip_height(t, level + above, x, z) - terrimpi_sample(&t->field, x, z);
+}
+
+/* The moves of a node's vertex (i, j); (i0, j0) is the node's first one on the lattice. */
+static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_t i0, uint32_t j0,
+                                uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
+{
+    uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
+    int odd = (i | j) & 1u, border = i == 0 || j == 0 || i == last + 1u || j == last + 1u;
+    vertex->height = terrimpi_sample(&t->field, terrimpi_mip_col(t, level, i0 + i),
+                                     terrimpi_mip_row(t, level, j0 + j));
+    vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
+    if (odd || border)
+        vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, odd ? 1u : 2u);
+    if (j == 1u)
+        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i - both, j0, 2);
+    if (j == last)
+        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i + both, j0 + last + 1u, 2);
+    if (i == 1u)
+        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0, j0 + j - both, 2);
+    if (i == last)
+        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0 + last + 1u, j0 + j + both, 2);
+    if (odd && (j == 0 || j == last + 1u)) /* between two border vertices: one of them moves */
+        vertex->beside[0] = 0.5f * (terrimpi_mip_move(t, level, i0 + i - 1u, j0 + j, 2) +
+                                    terrimpi_mip_move(t, level, i0 + i + 1u, j0 + j, 2));
+    if (odd && (i == 0 || i == last + 1u))
+        vertex->beside[1] = 0.5f * (terrimpi_mip_move(t, level, i0 + i, j0 + j - 1u, 2) +
+                                    terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 2));
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
+                                                        float *xyz,
+                                                        terrimp_geomip_vertex *vertices)
+{
+    terrimpi_mip_place p;
+    uint32_t i, j, i0, j0;
+    if (!tree || (!xyz && !vertices))
+        return TERRIMP_E_NULL;
+    if (node >= tree->node_count)
+        return TERRIMP_E_RANGE;
+    p = terrimpi_mip_place_of(tree, node);
+    i0 = p.x * tree->chunk_quads;
+    j0 = p.z * tree->chunk_quads;
+    for (j = 0; j <= tree->chunk_quads; j++)
+        for (i = 0; i <= tree->chunk_quads; i++) {
+            uint32_t x = terrimpi_mip_col(tree, p.level, i0 + i);
+            uint32_t z = terrimpi_mip_row(tree, p.level, j0 + j);
+            if (xyz) {
+                *xyz++ = terrimpi_line(tree->field.origin_x, tree->field.spacing_x, x);
+                *xyz++ = terrimpi_sample(&tree->field, x, z);
+                *xyz++ = terrimpi_line(tree->field.origin_z, tree->field.spacing_z, z);
+            }
+            if (vertices)
+                terrimpi_mip_vertex(tree, p.level, i0, j0, i, j, vertices++);
+        }
+    return TERRIMP_OK;
+}
+
+static void terrimpi_mip_weights(uint32_t quads, uint32_t i, uint32_t j, terrimp_geomip_weights *w)
+{
+    int odd = (i | j) & 1u;
+    uint8_t on[TERRIMP_SIDE_COUNT];
+    int side;
+    memset(w, 0, sizeof *w);
+    on[TERRIMP_SIDE_Z0] = j == 0;
+    on[TERRIMP_SIDE_Z1] = j == quads;
+    on[TERRIMP_SIDE_X0] = i == 0;
+    on[TERRIMP_SIDE_X1] = i == quads;
+    w->self = odd != 0;
+    w->beside[TERRIMP_SIDE_Z0] = j == 1u;
+    w->beside[TERRIMP_SIDE_Z1] = j == quads - 1u;
+    w->beside[TERRIMP_SIDE_X0] = i == 1u;
+    w->beside[TERRIMP_SIDE_X1] = i == quads - 1u;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        if (!on[side])
+            continue;
+        (odd ? w->odd : w->even)[side] = 1;
+        w->beside[side] = odd != 0;
+        w->self = 0;
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
+                                                       terrimp_geomip_weights *weights)
+{
+    uint32_t i, j;
+    if (!weights)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_mip_quads_fit(chunk_quads))
+        return TERRIMP_E_RANGE;
+    for (j = 0; j <= chunk_quads; j++)
+        for (i = 0; i <= chunk_quads; i++)
+            terrimpi_mip_weights(chunk_quads, i, j, weights++);
+    return TERRIMP_OK;
+}
+
+static float terrimpi_mip_dot4(const uint8_t weight[4], const float factor[4])
+{
+    return (float)weight[0] * factor[0] + (float)weight[1] * factor[1] +
+           (float)weight[2] * factor[2] + (float)weight[3] * factor[3];
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
+                                                const terrimp_geomip_draw *draw,
+                                                const terrimp_geomip_vertex *vertices,
+                                                float *heights, size_t stride)
+{
+    uint32_t i, j;
+    if (!draw || !vertices || !heights)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_mip_quads_fit(chunk_quads) || stride == 0)
+        return TERRIMP_E_RANGE;
+    for (j = 0; j <= chunk_quads; j++)
+        for (i = 0; i <= chunk_quads; i++, vertices++, heights += stride) {
+            const float *coarse = draw->side_coarse;
+            terrimp_geomip_weights w;
+            float factor, along_z, along_x;
+            terrimpi_mip_weights(chunk_quads, i, j, &w);
+            factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
+                     terrimpi_mip_dot4(w.even, coarse);
+            along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
+                      (float)w.beside[TERRIMP_SIDE_Z1] * coarse[TERRIMP_SIDE_Z1];
+            along_x = (float)w.beside[TERRIMP_SIDE_X0] * coarse[TERRIMP_SIDE_X0] +
+                      (float)w.beside[TERRIMP_SIDE_X1] * coarse[TERRIMP_SIDE_X1];
+            *heights = vertices->height + factor * (vertices->move + vertices->beside[0] * along_z +
+                                                    vertices->beside[1] * along_x);
+        }
+    return TERRIMP_OK;
 }
 
 /* ==== Simplifier ========================================================= >>impl-simplifier */
@@ -4400,268 +6069,6 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
     }
     end_raise[0] = raise[0];
     end_raise[1] = raise[1];
-    return TERRIMP_OK;
-}
-
-/* ==== Camera ============================================================= >>impl-camera */
-/* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
-
-TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
-{
-    terrimp_camera c;
-    float right[3];
-    if (!camera || !out)
-        return TERRIMP_E_NULL;
-    c = *camera;
-    if (!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) || !terrimpi_finite3(c.up) ||
-        !terrimpi_finite(c.fov_y_rad) || !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far))
-        return TERRIMP_E_NOT_FINITE;
-    if (c.fov_y_rad == 0.0f)
-        c.fov_y_rad = 1.0471976f;
-    if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
-        c.up[1] = 1.0f;
-    if (c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u || c.width_px > 65536u ||
-        c.height_px < 1u || c.height_px > 65536u || c.z_near <= 0.0f || c.z_far <= c.z_near ||
-        !terrimpi_normalize(c.forward))
-        return TERRIMP_E_RANGE;
-    terrimpi_basis(c.forward, c.up, right);
-    *out = c;
-    return TERRIMP_OK;
-}
-
-/* Column-major view matrix of an eye and its orthonormal axes. */
-static void terrimpi_view_matrix(const float eye[3], const float right[3], const float up[3],
-                                 const float forward[3], float m[16])
-{
-    int i;
-    for (i = 0; i < 3; i++) {
-        m[i * 4 + 0] = right[i];
-        m[i * 4 + 1] = up[i];
-        m[i * 4 + 2] = -forward[i];
-        m[i * 4 + 3] = 0.0f;
-    }
-    m[12] = -terrimpi_dot(right, eye);
-    m[13] = -terrimpi_dot(up, eye);
-    m[14] = terrimpi_dot(forward, eye);
-    m[15] = 1.0f;
-}
-
-/* Column-major perspective matrix of a frustum whose sides are tangents. */
-static void terrimpi_projection_matrix(float left, float right, float down, float up, float z_near,
-                                       float z_far, int depth_zero_to_one, float m[16])
-{
-    memset(m, 0, 16 * sizeof m[0]);
-    m[0] = 2.0f / (right - left);
-    m[5] = 2.0f / (up - down);
-    m[8] = (right + left) / (right - left);
-    m[9] = (up + down) / (up - down);
-    m[11] = -1.0f;
-    if (depth_zero_to_one) {
-        m[10] = -z_far / (z_far - z_near);
-        m[14] = -z_far * z_near / (z_far - z_near);
-    } else {
-        m[10] = -(z_far + z_near) / (z_far - z_near);
-        m[14] = -2.0f * z_far * z_near / (z_far - z_near);
-    }
-}
-
-/* Half the height and width of a resolved camera's screen at distance 1. */
-static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x, float *tan_y)
-{
-    *tan_y = TERRIMP_TANF(camera->fov_y_rad * 0.5f);
-    *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
-}
-
-TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
-                                                   float projection[16])
-{
-    terrimp_camera c;
-    terrimp_result result;
-    float right[3], tan_x, tan_y;
-    if (!view || !projection)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
-    terrimpi_cross(c.forward, c.up, right);
-    terrimpi_view_matrix(c.eye, right, c.up, c.forward, view);
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
-    terrimpi_projection_matrix(-tan_x, tan_x, -tan_y, tan_y, c.z_near, c.z_far,
-                               c.depth_zero_to_one, projection);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
-{
-    terrimp_camera c;
-    terrimp_result result;
-    float tan_x, tan_y;
-    if (!factor)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
-    *factor = (float)c.height_px / (2.0f * tan_y);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
-                                                  terrimp_frustum *frustum)
-{
-    terrimp_camera c;
-    terrimp_result result;
-    float right[3], tan_x, tan_y;
-    int i;
-    if (!frustum)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
-    terrimpi_cross(c.forward, c.up, right);
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
-    for (i = 0; i < 3; i++) {
-        frustum->eye[i] = c.eye[i];
-        frustum->plane[0][i] = right[i] + c.forward[i] * tan_x;
-        frustum->plane[1][i] = c.forward[i] * tan_x - right[i];
-        frustum->plane[2][i] = c.up[i] + c.forward[i] * tan_y;
-        frustum->plane[3][i] = c.forward[i] * tan_y - c.up[i];
-        frustum->plane[4][i] = c.forward[i];
-        frustum->plane[5][i] = -c.forward[i];
-    }
-    for (i = 0; i < 4; i++)
-        frustum->plane[i][3] = 0.0f;
-    frustum->plane[4][3] = -c.z_near;
-    frustum->plane[5][3] = c.z_far;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API int terrimp_frustum_test(const terrimp_frustum *frustum, const terrimp_box *box,
-                                     int mask)
-{
-    int i, k, crossing = 0;
-    for (i = 0; i < 6; i++) {
-        const float *plane = frustum->plane[i];
-        float most = plane[3], least = plane[3]; /* over the box's corners */
-        if (!(mask & (1 << i)))
-            continue;
-        for (k = 0; k < 3; k++) {
-            float a = plane[k] * (box->min[k] - frustum->eye[k]);
-            float b = plane[k] * (box->max[k] - frustum->eye[k]);
-            most += terrimpi_max(a, b);
-            least += terrimpi_min(a, b);
-        }
-        if (most < 0.0f)
-            return TERRIMP_PLANES_OUTSIDE;
-        if (least < 0.0f)
-            crossing |= 1 << i;
-    }
-    return crossing;
-}
-
-TERRIMP_API float terrimp_box_distance(const terrimp_box *box, const float point[3])
-{
-    float d[3];
-    int i;
-    for (i = 0; i < 3; i++)
-        d[i] = terrimpi_max(0.0f,
-                            terrimpi_max(box->min[i] - point[i], point[i] - box->max[i]));
-    return terrimpi_length(d);
-}
-
-TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point[3])
-{
-    float d[3];
-    int i;
-    for (i = 0; i < 3; i++)
-        d[i] = terrimpi_max(point[i] - box->min[i], box->max[i] - point[i]);
-    return terrimpi_length(d);
-}
-
-/* Corner i of a box (bit k of i: the maximum along axis k), relative to a point. */
-static void terrimpi_box_corner(const terrimp_box *box, int i, const float point[3],
-                                float corner[3])
-{
-    int k;
-    for (k = 0; k < 3; k++)
-        corner[k] = ((i >> k) & 1 ? box->max[k] : box->min[k]) - point[k];
-}
-
-static terrimp_result terrimpi_check_box(const terrimp_box *box)
-{
-    int i;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max))
-        return TERRIMP_E_NOT_FINITE;
-    for (i = 0; i < 3; i++)
-        if (box->min[i] > box->max[i])
-            return TERRIMP_E_RANGE;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture)
-{
-    static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
-    terrimp_capture c;
-    terrimp_result result;
-    float slope = 1.0f; /* of the steepest ray to a corner: its length over its depth */
-    int i;
-    if (!box || !eye || !capture)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_box(box);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
-    if (terrimp_box_distance(box, eye) <= 0.0f)
-        return TERRIMP_E_INSIDE;
-    for (i = 0; i < 3; i++) {
-        c.eye[i] = eye[i];
-        c.forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
-    }
-    if (!terrimpi_normalize(c.forward))
-        return TERRIMP_E_INSIDE;
-    memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
-    terrimpi_basis(c.forward, c.up, c.right);
-    c.z_near = c.z_far = 0.0f;
-    c.tan_left = c.tan_right = c.tan_down = c.tan_up = 0.0f;
-    for (i = 0; i < 8; i++) {
-        float p[3], length, z, x, y;
-        terrimpi_box_corner(box, i, eye, p);
-        z = terrimpi_dot(c.forward, p);
-        length = terrimpi_length(p);
-        /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-        if (!(z > 0.001f * length))
-            return TERRIMP_E_BEHIND;
-        slope = terrimpi_max(slope, length / z);
-        x = terrimpi_dot(c.right, p) / z;
-        y = terrimpi_dot(c.up, p) / z;
-        c.z_near = i ? terrimpi_min(c.z_near, z) : z;
-        c.z_far = i ? terrimpi_max(c.z_far, z) : z;
-        c.tan_left = i ? terrimpi_min(c.tan_left, x) : x;
-        c.tan_right = i ? terrimpi_max(c.tan_right, x) : x;
-        c.tan_down = i ? terrimpi_min(c.tan_down, y) : y;
-        c.tan_up = i ? terrimpi_max(c.tan_up, y) : y;
-    }
-    /* A hair's breadth, so that rounding leaves no corner outside and a flat box has a volume. */
-    c.z_near *= 1.0f - 1e-6f * slope;
-    c.z_far *= 1.0f + 1e-6f * slope;
-    terrimpi_widen(&c.tan_left, &c.tan_right, slope);
-    terrimpi_widen(&c.tan_down, &c.tan_up, slope);
-    *capture = c;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
-                                                    int depth_zero_to_one, float view[16],
-                                                    float projection[16])
-{
-    if (!capture || !view || !projection)
-        return TERRIMP_E_NULL;
-    terrimpi_view_matrix(capture->eye, capture->right, capture->up, capture->forward, view);
-    terrimpi_projection_matrix(capture->tan_left, capture->tan_right, capture->tan_down,
-                               capture->tan_up, capture->z_near, capture->z_far,
-                               depth_zero_to_one, projection);
     return TERRIMP_OK;
 }
 

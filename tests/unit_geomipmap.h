@@ -1,0 +1,1021 @@
+/* Laws of the geomipmap room: patterns, errors, selection, morphing. */
+#ifndef UNIT_GEOMIPMAP_H
+#define UNIT_GEOMIPMAP_H
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- patterns ---- */
+
+static const uint32_t mip_quads[] = {4, 6, 8, 16, 32, 64};
+
+/* Twice the area of a triangle in quads; above 0 when it is counter-clockwise seen from +y. */
+static int32_t mip_area2(uint32_t quads, const uint32_t v[3])
+{
+    int32_t row = (int32_t)quads + 1, x[3], z[3], k;
+    for (k = 0; k < 3; k++) {
+        x[k] = (int32_t)v[k] % row;
+        z[k] = (int32_t)v[k] / row;
+    }
+    return (z[1] - z[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (z[2] - z[0]);
+}
+
+/* Visits the triangles of a pattern; those that name a vertex twice are left out. */
+typedef void (*mip_visit)(void *user, uint32_t quads, const uint32_t triangle[3]);
+
+static void mip_triangles(const uint16_t *indices, uint32_t quads, int form, uint32_t pattern,
+                          mip_visit visit, void *user)
+{
+    terrimp_pattern p;
+    uint32_t k, step = form == TERRIMP_FORM_STRIP ? 1u : 3u, count = 0;
+    CHECK(terrimp_pattern_find(quads, form, pattern, &p) == TERRIMP_OK);
+    for (k = 0; k + 3u <= p.index_count; k += step) {
+        const uint16_t *t = indices + p.first_index + k;
+        uint32_t flip = form == TERRIMP_FORM_STRIP ? k & 1u : 0, v[3];
+        v[0] = t[flip];
+        v[1] = t[1u - flip];
+        v[2] = t[2];
+        if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0])
+            continue;
+        count += mip_area2(quads, v) != 0;
+        if (visit)
+            visit(user, quads, v);
+    }
+    CHECK(count == p.triangle_count);
+}
+
+static uint16_t *mip_filled(uint32_t quads, int form)
+{
+    uint32_t count = terrimp_pattern_index_count(quads, form);
+    uint16_t *indices = (uint16_t *)malloc(count * sizeof *indices);
+    CHECK(terrimp_pattern_fill(quads, form, indices, count) == TERRIMP_OK);
+    return indices;
+}
+
+/* What a square is covered with: for each quad its four parts (between the middle and a side) and
+   directed edges of the triangles. */
+typedef struct mip_cover {
+    uint8_t parts[64 * 64][4];
+    int32_t area2;
+    uint8_t used[65 * 65];
+} mip_cover;
+
+static void mip_cover_triangle(void *user, uint32_t quads, const uint32_t v[3])
+{
+    mip_cover *cover = (mip_cover *)user;
+    int32_t row = (int32_t)quads + 1, x[3], z[3], k, i, j, part;
+    int32_t low_x, high_x, low_z, high_z;
+    CHECK(mip_area2(quads, v) >= 0);
+    cover->area2 += mip_area2(quads, v);
+    for (k = 0; k < 3; k++) {
+        x[k] = (int32_t)v[k] % row * 8;
+        z[k] = (int32_t)v[k] / row * 8;
+        cover->used[v[k]] = 1;
+    }
+    low_x = x[0] < x[1] ? x[0] : x[1], low_x = low_x < x[2] ? low_x : x[2];
+    low_z = z[0] < z[1] ? z[0] : z[1], low_z = low_z < z[2] ? low_z : z[2];
+    high_x = x[0] > x[1] ? x[0] : x[1], high_x = high_x > x[2] ? high_x : x[2];
+    high_z = z[0] > z[1] ? z[0] : z[1], high_z = high_z > z[2] ? high_z : z[2];
+    for (j = low_z / 8; j < high_z / 8; j++)
+        for (i = low_x / 8; i < high_x / 8; i++)
+            for (part = 0; part < 4; part++) { /* a point off every edge that can occur */
+                static const int32_t at_x[4] = {3, 5, 1, 7}, at_z[4] = {1, 7, 4, 4};
+                int32_t px = i * 8 + at_x[part], pz = j * 8 + at_z[part], inside = 1;
+                for (k = 0; k < 3; k++) {
+                    int32_t n = (k + 1) % 3;
+                    inside &= (z[n] - z[k]) * (px - x[k]) - (x[n] - x[k]) * (pz - z[k]) > 0;
+                }
+                cover->parts[j * (int32_t)quads + i][part] += (uint8_t)inside;
+            }
+}
+
+static void every_pattern_covers_its_square_once(void)
+{
+    mip_cover *cover = (mip_cover *)malloc(sizeof *cover);
+    uint32_t k, pattern, i, part;
+    int form;
+    for (form = 0; form < (int)TERRIMP_FORM_COUNT; form++)
+        for (k = 0; k < sizeof mip_quads / sizeof mip_quads[0]; k++) {
+            uint32_t quads = mip_quads[k];
+            uint16_t *indices = mip_filled(quads, form);
+            for (pattern = 0; pattern < TERRIMP_PATTERN_COUNT; pattern++) {
+                memset(cover, 0, sizeof *cover);
+                mip_triangles(indices, quads, form, pattern, mip_cover_triangle, cover);
+                CHECK(cover->area2 == (int32_t)(2u * quads * quads));
+                for (i = 0; i < quads * quads; i++)
+                    for (part = 0; part < 4u; part++)
+                        CHECK(cover->parts[i][part] == 1);
+                for (i = 0; i < (quads + 1u) * (quads + 1u); i++) {
+                    uint32_t x = i % (quads + 1u), z = i / (quads + 1u);
+                    uint32_t out = ((pattern & 1u) && z == 0) || ((pattern & 2u) && z == quads)
+                                       ? x & 1u : 0;
+                    if (((pattern & 4u) && x == 0) || ((pattern & 8u) && x == quads))
+                        out |= z & 1u;
+                    CHECK(cover->used[i] == (form == TERRIMP_FORM_STITCHED || !out));
+                }
+            }
+            free(indices);
+        }
+    free(cover);
+}
+
+/* Counts the edges along the borders: count[side][length - 1][i], of those that begin at the i-th
+   vertex of the side; an edge in the other direction takes one away. */
+typedef struct mip_edges {
+    int count[TERRIMP_SIDE_COUNT][2][65];
+} mip_edges;
+
+static void mip_note_edge(mip_edges *edges, int side, uint32_t from, uint32_t to)
+{
+    uint32_t low = from < to ? from : to, length = from < to ? to - from : from - to;
+    int fits = length == 1u || length == 2u;
+    CHECK(fits);
+    if (fits)
+        edges->count[side][length - 1u][low] += from < to ? 1 : -1;
+}
+
+static void mip_border_edges(void *user, uint32_t quads, const uint32_t v[3])
+{
+    mip_edges *edges = (mip_edges *)user;
+    uint32_t k, row = quads + 1u;
+    for (k = 0; k < 3u; k++) {
+        uint32_t a = v[k], b = v[(k + 1u) % 3u];
+        if (a < row && b < row)
+            mip_note_edge(edges, TERRIMP_SIDE_Z0, b, a);
+        if (a / row == quads && b / row == quads)
+            mip_note_edge(edges, TERRIMP_SIDE_Z1, a % row, b % row);
+        if (a % row == 0 && b % row == 0)
+            mip_note_edge(edges, TERRIMP_SIDE_X0, a / row, b / row);
+        if (a % row == quads && b % row == quads)
+            mip_note_edge(edges, TERRIMP_SIDE_X1, b / row, a / row);
+    }
+}
+
+static void patterns_share_every_border_vertex_with_neighbours_of_both_levels(void)
+{
+    mip_edges edges;
+    uint32_t k, pattern, side, i;
+    int form;
+    for (form = 0; form < (int)TERRIMP_FORM_COUNT; form++)
+        for (k = 0; k < sizeof mip_quads / sizeof mip_quads[0]; k++) {
+            uint32_t quads = mip_quads[k];
+            uint16_t *indices = mip_filled(quads, form);
+            for (pattern = 0; pattern < TERRIMP_PATTERN_COUNT; pattern++) {
+                memset(&edges, 0, sizeof edges);
+                mip_triangles(indices, quads, form, pattern, mip_border_edges, &edges);
+                for (side = 0; side < (uint32_t)TERRIMP_SIDE_COUNT; side++) {
+                    uint32_t step = 1u + (pattern >> side & 1u); /* of the neighbour's vertices */
+                    for (i = 0; i < quads; i++) {
+                        CHECK(edges.count[side][0][i] == (step == 1u));
+                        CHECK(edges.count[side][1][i] == (step == 2u && i % 2u == 0));
+                    }
+                }
+            }
+            free(indices);
+        }
+}
+
+/* Vertices that a FIFO cache has to transform for each triangle. */
+static float mip_acmr(const uint16_t *indices, uint32_t count, uint32_t triangles, uint32_t entries)
+{
+    static uint32_t loaded[129 * 129];
+    uint32_t k, misses = 0;
+    memset(loaded, 0, sizeof loaded);
+    for (k = 0; k < count; k++)
+        if (loaded[indices[k]] == 0 || misses + 1u - loaded[indices[k]] > entries) {
+            misses++;
+            loaded[indices[k]] = misses + 0u;
+        }
+    return (float)misses / (float)triangles;
+}
+
+static void vertex_caches_of_16_and_32_are_used_well(void)
+{
+    static const char *const names[] = {"list", "strip", "stitched"};
+    static const uint32_t sizes[] = {16, 64};
+    uint32_t k, entries, pattern;
+    int form;
+    for (form = 0; form < (int)TERRIMP_FORM_COUNT; form++)
+        for (k = 0; k < 2u; k++) {
+            uint16_t *indices = mip_filled(sizes[k], form);
+            for (entries = 16; entries <= 32u; entries += 16u) {
+                float worst = 0.0f, plain = 0.0f;
+                for (pattern = 0; pattern < TERRIMP_PATTERN_COUNT; pattern++) {
+                    terrimp_pattern p;
+                    float acmr;
+                    terrimp_pattern_find(sizes[k], form, pattern, &p);
+                    acmr = mip_acmr(indices + p.first_index, p.index_count, p.triangle_count,
+                                    entries);
+                    if (pattern == 0)
+                        plain = acmr;
+                    worst = acmr > worst ? acmr : worst;
+                }
+                printf("ACMR of %u quads, %s, FIFO of %u: %.4f, worst pattern %.4f\n", sizes[k],
+                       names[form], entries, (double)plain, (double)worst);
+                if (form != TERRIMP_FORM_STITCHED)
+                    CHECK(plain <= (sizes[k] == 16 ? 0.60f : 0.55f));
+                CHECK(worst <= (sizes[k] == 16 ? 0.63f : 0.57f));
+            }
+            free(indices);
+        }
+}
+
+static void patterns_refuse_bad_sizes(void)
+{
+    static const uint32_t bad[] = {0, 1, 2, 3, 5, 63, 65, 130, 0xffffffffu};
+    terrimp_pattern p;
+    uint16_t few[8];
+    uint32_t k;
+    for (k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+        CHECK(terrimp_pattern_find(bad[k], 0, 0, &p) == TERRIMP_E_RANGE);
+        CHECK(terrimp_pattern_index_count(bad[k], 0) == 0);
+        CHECK(terrimp_pattern_fill(bad[k], 0, few, 8) == TERRIMP_E_RANGE);
+    }
+    CHECK(terrimp_pattern_find(64, 0, 16, &p) == TERRIMP_E_RANGE);
+    CHECK(terrimp_pattern_find(64, -1, 0, &p) == TERRIMP_E_RANGE);
+    CHECK(terrimp_pattern_find(64, TERRIMP_FORM_COUNT, 0, &p) == TERRIMP_E_RANGE);
+    CHECK(terrimp_pattern_find(64, 0, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_pattern_fill(64, 0, NULL, 8) == TERRIMP_E_NULL);
+    CHECK(terrimp_pattern_fill(64, 0, few, 8) == TERRIMP_E_CAPACITY);
+}
+
+/* ---- errors ---- */
+
+/* A random terrain with its tree, and a view of it. */
+typedef struct mip_scene {
+    float *heights, *scratch;
+    terrimp_geomip tree;
+    terrimp_geomip_view view;
+} mip_scene;
+
+static float mip_hills(uint32_t x, uint32_t z, float phase)
+{
+    float u = (float)x, v = (float)z;
+    return 20.0f * sinf(u * 0.037f + phase) * sinf(v * 0.051f) + 4.0f * sinf(u * 0.31f + v * 0.2f) +
+           random_float(-1.0f, 1.0f);
+}
+
+static void mip_make(mip_scene *s, uint32_t width, uint32_t depth, uint32_t quads)
+{
+    terrimp_heightfield field;
+    uint32_t x, z;
+    float phase = random_float(0.0f, 6.0f);
+    memset(&field, 0, sizeof field);
+    memset(s, 0, sizeof *s);
+    s->heights = (float *)malloc((size_t)width * depth * sizeof *s->heights);
+    for (z = 0; z < depth; z++)
+        for (x = 0; x < width; x++)
+            s->heights[z * width + x] = mip_hills(x, z, phase);
+    field.samples = s->heights;
+    field.width = width;
+    field.depth = depth;
+    field.spacing_x = 1.5f;
+    field.spacing_z = 1.25f;
+    field.origin_x = -31.0f;
+    CHECK(terrimp_geomip_init(&field, quads, &s->tree) == TERRIMP_OK);
+    s->tree.nodes = (terrimp_geomip_node *)malloc(s->tree.node_count * sizeof *s->tree.nodes);
+    s->scratch = (float *)malloc(s->tree.scratch_count * sizeof(float));
+    CHECK(terrimp_geomip_build(&s->tree, s->scratch) == TERRIMP_OK);
+    s->view.distances = (float *)malloc(s->tree.node_count * sizeof(float));
+    s->view.marks = (terrimp_geomip_mark *)calloc(s->tree.node_count, sizeof *s->view.marks);
+    s->view.draw_capacity = s->tree.level_first[1];
+    s->view.draws =
+        (terrimp_geomip_draw *)malloc(s->view.draw_capacity * sizeof *s->view.draws);
+}
+
+static void mip_free(mip_scene *s)
+{
+    free(s->heights);
+    free(s->scratch);
+    free(s->tree.nodes);
+    free(s->view.distances);
+    free(s->view.marks);
+    free(s->view.draws);
+}
+
+static float mip_sample(const mip_scene *s, uint32_t x, uint32_t z)
+{
+    return s->heights[z * s->tree.field.width + x];
+}
+
+/* Column and row of a node's vertex. */
+static void mip_vertex(const mip_scene *s, const terrimp_geomip_draw *draw, uint32_t i, uint32_t j,
+                       uint32_t at[2])
+{
+    uint64_t x = ((uint64_t)draw->x * s->tree.chunk_quads + i) << draw->level;
+    uint64_t z = ((uint64_t)draw->z * s->tree.chunk_quads + j) << draw->level;
+    at[0] = x < s->tree.field.width ? (uint32_t)x : s->tree.field.width - 1u;
+    at[1] = z < s->tree.field.depth ? (uint32_t)z : s->tree.field.depth - 1u;
+}
+
+/* Calls `sample` for each sample under each triangle of a draw, with the height drawn there. */
+typedef struct mip_drawn {
+    const mip_scene *scene;
+    const terrimp_geomip_draw *draw;
+    const float *heights; /* of the vertices; NULL: the samples */
+    void (*sample)(struct mip_drawn *drawn, uint32_t x, uint32_t z, float height);
+    const terrimp_camera *camera;
+    float matrix[16], worst;
+    float *surface; /* [depth][width] */
+    uint32_t seen;
+} mip_drawn;
+
+static void mip_draw_triangle(void *user, uint32_t quads, const uint32_t v[3])
+{
+    mip_drawn *d = (mip_drawn *)user;
+    uint32_t at[3][2], k, low_x = 0xffffffffu, low_z = low_x, high_x = 0, high_z = 0, x, z;
+    float h[3];
+    for (k = 0; k < 3u; k++) {
+        mip_vertex(d->scene, d->draw, v[k] % (quads + 1u), v[k] / (quads + 1u), at[k]);
+        h[k] = d->heights ? d->heights[v[k]] : mip_sample(d->scene, at[k][0], at[k][1]);
+        low_x = at[k][0] < low_x ? at[k][0] : low_x;
+        low_z = at[k][1] < low_z ? at[k][1] : low_z;
+        high_x = at[k][0] > high_x ? at[k][0] : high_x;
+        high_z = at[k][1] > high_z ? at[k][1] : high_z;
+    }
+    for (z = low_z; z <= high_z; z++)
+        for (x = low_x; x <= high_x; x++) {
+            double part[3], all = 0.0;
+            for (k = 0; k < 3u; k++) {
+                const uint32_t *a = at[(k + 1u) % 3u], *b = at[(k + 2u) % 3u];
+                part[k] = ((double)b[1] - a[1]) * ((double)x - a[0]) -
+                          ((double)b[0] - a[0]) * ((double)z - a[1]);
+                all += part[k];
+            }
+            if (all <= 0.0 || part[0] < 0.0 || part[1] < 0.0 || part[2] < 0.0)
+                continue;
+            d->sample(d, x, z, (float)((part[0] * (double)h[0] + part[1] * (double)h[1] +
+                                        part[2] * (double)h[2]) / all));
+        }
+}
+
+static void mip_miss(mip_drawn *d, uint32_t x, uint32_t z, float height)
+{
+    float miss = fabsf(mip_sample(d->scene, x, z) - height);
+    d->worst = miss > d->worst ? miss : d->worst;
+    d->seen++;
+}
+
+static terrimp_geomip_draw mip_draw_of(const terrimp_geomip *tree, uint32_t node)
+{
+    terrimp_geomip_draw draw;
+    memset(&draw, 0, sizeof draw);
+    draw.node = node;
+    while (node >= tree->level_first[draw.level + 1u])
+        draw.level++;
+    draw.x = (node - tree->level_first[draw.level]) % tree->level_x[draw.level];
+    draw.z = (node - tree->level_first[draw.level]) / tree->level_x[draw.level];
+    return draw;
+}
+
+static void a_node_knows_the_largest_error_of_all_its_patterns(void)
+{
+    static const uint32_t sizes[][3] = {{65, 65, 8},    {70, 51, 8}, {33, 129, 4},
+                                        {100, 90, 16}, {2, 9, 4},   {70, 51, 4}};
+    uint32_t k, node, pattern;
+    for (k = 0; k < 6u; k++) {
+        mip_scene s;
+        uint16_t *indices = mip_filled(sizes[k][2], 0);
+        mip_make(&s, sizes[k][0], sizes[k][1], sizes[k][2]);
+        if (k == 5u) { /* noise: some children are worse than their parents */
+            for (node = 0; node < sizes[k][0] * sizes[k][1]; node++)
+                s.heights[node] = random_float(0.0f, 1.0f) * random_float(0.0f, 1.0f);
+            CHECK(terrimp_geomip_build(&s.tree, s.scratch) == TERRIMP_OK);
+        }
+        for (node = 0; node < s.tree.node_count; node++) {
+            terrimp_geomip_draw draw = mip_draw_of(&s.tree, node);
+            float found = s.tree.nodes[node].error;
+            mip_drawn d;
+            memset(&d, 0, sizeof d);
+            d.scene = &s;
+            d.draw = &draw;
+            d.sample = mip_miss;
+            if (draw.level == 0)
+                continue;
+            for (pattern = 0; pattern < TERRIMP_PATTERN_COUNT; pattern++) {
+                if (((pattern & 1u) && draw.z == 0) || ((pattern & 4u) && draw.x == 0) ||
+                    ((pattern & 2u) && draw.z + 1u == s.tree.level_z[draw.level]) ||
+                    ((pattern & 8u) && draw.x + 1u == s.tree.level_x[draw.level]))
+                    continue; /* there is no neighbour */
+                mip_triangles(indices, sizes[k][2], 0, pattern, mip_draw_triangle, &d);
+            }
+            for (pattern = 0; pattern < 4u; pattern++) { /* children */
+                uint32_t x = draw.x * 2u + (pattern & 1u), z = draw.z * 2u + (pattern >> 1);
+                if (x < s.tree.level_x[draw.level - 1u] && z < s.tree.level_z[draw.level - 1u]) {
+                    const terrimp_geomip_node *child =
+                        &s.tree.nodes[s.tree.level_first[draw.level - 1u] +
+                                      z * s.tree.level_x[draw.level - 1u] + x];
+                    CHECK(found >= child->error);
+                    d.worst = child->error > d.worst ? child->error : d.worst;
+                }
+            }
+            CHECK(fabsf(found - d.worst) <= 1e-5f * (1.0f + d.worst));
+            CHECK(s.tree.nodes[node].rms <= found && s.tree.nodes[node].rms >= 0.0f);
+        }
+        mip_free(&s);
+        free(indices);
+    }
+}
+
+/* ---- selection ---- */
+
+static void mip_random_camera(const mip_scene *s, terrimp_camera *camera)
+{
+    const terrimp_heightfield *f = &s->tree.field;
+    float wide = (float)f->width * f->spacing_x, deep = (float)f->depth * f->spacing_z;
+    memset(camera, 0, sizeof *camera);
+    camera->eye[0] = f->origin_x + random_float(-0.3f, 1.3f) * wide;
+    camera->eye[1] = random_range(0, 2) ? random_float(0.0f, 60.0f) : random_float(-300.0f, 900.0f);
+    camera->eye[2] = f->origin_z + random_float(-0.3f, 1.3f) * deep;
+    camera->forward[0] = random_float(-1.0f, 1.0f);
+    camera->forward[1] = random_range(0, 3) ? random_float(-0.7f, 0.3f) : random_float(-9.0f, 9.0f);
+    camera->forward[2] = random_float(-1.0f, 1.0f);
+    if (random_range(0, 2) == 0) {
+        camera->up[0] = random_float(-1.0f, 1.0f);
+        camera->up[1] = random_float(-1.0f, 1.0f);
+        camera->up[2] = random_float(-1.0f, 1.0f);
+    }
+    camera->fov_y_rad = random_float(0.3f, 2.0f);
+    camera->width_px = random_range(200, 2000);
+    camera->height_px = random_range(200, 2000);
+    camera->z_near = random_float(0.1f, 3.0f);
+    camera->z_far = 5000.0f;
+}
+
+static void mip_random_settings(mip_scene *s)
+{
+    s->view.rule = (int)random_range(0, TERRIMP_GEOMIP_RULE_COUNT - 1);
+    s->view.tolerance_px = random_float(0.0f, 1.0f) < 0.5f ? random_float(0.2f, 3.0f)
+                                                           : random_float(1.0f, 60.0f);
+    s->view.morph_ratio = random_range(0, 1) ? 0.0f : random_float(1.0f, 2.5f);
+    s->view.hysteresis = random_range(0, 1) ? 0.0f : random_float(0.0f, 0.5f);
+}
+
+/* Level that each finest chunk is drawn at; 255 where it is not. */
+static uint8_t *mip_levels(const mip_scene *s)
+{
+    const terrimp_geomip *t = &s->tree;
+    uint8_t *levels = (uint8_t *)malloc(t->level_first[1]);
+    uint32_t k, x, z;
+    memset(levels, 255, t->level_first[1]);
+    for (k = 0; k < s->view.draw_count; k++) {
+        const terrimp_geomip_draw *d = &s->view.draws[k];
+        CHECK(d->node == t->level_first[d->level] + d->z * t->level_x[d->level] + d->x);
+        for (z = d->z << d->level; z < (d->z + 1u) << d->level && z < t->level_z[0]; z++)
+            for (x = d->x << d->level; x < (d->x + 1u) << d->level && x < t->level_x[0]; x++) {
+                CHECK(levels[z * t->level_x[0] + x] == 255); /* nothing is drawn twice */
+                levels[z * t->level_x[0] + x] = (uint8_t)d->level;
+            }
+    }
+    return levels;
+}
+
+/* Checks levels and patterns along one border of a draw. */
+static void mip_check_border(const mip_scene *s, const uint8_t *levels,
+                             const terrimp_geomip_draw *d, int side)
+{
+    const terrimp_geomip *t = &s->tree;
+    uint32_t along, count = 1u << d->level, coarse = d->pattern >> side & 1u;
+    for (along = 0; along < count; along++) {
+        uint32_t x = d->x << d->level, z = d->z << d->level;
+        uint8_t level;
+        x += side == TERRIMP_SIDE_X0 ? (uint32_t)-1 : side == TERRIMP_SIDE_X1 ? count : along;
+        z += side == TERRIMP_SIDE_Z0 ? (uint32_t)-1 : side == TERRIMP_SIDE_Z1 ? count : along;
+        if (x >= t->level_x[0] || z >= t->level_z[0]) {
+            if (along == 0)
+                CHECK(!coarse);
+            continue;
+        }
+        level = levels[z * t->level_x[0] + x];
+        if (level == 255)
+            continue;
+        CHECK(level <= d->level + 1u && level + 1u >= d->level);
+        CHECK(coarse == (level > d->level));
+    }
+}
+
+static void selections_tile_the_view_and_neighbours_fit(void)
+{
+    static const uint32_t sizes[][3] = {
+        {513, 513, 8}, {300, 457, 8}, {1025, 257, 16}, {90, 80, 4}, {2, 2, 8}};
+    uint32_t k, frame, i;
+    int side;
+    for (k = 0; k < 5u; k++) {
+        mip_scene s;
+        mip_make(&s, sizes[k][0], sizes[k][1], sizes[k][2]);
+        for (frame = 0; frame < 60u; frame++) {
+            terrimp_camera camera;
+            terrimp_frustum frustum;
+            uint8_t *levels;
+            uint32_t triangles = 0;
+            mip_random_settings(&s);
+            mip_random_camera(&s, &camera);
+            CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+            CHECK(s.view.draws_needed == s.view.draw_count);
+            levels = mip_levels(&s);
+            terrimp_camera_frustum(&camera, &frustum);
+            for (i = 0; i < s.tree.level_first[1]; i++) {
+                terrimp_box box;
+                terrimp_geomip_box(&s.tree, i, &box);
+                if (terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) >= 0)
+                    CHECK(levels[i] != 255);
+            }
+            for (i = 0; i < s.view.draw_count; i++) {
+                terrimp_pattern p = {0, 0, 0};
+                for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+                    mip_check_border(&s, levels, &s.view.draws[i], side);
+                terrimp_pattern_find(s.tree.chunk_quads, 0, s.view.draws[i].pattern, &p);
+                triangles += p.triangle_count;
+                CHECK(s.view.draws[i].error_px <= s.view.tolerance_px);
+            }
+            CHECK(triangles == s.view.triangle_count);
+            free(levels);
+        }
+        mip_free(&s);
+    }
+}
+
+/* Pixels between a sample in view and where it is drawn. */
+static void mip_miss_on_screen(mip_drawn *d, uint32_t x, uint32_t z, float height)
+{
+    const terrimp_heightfield *f = &d->scene->tree.field;
+    double p[2][2], w = 0.0;
+    int k, r;
+    for (k = 0; k < 2; k++) {
+        double at[3], clip[4];
+        at[0] = (double)f->origin_x + (double)x * (double)f->spacing_x;
+        at[1] = k ? (double)height : (double)mip_sample(d->scene, x, z);
+        at[2] = (double)f->origin_z + (double)z * (double)f->spacing_z;
+        for (r = 0; r < 4; r++)
+            clip[r] = (double)d->matrix[r] * at[0] + (double)d->matrix[4 + r] * at[1] +
+                      (double)d->matrix[8 + r] * at[2] + (double)d->matrix[12 + r];
+        w = clip[3];
+        if (k == 0 && (w < (double)d->camera->z_near || fabs(clip[0]) > w || fabs(clip[1]) > w))
+            return; /* not in view */
+        p[k][0] = clip[0] / w * 0.5 * (double)d->camera->width_px;
+        p[k][1] = clip[1] / w * 0.5 * (double)d->camera->height_px;
+        if (k && w <= 0.0) {
+            d->worst = 1e9f;
+            return;
+        }
+    }
+    w = sqrt((p[0][0] - p[1][0]) * (p[0][0] - p[1][0]) + (p[0][1] - p[1][1]) * (p[0][1] - p[1][1]));
+    d->worst = (float)w > d->worst ? (float)w : d->worst;
+    d->seen++;
+}
+
+static void mip_multiply(const float a[16], const float b[16], float out[16])
+{
+    int c, r, k;
+    for (c = 0; c < 4; c++)
+        for (r = 0; r < 4; r++) {
+            out[c * 4 + r] = 0.0f;
+            for (k = 0; k < 4; k++)
+                out[c * 4 + r] += a[k * 4 + r] * b[c * 4 + k];
+        }
+}
+
+/* The largest error on the screen of what a view has selected; *closest: largest share of the bound
+   that was used up. */
+static void mip_measure_screen(mip_scene *s, const terrimp_camera *camera, const uint16_t *indices,
+                               float *worst, float *share)
+{
+    uint32_t i, side1 = s->tree.chunk_quads + 1u;
+    float view[16], projection[16];
+    float *heights = (float *)malloc(side1 * side1 * sizeof *heights);
+    terrimp_geomip_vertex *vertices =
+        (terrimp_geomip_vertex *)malloc(side1 * side1 * sizeof *vertices);
+    terrimp_camera_matrices(camera, view, projection);
+    *worst = *share = 0.0f;
+    for (i = 0; i < s->view.draw_count; i++) {
+        const terrimp_geomip_draw *draw = &s->view.draws[i];
+        mip_drawn d;
+        memset(&d, 0, sizeof d);
+        mip_multiply(projection, view, d.matrix);
+        d.scene = s;
+        d.draw = draw;
+        d.camera = camera;
+        d.heights = heights;
+        d.sample = mip_miss_on_screen;
+        terrimp_geomip_fill_vertices(&s->tree, draw->node, NULL, vertices);
+        terrimp_geomip_morph(s->tree.chunk_quads, draw, vertices, heights, 1);
+        mip_triangles(indices, s->tree.chunk_quads, 0, draw->pattern, mip_draw_triangle, &d);
+        *worst = d.worst > *worst ? d.worst : *worst;
+        if (draw->level > 0 && draw->morph == 0.0f && d.worst > 0.01f) {
+            CHECK(d.worst <= draw->error_px * 1.001f + 0.01f);
+            *share = d.worst / draw->error_px > *share ? d.worst / draw->error_px : *share;
+        }
+    }
+    free(heights);
+    free(vertices);
+}
+
+static void no_sample_in_view_is_further_off_than_predicted(void)
+{
+    mip_scene s;
+    uint16_t *indices = mip_filled(8, 0);
+    uint32_t frame, close = 0;
+    mip_make(&s, 193, 161, 8);
+    for (frame = 0; frame < 150u; frame++) {
+        terrimp_camera camera;
+        float worst, share;
+        mip_random_settings(&s);
+        mip_random_camera(&s, &camera);
+        s.view.rule = frame % 3u ? TERRIMP_GEOMIP_BOUND : TERRIMP_GEOMIP_DISTANCE;
+        s.view.morph_ratio = 0.0f;
+        CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+        mip_measure_screen(&s, &camera, indices, &worst, &share);
+        CHECK(worst <= s.view.tolerance_px * 1.001f + 0.01f);
+        close += share > 0.5f;
+    }
+    CHECK(close > 5u); /* the bound is worth something */
+    mip_free(&s);
+    free(indices);
+}
+
+/* Chunks that two frames draw at different levels. */
+static uint32_t mip_changes(const mip_scene *s, const uint8_t *before, const uint8_t *after)
+{
+    uint32_t i, count = 0;
+    for (i = 0; i < s->tree.level_first[1]; i++)
+        count += before[i] != after[i] && before[i] != 255 && after[i] != 255;
+    return count;
+}
+
+static void a_jittering_camera_does_not_flicker(void)
+{
+    mip_scene s;
+    uint32_t place, frame, changes[2] = {0, 0}, steady; /* without hysteresis, and with it */
+    mip_make(&s, 513, 513, 8);
+    for (steady = 0; steady < 2u; steady++)
+        for (place = 0; place < 60u; place++) {
+            terrimp_camera still, camera;
+            uint8_t *before = NULL;
+            mip_random_camera(&s, &still);
+            s.view.rule = (int)(place % TERRIMP_GEOMIP_RULE_COUNT);
+            s.view.tolerance_px = random_float(0.5f, 4.0f);
+            s.view.hysteresis = steady ? 0.1f : 0.0f;
+            for (frame = 0; frame < 20u; frame++) {
+                uint8_t *levels;
+                camera = still;
+                camera.eye[0] += frame % 2u ? 0.1f : -0.1f;
+                camera.eye[1] += frame / 2u % 2u ? 0.1f : -0.1f;
+                CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+                levels = mip_levels(&s);
+                if (before && frame > 4u) /* it may settle in the first round */
+                    changes[steady] += mip_changes(&s, before, levels);
+                free(before);
+                before = levels;
+            }
+            free(before);
+        }
+    CHECK(changes[1] == 0);
+    mip_free(&s);
+}
+
+static void the_same_frame_is_selected_twice_alike(void)
+{
+    mip_scene s;
+    terrimp_camera camera;
+    terrimp_geomip_draw *first;
+    uint32_t count, i;
+    mip_make(&s, 257, 257, 8);
+    s.view.morph_ratio = 1.5f;
+    memset(&camera, 0, sizeof camera);
+    camera.eye[1] = 40.0f;
+    camera.forward[0] = camera.forward[2] = 1.0f;
+    camera.width_px = camera.height_px = 500;
+    camera.z_near = 1.0f;
+    camera.z_far = 1000.0f;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+    count = s.view.draw_count;
+    first = (terrimp_geomip_draw *)malloc(count * sizeof *first);
+    memcpy(first, s.view.draws, count * sizeof *first);
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+    CHECK(count == s.view.draw_count && memcmp(first, s.view.draws, count * sizeof *first) == 0);
+    for (i = 1; i < count; i++) { /* an earlier node does not lie behind a later one */
+        const terrimp_geomip_draw *a = &s.view.draws[i - 1u], *b = &s.view.draws[i];
+        uint32_t ax = (a->x + 1u) << a->level, az = (a->z + 1u) << a->level;
+        CHECK(ax <= b->x << b->level || az <= b->z << b->level || a->level > b->level ||
+              (b->x + 1u) << b->level > a->x << a->level);
+    }
+    free(first);
+    mip_free(&s);
+}
+
+static void nodes_cost_few_bytes(void)
+{
+    size_t node = sizeof(terrimp_geomip_node) + sizeof(terrimp_geomip_mark) + sizeof(float);
+    mip_scene s;
+    mip_make(&s, 513, 513, 8);
+    CHECK(s.tree.node_count * node <= 200u * s.tree.level_first[1]);
+    CHECK(sizeof(terrimp_geomip_vertex) == 16u && sizeof(terrimp_geomip_weights) == 16u);
+    mip_free(&s);
+}
+
+static void bad_geomip_input_is_refused(void)
+{
+    mip_scene s;
+    terrimp_camera camera, good;
+    terrimp_geomip tree;
+    terrimp_geomip_view kept;
+    float xyz[3] = {0, 0, 0}, distances[1];
+    mip_make(&s, 65, 65, 8);
+    mip_random_camera(&s, &good);
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_OK);
+    kept = s.view;
+    camera = good;
+    camera.eye[1] = sqrtf(-1.0f);
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_E_NOT_FINITE);
+    camera = good;
+    camera.forward[2] = (float)HUGE_VAL;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_E_NOT_FINITE);
+    camera.width_px = 0;
+    camera.forward[2] = 1.0f;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_E_RANGE);
+    CHECK(memcmp(&kept, &s.view, sizeof kept) == 0);
+    s.view.tolerance_px = sqrtf(-1.0f);
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_E_NOT_FINITE);
+    s.view.tolerance_px = -1.0f;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_E_RANGE);
+    s.view.tolerance_px = 0.0f;
+    s.view.rule = TERRIMP_GEOMIP_RULE_COUNT;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_E_RANGE);
+    s.view.rule = 0;
+    s.view.hysteresis = 2.0f;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_E_RANGE);
+    s.view.hysteresis = 0.0f;
+    s.view.morph_ratio = 0.5f;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_E_RANGE);
+    s.view.morph_ratio = 0.0f;
+    s.view.draw_capacity = 0;
+    camera = good; /* from above everything is in view */
+    camera.eye[0] = camera.eye[2] = 40.0f;
+    camera.eye[1] = 500.0f;
+    camera.forward[0] = camera.forward[2] = 0.0f;
+    camera.forward[1] = -1.0f;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_E_CAPACITY);
+    CHECK(s.view.draw_count == 0 && s.view.draws_needed > 0);
+    s.view.draws = NULL;
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &good) == TERRIMP_E_NULL);
+    s.view.draws = kept.draws;
+    CHECK(terrimp_geomip_select(NULL, &s.view, &good) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_select(&s.tree, NULL, &good) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_init(&s.tree.field, 7, &tree) == TERRIMP_E_RANGE);
+    CHECK(terrimp_geomip_init(&s.tree.field, 2, &tree) == TERRIMP_E_RANGE);
+    CHECK(terrimp_geomip_init(NULL, 8, &tree) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_init(&s.tree.field, 8, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_init(&s.tree.field, 8, &tree) == TERRIMP_OK && tree.nodes == NULL);
+    CHECK(terrimp_geomip_build(&tree, s.scratch) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_build_node(&s.tree, s.tree.node_count, s.scratch) == TERRIMP_E_RANGE);
+    CHECK(terrimp_geomip_fill_vertices(&s.tree, s.tree.node_count, xyz, NULL) == TERRIMP_E_RANGE);
+    CHECK(terrimp_geomip_fill_vertices(&s.tree, 0, NULL, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_distances(&s.tree, 1, 1.0f, 1.0f, sqrtf(-1.0f), distances) ==
+          TERRIMP_E_NOT_FINITE);
+    CHECK(terrimp_geomip_distances(&s.tree, 1, 1.0f, 1.0f, 0.0f, distances) == TERRIMP_E_RANGE);
+    CHECK(terrimp_geomip_distances(&s.tree, 1, 1.0f, 1.0f, 1.0f, NULL) == TERRIMP_E_NULL);
+    s.heights[70] = sqrtf(-1.0f);
+    CHECK(terrimp_geomip_build(&s.tree, s.scratch) == TERRIMP_E_NOT_FINITE);
+    mip_free(&s);
+}
+
+/* ---- morphing ---- */
+
+static void mip_note_used(void *user, uint32_t quads, const uint32_t v[3])
+{
+    uint8_t *used = (uint8_t *)user;
+    (void)quads;
+    used[v[0]] = used[v[1]] = used[v[2]] = 1;
+}
+
+/* Morphed heights of a draw. */
+static void mip_heights(const mip_scene *s, const terrimp_geomip_draw *draw, float *heights)
+{
+    static terrimp_geomip_vertex vertices[65 * 65];
+    CHECK(terrimp_geomip_fill_vertices(&s->tree, draw->node, NULL, vertices) == TERRIMP_OK);
+    CHECK(terrimp_geomip_morph(s->tree.chunk_quads, draw, vertices, heights, 1) == TERRIMP_OK);
+}
+
+static void nodes_meet_exactly_at_any_fraction(void)
+{
+    static const uint32_t sizes[][3] = {{257, 257, 8}, {129, 129, 4}, {129, 129, 6}, {200, 143, 8}};
+    static float heights[65 * 65];
+    static uint8_t used[65 * 65];
+    uint32_t k, frame, i, v, side, shared = 0, between = 0;
+    for (k = 0; k < 4u; k++) {
+        mip_scene s;
+        uint32_t quads = sizes[k][2];
+        int form = k % 2u ? TERRIMP_FORM_STITCHED : TERRIMP_FORM_LIST;
+        uint16_t *indices = mip_filled(quads, form);
+        float *met;
+        mip_make(&s, sizes[k][0], sizes[k][1], quads);
+        side = (quads << (s.tree.level_count - 1u)) + 1u;
+        met = (float *)malloc(side * side * sizeof *met);
+        for (frame = 0; frame < 25u; frame++) {
+            terrimp_camera camera;
+            mip_random_settings(&s);
+            mip_random_camera(&s, &camera);
+            s.view.morph_ratio = random_float(1.05f, 3.0f);
+            CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+            memset(met, 255, side * side * sizeof *met); /* NaN: nobody was here */
+            for (i = 0; i < s.view.draw_count; i++) {
+                const terrimp_geomip_draw *draw = &s.view.draws[i];
+                mip_heights(&s, draw, heights);
+                memset(used, 0, sizeof used);
+                mip_triangles(indices, quads, form, draw->pattern, mip_note_used, used);
+                between += draw->morph > 0.0f && draw->morph < 1.0f;
+                for (v = 0; v < (quads + 1u) * (quads + 1u); v++) {
+                    uint32_t x = (draw->x * quads + v % (quads + 1u)) << draw->level;
+                    uint32_t z = (draw->z * quads + v / (quads + 1u)) << draw->level;
+                    float *height = &met[z * side + x]; /* of the lattice, that has no far edge */
+                    if (!used[v])
+                        continue;
+                    if (*height == *height) {
+                        shared++;
+                        CHECK(*height == heights[v]);
+                    }
+                    *height = heights[v];
+                }
+            }
+        }
+        free(met);
+        mip_free(&s);
+        free(indices);
+    }
+    CHECK(shared > 3000 && between > 300);
+}
+
+static void mip_store(mip_drawn *d, uint32_t x, uint32_t z, float height)
+{
+    d->surface[z * d->scene->tree.field.width + x] = height;
+}
+
+/* Children that have morphed wholly have the shape of their parent, its borders moving or not. */
+static void children_begin_in_the_shape_of_their_parent(void)
+{
+    static float drawn[65 * 65], heights[65 * 65], of_parent[65 * 65];
+    uint16_t *indices = mip_filled(8, 0);
+    mip_scene s;
+    uint32_t node, v;
+    int side;
+    mip_make(&s, 65, 65, 8);
+    for (node = 0; node + 1u < s.tree.node_count; node++) {
+        terrimp_geomip_draw child = mip_draw_of(&s.tree, node), parent;
+        mip_drawn d;
+        parent = mip_draw_of(&s.tree, s.tree.level_first[child.level + 1u] +
+                                          child.z / 2u * s.tree.level_x[child.level + 1u] +
+                                          child.x / 2u);
+        child.morph = 1.0f;
+        for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+            uint32_t at = side < 2 ? child.z : child.x;
+            child.side[side] = 1.0f;
+            parent.side[side] = random_float(0.0f, 1.0f);
+            if ((at & 1u) == ((uint32_t)side & 1u)) /* an outer side: the parent's too */
+                child.side_coarse[side] = parent.side[side];
+        }
+        memset(&d, 0, sizeof d);
+        d.scene = &s;
+        d.draw = &parent;
+        d.heights = of_parent;
+        d.sample = mip_store;
+        d.surface = drawn;
+        mip_heights(&s, &parent, of_parent);
+        mip_triangles(indices, 8, 0, 0, mip_draw_triangle, &d);
+        mip_heights(&s, &child, heights);
+        for (v = 0; v < 81u; v++) {
+            uint32_t at[2];
+            mip_vertex(&s, &child, v % 9u, v / 9u, at);
+            CHECK(fabsf(heights[v] - drawn[at[1] * 65u + at[0]]) < 1e-4f);
+        }
+    }
+    mip_free(&s);
+    free(indices);
+}
+
+static void nodes_have_ceased_to_morph_when_they_split(void)
+{
+    mip_scene s;
+    uint32_t frame, node, split = 0;
+    mip_make(&s, 257, 257, 8);
+    for (node = 0; node < 257u * 257u; node++) /* a rough patch: the flat round it is forced */
+        if (node % 257u < 130u || node % 257u > 150u || node / 257u < 130u || node / 257u > 150u)
+            s.heights[node] = 0.0f;
+    CHECK(terrimp_geomip_build(&s.tree, s.scratch) == TERRIMP_OK);
+    for (frame = 0; frame < 40u; frame++) {
+        terrimp_camera camera;
+        float ratio2;
+        mip_random_settings(&s);
+        mip_random_camera(&s, &camera);
+        s.view.morph_ratio = random_float(1.05f, 3.0f);
+        ratio2 = s.view.morph_ratio * s.view.morph_ratio;
+        CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+        for (node = 0; node + 1u < s.tree.node_count; node++) {
+            terrimp_geomip_draw n = mip_draw_of(&s.tree, node);
+            uint32_t above = s.tree.level_first[n.level + 1u] +
+                             n.z / 2u * s.tree.level_x[n.level + 1u] + n.x / 2u;
+            CHECK(s.view.distances[above] >= s.view.distances[node] * ratio2 * 0.9999f);
+            if (s.view.marks[node].frame != s.view.frame || s.view.marks[node].measure < 1.0f)
+                continue;
+            split++;
+            CHECK(s.view.marks[above].frame == s.view.frame);
+            CHECK(s.view.marks[above].measure >= ratio2 * 0.9999f);
+        }
+    }
+    CHECK(split > 500);
+    mip_free(&s);
+}
+
+/* The drawn surface at every sample; NaN where nothing is drawn. */
+static void mip_surface(mip_scene *s, const uint16_t *stitched, float *surface)
+{
+    static float heights[65 * 65];
+    uint32_t i;
+    memset(surface, 255, s->tree.field.width * s->tree.field.depth * sizeof *surface);
+    for (i = 0; i < s->view.draw_count; i++) {
+        mip_drawn d;
+        memset(&d, 0, sizeof d);
+        d.scene = s;
+        d.draw = &s->view.draws[i];
+        d.heights = heights;
+        d.sample = mip_store;
+        d.surface = surface;
+        mip_heights(s, d.draw, heights);
+        mip_triangles(stitched, s->tree.chunk_quads, TERRIMP_FORM_STITCHED, d.draw->pattern,
+                      mip_draw_triangle, &d);
+    }
+}
+
+/* The largest change of a height from frame to frame on a way of `steps` steps. */
+static float mip_largest_step(mip_scene *s, const terrimp_camera *from, const float way[3],
+                              uint32_t steps, const uint16_t *stitched)
+{
+    uint32_t samples = s->tree.field.width * s->tree.field.depth, frame, i;
+    float *before = (float *)malloc(samples * sizeof *before), largest = 0.0f;
+    float *after = (float *)malloc(samples * sizeof *after), *swap;
+    for (frame = 0; frame <= steps; frame++) {
+        terrimp_camera camera = *from;
+        for (i = 0; i < 3u; i++)
+            camera.eye[i] += way[i] * (float)frame / (float)steps;
+        CHECK(terrimp_geomip_select(&s->tree, &s->view, &camera) == TERRIMP_OK);
+        mip_surface(s, stitched, after);
+        for (i = 0; frame > 0 && i < samples; i++)
+            if (fabsf(after[i] - before[i]) > largest) /* never for NaN */
+                largest = fabsf(after[i] - before[i]);
+        swap = before;
+        before = after;
+        after = swap;
+    }
+    free(before);
+    free(after);
+    return largest;
+}
+
+static void heights_change_with_the_camera_s_step(void)
+{
+    uint16_t *stitched = mip_filled(4, TERRIMP_FORM_STITCHED);
+    uint32_t way;
+    for (way = 0; way < 8u; way++) {
+        mip_scene s;
+        terrimp_camera camera;
+        float along[3], coarse, fine;
+        mip_make(&s, 65, 65, 4);
+        mip_random_camera(&s, &camera);
+        camera.eye[1] = random_float(5.0f, 80.0f);
+        camera.forward[1] -= 0.5f;
+        camera.fov_y_rad = 2.0f;
+        s.view.rule = (int)(way % TERRIMP_GEOMIP_RULE_COUNT);
+        s.view.tolerance_px = random_float(4.0f, 12.0f);
+        s.view.morph_ratio = 1.5f;
+        along[0] = random_float(-40.0f, 40.0f);
+        along[1] = random_float(-3.0f, 3.0f);
+        along[2] = random_float(-40.0f, 40.0f);
+        coarse = mip_largest_step(&s, &camera, along, 16, stitched);
+        fine = mip_largest_step(&s, &camera, along, 256, stitched);
+        CHECK(fine <= coarse / 8.0f + 1e-4f);
+        mip_free(&s);
+    }
+    free(stitched);
+}
+
+static void geomipmap_tests(void)
+{
+    RUN(every_pattern_covers_its_square_once);
+    RUN(patterns_share_every_border_vertex_with_neighbours_of_both_levels);
+    RUN(vertex_caches_of_16_and_32_are_used_well);
+    RUN(patterns_refuse_bad_sizes);
+    RUN(a_node_knows_the_largest_error_of_all_its_patterns);
+    RUN(selections_tile_the_view_and_neighbours_fit);
+    RUN(no_sample_in_view_is_further_off_than_predicted);
+    RUN(a_jittering_camera_does_not_flicker);
+    RUN(the_same_frame_is_selected_twice_alike);
+    RUN(nodes_meet_exactly_at_any_fraction);
+    RUN(children_begin_in_the_shape_of_their_parent);
+    RUN(nodes_have_ceased_to_morph_when_they_split);
+    RUN(heights_change_with_the_camera_s_step);
+    RUN(nodes_cost_few_bytes);
+    RUN(bad_geomip_input_is_refused);
+}
+
+#endif
