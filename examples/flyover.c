@@ -1,5 +1,6 @@
-/* Flies a camera over a large terrain and draws it with terrain impostors, through OpenGL without a
-   window. Leaves pictures, a table with a line a frame, and a summary.
+/* Flies a camera over a large terrain and draws it with terrain impostors, or with geometrical
+   mipmapping alone, through OpenGL without a window. Leaves pictures, a table with a line a frame,
+   and a summary.
    Build:  make flyover
    Use:    flyover --dem N42E001.hgt --frames 300 --out pictures --save-every 100 --compare
    Expect: `key value` lines; with --compare, PSNR and speed-up against the full mesh. */
@@ -10,6 +11,7 @@
 #include "host/context.h"
 #include "host/dem.h"
 #include "host/flight.h"
+#include "host/gl_geomip.h"
 #include "host/gl_terrain.h"
 #include "host/image.h"
 #include "host/lightmap.h"
@@ -30,7 +32,7 @@
 /* A way of drawing the terrain, with the times it took. */
 typedef struct contender {
     const char *name;
-    terrimp_view *view;
+    terrimp_view *view; /* null: geometrical mipmapping */
     terrimp_stats now;  /* of the newest frame */
     stats ms;
     uint8_t *picture;   /* of the newest frame that was read back */
@@ -44,6 +46,7 @@ typedef struct flyover {
     terrimp_terrain_info info;
     context context;
     gl_terrain gl;
+    gl_geomip geomip;             /* with --mode geomip only */
     flight flight;
     contender chosen, full;       /* full takes part with --compare only */
     FILE *table;
@@ -152,6 +155,12 @@ static void open_graphics(flyover *f, uint32_t atlas_size)
 
 /* ---- The views and the flight ------------------------------------------- */
 
+static void name_contender(const flyover *f, contender *c, const char *name)
+{
+    c->name = name;
+    c->picture = allocate((size_t)f->options.width * f->options.height * 3);
+}
+
 /* Returns the side of the view's atlases. */
 static uint32_t open_contender(flyover *f, contender *c, const char *name, int mode)
 {
@@ -165,11 +174,34 @@ static uint32_t open_contender(flyover *f, contender *c, const char *name, int m
     desc.texels_per_px = f->options.texels;
     desc.atlas_size = f->options.atlas;
     desc.max_captures = f->options.max_captures;
-    c->name = name;
-    c->picture = allocate((size_t)f->options.width * f->options.height * 3);
+    name_contender(f, c, name);
     need(terrimp_view_desc_resolve(f->terrain, &desc, &desc));
     need(terrimp_view_create(f->terrain, &desc, NULL, &c->view));
     return desc.atlas_size;
+}
+
+/* Geometrical mipmapping draws no pictures: its atlases are as small as may be. */
+static uint32_t open_chosen(flyover *f)
+{
+    if (f->options.terrimp_mode)
+        return open_contender(f, &f->chosen, f->options.mode, f->options.terrimp_mode);
+    name_contender(f, &f->chosen, f->options.mode);
+    return 64;
+}
+
+static void open_geomip(flyover *f)
+{
+    terrimp_geomip_view settings;
+    const char *trouble;
+    double start = clock_ms();
+    memset(&settings, 0, sizeof settings);
+    settings.rule = f->options.rule;
+    settings.tolerance_px = f->options.tolerance;
+    settings.morph_ratio = f->options.morph;
+    trouble = gl_geomip_open(&f->geomip, &f->gl, &f->field, f->options.chunk, &settings);
+    if (trouble)
+        stop(trouble);
+    printf("geomip_build_ms %.1f\n", clock_ms() - start);
 }
 
 static void plan_flight(flyover *f)
@@ -230,11 +262,15 @@ static double draw_frame(flyover *f, contender *c, terrimp_camera camera)
 {
     terrimp_callbacks callbacks = gl_terrain_callbacks(&f->gl);
     double start = clock_ms(), ms;
-    need(terrimp_view_update(c->view, &camera));
-    need(terrimp_view_get_stats(c->view, &c->now));
+    if (c->view) {
+        need(terrimp_view_update(c->view, &camera));
+        need(terrimp_view_get_stats(c->view, &c->now));
+    } else {
+        need(gl_geomip_update(&f->geomip, &camera, &c->now));
+    }
     tighten(&camera, &c->now);
     need(gl_terrain_begin(&f->gl, &camera, f->options.sky));
-    need(terrimp_view_render(c->view, &callbacks));
+    need(c->view ? terrimp_view_render(c->view, &callbacks) : gl_geomip_draw(&f->geomip));
     gl_terrain_end(&f->gl);
     ms = clock_ms() - start;
     stats_add(&c->ms, ms);
@@ -260,7 +296,7 @@ static void save_frame(flyover *f, contender *c, size_t frame)
     if (f->options.wireframe) {
         uint8_t *lines = allocate((size_t)width * (size_t)height * 3);
         char name[64];
-        need(gl_terrain_wireframe(&f->gl, c->view));
+        need(c->view ? gl_terrain_wireframe(&f->gl, c->view) : gl_geomip_wireframe(&f->geomip));
         context_read(&f->context, lines);
         snprintf(name, sizeof name, "%s_wireframe", c->name);
         write_picture(f, name, frame, lines, width, height);
@@ -407,6 +443,7 @@ static void close_all(flyover *f)
     stats_free(&f->psnr);
     stats_free(&f->psnr_terrain);
     flight_free(&f->flight);
+    gl_geomip_close(&f->geomip);
     gl_terrain_close(&f->gl);
     context_close(&f->context);
     terrimp_terrain_destroy(f->terrain);
@@ -425,10 +462,12 @@ int main(int argc, char **argv)
     }
     build_terrain(&f);
     plan_flight(&f);
-    atlas_size = open_contender(&f, &f.chosen, f.options.mode, f.options.terrimp_mode);
+    atlas_size = open_chosen(&f);
     if (f.options.compare)
         open_contender(&f, &f.full, "full", TERRIMP_MODE_FULL);
     open_graphics(&f, atlas_size);
+    if (!f.chosen.view)
+        open_geomip(&f);
     if (f.options.out && mkdir(f.options.out, 0777) != 0 && errno != EEXIST)
         stop_file(f.options.out, strerror(errno));
     open_table(&f);

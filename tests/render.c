@@ -11,6 +11,7 @@
 #include "examples/host/context.h"
 #include "examples/host/dem.h"
 #include "examples/host/flight.h"
+#include "examples/host/gl_geomip.h"
 #include "examples/host/gl_terrain.h"
 #include "examples/host/image.h"
 #include "examples/host/lightmap.h"
@@ -219,12 +220,9 @@ static uint8_t *open_picture(const scene *s)
 
 /* ---- A frame ------------------------------------------------------------ */
 
-/* Updates the view for a pose. Returns the camera to draw with: its clip distances are those that
-   the update asks for, like a host's would be. */
-static terrimp_camera aim(const scene *s, terrimp_view *view, const flight_pose *pose,
-                          terrimp_stats *stats)
+/* A camera that sees the whole terrain. */
+static terrimp_camera camera_at(const scene *s, const flight_pose *pose)
 {
-    float up = tanf(0.5f * s->fov), right = up * (float)s->width / (float)s->height;
     terrimp_camera camera;
     int i;
     memset(&camera, 0, sizeof camera);
@@ -237,12 +235,27 @@ static terrimp_camera aim(const scene *s, terrimp_view *view, const flight_pose 
     camera.height_px = (uint32_t)s->height;
     camera.z_far = terrimp_box_farthest(&s->info.box, camera.eye) * 1.2f;
     camera.z_near = camera.z_far / 8192.0f;
-    need_ok(terrimp_view_update(view, &camera));
-    need_ok(terrimp_view_get_stats(view, stats));
+    return camera;
+}
+
+/* Its clip distances become those that an update asks for, like a host's would be. */
+static terrimp_camera tighten(const scene *s, terrimp_camera camera, const terrimp_stats *stats)
+{
+    float up = tanf(0.5f * s->fov), right = up * (float)s->width / (float)s->height;
     camera.z_near = fmaxf(camera.z_near, stats->z_near / sqrtf(1.0f + up * up + right * right));
     if (stats->z_far > camera.z_near)
         camera.z_far = stats->z_far * 1.01f;
     return camera;
+}
+
+/* Updates the view for a pose. Returns the camera to draw with. */
+static terrimp_camera aim(const scene *s, terrimp_view *view, const flight_pose *pose,
+                          terrimp_stats *stats)
+{
+    terrimp_camera camera = camera_at(s, pose);
+    need_ok(terrimp_view_update(view, &camera));
+    need_ok(terrimp_view_get_stats(view, stats));
+    return tighten(s, camera, stats);
 }
 
 /* Stands between a view and its callbacks: notes what passes, and may hold captures back. */
@@ -730,6 +743,137 @@ static void hills_look_like_the_full_mesh(void)
     scene_close(&s);
 }
 
+/* ---- Geometrical mipmapping --------------------------------------------- */
+
+static terrimp_geomip_view geomip_settings(int rule, float tolerance_px, float morph_ratio)
+{
+    terrimp_geomip_view settings;
+    memset(&settings, 0, sizeof settings);
+    settings.rule = rule;
+    settings.tolerance_px = tolerance_px;
+    settings.morph_ratio = morph_ratio;
+    return settings;
+}
+
+static terrimp_stats draw_geomip(scene *s, gl_geomip *g, const flight_pose *pose,
+                                 const uint8_t sky[3], uint8_t *rgb)
+{
+    terrimp_camera camera = camera_at(s, pose);
+    terrimp_stats stats;
+    need_ok(gl_geomip_update(g, &camera, &stats));
+    camera = tighten(s, camera, &stats);
+    need_ok(gl_terrain_begin(&s->gl, &camera, sky));
+    need_ok(gl_geomip_draw(g));
+    gl_terrain_end(&s->gl);
+    context_read(&s->context, rgb);
+    return stats;
+}
+
+/* Levels that are drawn beside each other in the newest selection, as a count. */
+static uint32_t count_levels(const gl_geomip *g)
+{
+    uint32_t seen = 0, count = 0, i;
+    for (i = 0; i < g->view.draw_count; i++)
+        seen |= 1u << g->view.draws[i].level;
+    for (; seen; seen >>= 1)
+        count += seen & 1u;
+    return count;
+}
+
+/* The wild flight, where the full mesh leaves no pixel open (see no_hole_in...). */
+static void check_geomip_covers(scene *s, float reach, uint32_t chunk_quads, float tolerance_px,
+                                float morph_ratio)
+{
+    terrimp_geomip_view settings = geomip_settings(0, tolerance_px, morph_ratio);
+    uint8_t *picture = open_picture(s);
+    flight_pose poses[WILD_FRAMES];
+    size_t i, holes, all = 0;
+    uint32_t levels = 0;
+    gl_geomip g;
+    need(gl_geomip_open(&g, &s->gl, &s->field, chunk_quads, &settings));
+    wild_flight(s, reach, poses);
+    for (i = 0; i < WILD_FRAMES; i++) {
+        draw_geomip(s, &g, &poses[i], magenta, picture);
+        holes = count_colour(picture, magenta, s->pixels);
+        if (holes && !all)
+            keep_picture(s, morph_ratio > 1.0f ? "morph_holes" : "geomip_holes", i, picture);
+        all += holes;
+        levels += count_levels(&g);
+    }
+    printf("  %s, morphing %.1f: %.1f levels a frame, %u pixels are holes\n", s->name,
+           (double)morph_ratio, (double)levels / WILD_FRAMES, (unsigned)all);
+    CHECK(levels > WILD_FRAMES * 3 / 2); /* there are borders between levels */
+    CHECK(all == 0);
+    free(picture);
+    gl_geomip_close(&g);
+}
+
+static void no_hole_between_mipmapped_nodes(void)
+{
+    static const dem_desc part = { 0, 0, 0, 300, 300, 577, 577 };
+    scene s;
+    open_hills(&s, 480, 384, 40.0f);
+    check_geomip_covers(&s, 100.0f, 16, 1.0f, 1.0f);
+    check_geomip_covers(&s, 100.0f, 8, 1.0f, 3.0f);
+    scene_close(&s);
+    open_rough(&s, 480, 384, 40.0f);
+    check_geomip_covers(&s, 45.0f, 8, 4.0f, 1.0f);
+    check_geomip_covers(&s, 45.0f, 4, 4.0f, 3.0f);
+    scene_close(&s);
+    if (!open_tile(&s, "N42E001.hgt", &part)) {
+        SKIP("there is no N42E001.hgt");
+        return;
+    }
+    scene_show(&s, 480, 384, 40.0f, ATLAS);
+    check_geomip_covers(&s, 8000.0f, 16, 2.0f, 1.0f);
+    check_geomip_covers(&s, 8000.0f, 8, 2.0f, 3.0f);
+    scene_close(&s);
+}
+
+/* What tolerance 1 must reach at least, [dB]. */
+#define PICTURE_DB 33.0
+#define BOUND_DB 40.0
+
+static double worst_geomip(scene *s, const char *what, terrimp_geomip_view settings)
+{
+    terrimp_view *full = open_full_view(s);
+    uint8_t *a = open_picture(s), *b = open_picture(s);
+    flight_pose poses[SAMPLE_POSES];
+    double worst = 99.0;
+    uint32_t triangles = 0;
+    gl_geomip g;
+    size_t i;
+    need(gl_geomip_open(&g, &s->gl, &s->field, 32, &settings));
+    sample_poses(s, poses);
+    for (i = 0; i < SAMPLE_POSES; i++) {
+        triangles += draw_geomip(s, &g, &poses[i], light_blue, a).triangles;
+        draw_pose(s, full, &poses[i], light_blue, b);
+        worst = fmin(worst, psnr(s, a, b));
+    }
+    printf("  %s, %s: PSNR over terrain at least %.2f dB, %u triangles\n", s->name, what, worst,
+           (unsigned)(triangles / SAMPLE_POSES));
+    free(a);
+    free(b);
+    gl_geomip_close(&g);
+    terrimp_view_destroy(full);
+    return worst;
+}
+
+static void mipmapped_terrain_looks_like_the_full_mesh(void)
+{
+    double likeness, coarse;
+    scene s;
+    open_hills(&s, 640, 512, 60.0f);
+    likeness = worst_geomip(&s, "picture", geomip_settings(TERRIMP_GEOMIP_PICTURE, 1.0f, 0.0f));
+    coarse = worst_geomip(&s, "picture, 8 px", geomip_settings(TERRIMP_GEOMIP_PICTURE, 8.0f, 0.0f));
+    CHECK(likeness >= PICTURE_DB);
+    CHECK(coarse < likeness - 3.0);
+    CHECK(worst_geomip(&s, "picture, morphing", geomip_settings(0, 1.0f, 1.5f)) >= PICTURE_DB);
+    CHECK(worst_geomip(&s, "bound", geomip_settings(TERRIMP_GEOMIP_BOUND, 1.0f, 0.0f)) >= BOUND_DB);
+    CHECK(worst_geomip(&s, "tiny", geomip_settings(TERRIMP_GEOMIP_DISTANCE, 0.01f, 0.0f)) >= 60.0);
+    scene_close(&s);
+}
+
 /* ---- Commands and pixels are repeatable --------------------------------- */
 
 enum { REPEAT_FRAMES = 8 };
@@ -949,6 +1093,8 @@ int main(void)
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);
+    RUN(no_hole_between_mipmapped_nodes);
+    RUN(mipmapped_terrain_looks_like_the_full_mesh);
     RUN(the_same_flight_gives_the_same_commands_and_pixels);
     RUN(both_systems_draw_the_same_picture);
     RUN(captures_keep_to_their_slots);

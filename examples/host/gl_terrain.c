@@ -89,7 +89,7 @@ static GLuint compile(GLenum type, const char *source)
     return shader;
 }
 
-static gl_program make_program(const char *vertex_source, const char *fragment_source)
+gl_program gl_program_make(const char *vertex_source, const char *fragment_source)
 {
     GLuint vertex = compile(GL_VERTEX_SHADER, vertex_source);
     GLuint fragment = compile(GL_FRAGMENT_SHADER, fragment_source);
@@ -256,10 +256,10 @@ static const char *fill(gl_terrain *g, const terrimp_terrain *terrain,
     make_lightmap(g, field, lightmap);
     if (!make_atlases(g, (GLsizei)atlas_size))
         return "the atlas cannot be rendered to";
-    g->ground = make_program(ground_vertex, ground_fragment);
-    g->fading = make_program(ground_vertex, fading_fragment);
-    g->impostor = make_program(impostor_vertex, impostor_fragment);
-    g->line = make_program(ground_vertex, line_fragment);
+    g->ground = gl_program_make(ground_vertex, ground_fragment);
+    g->fading = gl_program_make(ground_vertex, fading_fragment);
+    g->impostor = gl_program_make(impostor_vertex, impostor_fragment);
+    g->line = gl_program_make(ground_vertex, line_fragment);
     if (!g->ground.id || !g->fading.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
     set_field(g, &g->ground);
@@ -359,8 +359,7 @@ static void flush(gl_terrain *g)
     b->count = 0;
 }
 
-/* Turns to the frame, which is cleared the first time. */
-static void turn_to_frame(gl_terrain *g)
+void gl_terrain_turn_to_frame(gl_terrain *g)
 {
     if (g->target == GL_TO_FRAME)
         return;
@@ -438,7 +437,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     gl_terrain *g = (gl_terrain *)user;
     const gl_program *p = g->lines ? &g->line : &g->impostor;
-    turn_to_frame(g);
+    gl_terrain_turn_to_frame(g);
     flush(g);
     glUseProgram(p->id);
     glUniform3f(p->tint, 0.85f, 0.10f, 0.05f);
@@ -453,7 +452,7 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     gl_terrain *g = (gl_terrain *)user;
     if (g->lines)
         return;
-    turn_to_frame(g);
+    gl_terrain_turn_to_frame(g);
     flush(g);
     glUseProgram(g->ground.id);
     draw_mesh(g, &g->ground, g->lightmap, c->base_vertex, c->first_index, c->index_count,
@@ -468,7 +467,7 @@ static void draw_ground(void *user, const terrimp_ground_command *command)
     if (g->capturing && g->lines)
         return;
     if (!g->capturing)
-        turn_to_frame(g);
+        gl_terrain_turn_to_frame(g);
     if (b->count == GL_BATCH || b->fade_start != command->fade_start
         || b->fade_end != command->fade_end || b->depth_bias != command->depth_bias)
         flush(g);
@@ -517,7 +516,7 @@ terrimp_callbacks gl_terrain_callbacks(gl_terrain *g)
 
 void gl_terrain_end(gl_terrain *g)
 {
-    turn_to_frame(g);
+    gl_terrain_turn_to_frame(g);
     flush(g);
     glFinish();
 }
@@ -526,7 +525,7 @@ terrimp_result gl_terrain_wireframe(gl_terrain *g, terrimp_view *view)
 {
     terrimp_callbacks callbacks = gl_terrain_callbacks(g);
     terrimp_result result;
-    turn_to_frame(g);
+    gl_terrain_turn_to_frame(g);
     g->lines = 1;
     glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
     glEnable(GL_POLYGON_OFFSET_LINE);

@@ -15,6 +15,9 @@ typedef struct gl_program {
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
 } gl_program;
 
+/* Makes a program whose input `position` is at location 0; the id is 0 when it does not compile. */
+gl_program gl_program_make(const char *vertex_source, const char *fragment_source);
+
 enum { GL_TO_FRAME = -1, GL_TO_NOTHING = -2 };
 
 /* Ground draws of one state, waiting to be sent as one call. */
@@ -55,6 +58,9 @@ const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_t
 /* Starts a frame: clears it to the sky's colour and takes the camera's matrices. */
 terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
                                 const uint8_t sky[3]);
+
+/* Sends what follows to the frame, which is cleared the first time. For draws of one's own. */
+void gl_terrain_turn_to_frame(gl_terrain *g);
 
 /* The callbacks for terrimp_view_render, with g as their user pointer. */
 terrimp_callbacks gl_terrain_callbacks(gl_terrain *g);

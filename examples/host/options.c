@@ -102,9 +102,21 @@ static int take_mode(options *o, const char *text)
         o->terrimp_mode = TERRIMP_MODE_FULL;
     else if (strcmp(text, "impostor") == 0)
         o->terrimp_mode = TERRIMP_MODE_IMPOSTOR;
+    else if (strcmp(text, "geomip") == 0)
+        o->terrimp_mode = 0;
     else
         return 0;
     return 1;
+}
+
+static int take_rule(const char *text, int *rule)
+{
+    static const char *const names[] = { "picture", "bound", "distance" };
+    int i;
+    for (i = 0; i < 3; i++)
+        if (strcmp(text, names[i]) == 0)
+            *rule = TERRIMP_GEOMIP_PICTURE + i;
+    return *rule != 0;
 }
 
 static int take_frame_list(options *o, const char *text)
@@ -134,8 +146,8 @@ static int take_colour(const char *text, uint8_t colour[3])
 
 typedef enum option_id {
     DEM, FORMAT, RAW_SIZE, CROP, TERRAIN_SIZE, SEED, SPACING, HEIGHT_SCALE, MODE, SIZE, FOV, SKY,
-    FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, TEXELS, ATLAS, MAX_CAPTURES, OUT,
-    SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
+    FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, TEXELS, ATLAS, MAX_CAPTURES, RULE,
+    MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
 } option_id;
 
 typedef struct option {
@@ -152,7 +164,7 @@ static const option table[OPTION_COUNT] = {
     { SEED, "--seed", "N", "of the procedural terrain [1]" },
     { SPACING, "--spacing", "X[,Z]", "units between samples [1; a .hgt: metres]" },
     { HEIGHT_SCALE, "--height-scale", "S", "units for a step of a sample [1]" },
-    { MODE, "--mode", "full|impostor", "how to draw [impostor]" },
+    { MODE, "--mode", "full|impostor|geomip", "how to draw [impostor]" },
     { SIZE, "--size", "WxH", "of the picture in pixels [1280x1024]" },
     { FOV, "--fov", "DEG", "vertical field of view [60]" },
     { SKY, "--sky", "RRGGBB", "colour behind the terrain [a8c8e8]" },
@@ -163,10 +175,12 @@ static const option table[OPTION_COUNT] = {
     { CHUNK, "--chunk", "QUADS", "along the side of a chunk [64]" },
     { FADE, "--fade", "START,END", "distances between which ground gives way to impostors" },
     { MAX_ANGLE, "--max-angle", "DEG", "view angle that outdates a picture [5]" },
-    { TOLERANCE, "--tolerance", "PIXELS", "parallax error that outdates a picture [1]" },
+    { TOLERANCE, "--tolerance", "PIXELS", "error that outdates a picture; geomip: of a node [1]" },
     { TEXELS, "--texels", "N", "texels for a pixel in a new picture [2]" },
     { ATLAS, "--atlas", "N", "texels along the side of each of the two atlases [4096]" },
     { MAX_CAPTURES, "--max-captures", "N", "pictures renewed in one frame [no limit]" },
+    { RULE, "--rule", "picture|bound|distance", "of geomip: what is tolerated [picture]" },
+    { MORPH, "--morph", "RATIO", "of geomip: of the distances where nodes morph [1: not]" },
     { OUT, "--out", "DIR", "directory for the pictures; made if it is missing" },
     { SAVE_EVERY, "--save-every", "N", "save every Nth frame" },
     { SAVE_FRAMES, "--save-frames", "LIST", "save these frames: 0,10,20" },
@@ -226,6 +240,8 @@ static int take(options *o, option_id id, const char *text)
     case TEXELS: return take_number(text, 0.1f, 8.0f, &o->texels);
     case ATLAS: return take_unsigned(text, &o->atlas) && o->atlas >= 64 && o->atlas <= 32768;
     case MAX_CAPTURES: return take_unsigned(text, &o->max_captures);
+    case RULE: return take_rule(text, &o->rule);
+    case MORPH: return take_number(text, 1.0f, 4.0f, &o->morph);
     case OUT: return take_text(text, &o->out);
     case SAVE_EVERY: return take_unsigned(text, &o->save_every) && o->save_every > 0;
     case SAVE_FRAMES: return take_frame_list(o, text);

@@ -12,7 +12,7 @@ enum { OPTIONS_MAX_SAVED = 256 };
 /* Numbers that were not given are 0, texts are null: the program or the library has a default. */
 typedef struct options {
     const char *mode;                  /* as written; default "impostor" */
-    int terrimp_mode;                  /* what it means to the library */
+    int terrimp_mode;                  /* what it means to the library; 0: geometrical mipmapping */
     const char *dem, *path, *out, *stats;
     dem_desc file;                     /* --format, --raw-size, --crop */
     uint32_t terrain_size, seed;
@@ -23,6 +23,8 @@ typedef struct options {
     float spacing[2], height_scale;
     uint32_t chunk, atlas, max_captures;
     float fade[2], max_angle_degrees, tolerance, texels;
+    int rule;                          /* terrimp_geomip_rule */
+    float morph;
     uint32_t save_every;
     uint32_t save_frames[OPTIONS_MAX_SAVED], save_frame_count;
     uint8_t sky[3];

@@ -1,0 +1,351 @@
+#include "gl_geomip.h"
+
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- Shaders ------------------------------------------------------------ */
+
+/* Each variant is completed by a function `height`. As in gl_terrain, all positions are taken
+   relative to the eye first. */
+#define VERTEX_HEAD                      \
+    "#version 330 core\n"                \
+    "layout(location = 0) in vec3 position;\n"
+
+#define VERTEX_MAIN                                               \
+    "uniform mat4 matrix;\n"                                      \
+    "uniform vec3 eye;\n"                                         \
+    "uniform vec4 field;\n"                                       \
+    "out vec2 uv;\n"                                              \
+    "void main() {\n"                                             \
+    "    vec3 p = vec3(position.x, height(), position.z) - eye;\n" \
+    "    uv = position.xz * field.xy + field.zw;\n"               \
+    "    gl_Position = matrix * vec4(p, 1.0);\n"                  \
+    "}\n"
+
+static const char still_vertex[] = VERTEX_HEAD
+    "float height() { return position.y; }\n" VERTEX_MAIN;
+
+/* The formula of terrimp_geomip_weights. Sides are in the order Z0, Z1, X0, X1. Vertices that two
+   nodes share get the same sums, bit for bit, since all that differs is a product with 0. */
+static const char morphing_vertex[] = VERTEX_HEAD
+    "layout(location = 1) in vec3 move;\n"
+    "layout(location = 2) in vec4 odd;\n"
+    "layout(location = 3) in vec4 even;\n"
+    "layout(location = 4) in vec4 beside;\n"
+    "layout(location = 5) in float self;\n"
+    "uniform float morph;\n"
+    "uniform vec4 side, side_coarse;\n"
+    "float height() {\n"
+    "    float factor = self * morph + dot(odd, side) + dot(even, side_coarse);\n"
+    "    vec4 border = beside * side_coarse;\n"
+    "    vec2 along = vec2(border.x + border.y, border.z + border.w);\n"
+    "    return position.y + factor * (move.x + dot(move.yz, along));\n"
+    "}\n" VERTEX_MAIN;
+
+static const char ground_fragment[] =
+    "#version 330 core\n"
+    "uniform sampler2D lightmap;\n"
+    "in vec2 uv;\n"
+    "out vec4 colour;\n"
+    "void main() { colour = vec4(texture(lightmap, uv).rgb, 1.0); }\n";
+
+static const char line_fragment[] =
+    "#version 330 core\n"
+    "uniform vec3 tint;\n"
+    "out vec4 colour;\n"
+    "void main() { colour = vec4(tint, 1.0); }\n";
+
+static int is_morphing(const gl_geomip *g)
+{
+    return g->view.morph_ratio > 1.0f;
+}
+
+static gl_program make_program(gl_geomip *g, int index, const char *fragment)
+{
+    gl_program p = gl_program_make(is_morphing(g) ? morphing_vertex : still_vertex, fragment);
+    g->morph[index] = glGetUniformLocation(p.id, "morph");
+    g->side[index] = glGetUniformLocation(p.id, "side");
+    g->side_coarse[index] = glGetUniformLocation(p.id, "side_coarse");
+    return p;
+}
+
+/* ---- Opening ------------------------------------------------------------ */
+
+/* What the tree and its view keep; close frees it. */
+static int allocate(gl_geomip *g)
+{
+    const terrimp_geomip *t = &g->tree;
+    size_t nodes = t->node_count, grid = (size_t)(t->chunk_quads + 1) * (t->chunk_quads + 1);
+    g->tree.nodes = malloc(nodes * sizeof *t->nodes);
+    g->view.distances = malloc(nodes * sizeof *g->view.distances);
+    g->view.marks = calloc(nodes, sizeof *g->view.marks);
+    g->view.draw_capacity = t->level_x[0] * t->level_z[0]; /* a tiling has no more */
+    g->view.draws = malloc(g->view.draw_capacity * sizeof *g->view.draws);
+    g->arrays = calloc(nodes, sizeof *g->arrays);
+    g->vertices = calloc(nodes, sizeof *g->vertices);
+    g->xyz = malloc(grid * 3 * sizeof *g->xyz);
+    g->moves = malloc(grid * sizeof *g->moves);
+    return t->nodes && g->view.distances && g->view.marks && g->view.draws && g->arrays
+           && g->vertices && g->xyz && g->moves;
+}
+
+static terrimp_result build(gl_geomip *g)
+{
+    float *scratch = malloc(g->tree.scratch_count * sizeof *scratch);
+    terrimp_result result = TERRIMP_E_MEMORY;
+    if (scratch)
+        result = terrimp_geomip_build(&g->tree, scratch);
+    free(scratch);
+    return result;
+}
+
+/* Plain lists for morphing too: triangles of no area, as in the stitched form, leave a pixel open
+   now and then, since no rasteriser has exact depths for them. */
+static terrimp_result fill_indices(gl_geomip *g)
+{
+    const int form = TERRIMP_FORM_LIST;
+    uint32_t quads = g->tree.chunk_quads, i;
+    uint32_t count = terrimp_pattern_index_count(quads, form);
+    uint16_t *indices = malloc(count * sizeof *indices);
+    terrimp_result result = TERRIMP_E_MEMORY;
+    if (indices)
+        result = terrimp_pattern_fill(quads, form, indices, count);
+    for (i = 0; i < TERRIMP_PATTERN_COUNT && result == TERRIMP_OK; i++)
+        result = terrimp_pattern_find(quads, form, i, &g->patterns[i]);
+    if (result == TERRIMP_OK) {
+        glBindVertexArray(0);
+        glGenBuffers(1, &g->indices);
+        glBindBuffer(GL_ARRAY_BUFFER, g->indices);
+        glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(count * sizeof *indices), indices,
+                     GL_STATIC_DRAW);
+    }
+    free(indices);
+    return result;
+}
+
+static terrimp_result fill_weights(gl_geomip *g)
+{
+    size_t grid = (size_t)(g->tree.chunk_quads + 1) * (g->tree.chunk_quads + 1);
+    terrimp_geomip_weights *weights = malloc(grid * sizeof *weights);
+    terrimp_result result = TERRIMP_E_MEMORY;
+    if (weights)
+        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, weights);
+    if (result == TERRIMP_OK) {
+        glGenBuffers(1, &g->weights);
+        glBindBuffer(GL_ARRAY_BUFFER, g->weights);
+        glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(grid * sizeof *weights), weights,
+                     GL_STATIC_DRAW);
+    }
+    free(weights);
+    return result;
+}
+
+static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t chunk_quads)
+{
+    terrimp_result result = terrimp_geomip_init(field, chunk_quads, &g->tree);
+    if (result == TERRIMP_OK && !allocate(g))
+        result = TERRIMP_E_MEMORY;
+    if (result == TERRIMP_OK)
+        result = build(g);
+    if (result == TERRIMP_OK)
+        result = fill_indices(g);
+    if (result == TERRIMP_OK && is_morphing(g))
+        result = fill_weights(g);
+    if (result != TERRIMP_OK)
+        return terrimp_result_text((int)result);
+    g->ground = make_program(g, 0, ground_fragment);
+    g->line = make_program(g, 1, line_fragment);
+    if (!g->ground.id || !g->line.id)
+        return "a shader does not compile";
+    return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for the indices";
+}
+
+const char *gl_geomip_open(gl_geomip *g, gl_terrain *gl, const terrimp_heightfield *field,
+                           uint32_t chunk_quads, const terrimp_geomip_view *settings)
+{
+    const char *trouble;
+    memset(g, 0, sizeof *g);
+    g->gl = gl;
+    g->view.rule = settings->rule;
+    g->view.tolerance_px = settings->tolerance_px;
+    g->view.morph_ratio = settings->morph_ratio;
+    g->view.hysteresis = settings->hysteresis;
+    trouble = fill(g, field, chunk_quads);
+    if (trouble)
+        gl_geomip_close(g);
+    return trouble;
+}
+
+void gl_geomip_close(gl_geomip *g)
+{
+    uint32_t i;
+    for (i = 0; g->arrays && g->vertices && i < g->tree.node_count; i++)
+        if (g->arrays[i]) {
+            glDeleteVertexArrays(1, &g->arrays[i]);
+            glDeleteBuffers(1, &g->vertices[i]);
+        }
+    glDeleteBuffers(1, &g->indices);
+    glDeleteBuffers(1, &g->weights);
+    glDeleteProgram(g->ground.id);
+    glDeleteProgram(g->line.id);
+    free(g->tree.nodes);
+    free(g->view.distances);
+    free(g->view.marks);
+    free(g->view.draws);
+    free(g->arrays);
+    free(g->vertices);
+    free(g->xyz);
+    free(g->moves);
+    memset(g, 0, sizeof *g);
+}
+
+/* ---- A node's vertices -------------------------------------------------- */
+
+/* Morphing vertices are six floats: position, then what they move by; others only the position. */
+static void send_vertices(const gl_geomip *g, size_t grid)
+{
+    size_t floats = is_morphing(g) ? 6 : 3, i;
+    float *out;
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(grid * floats * sizeof *out), NULL, GL_STATIC_DRAW);
+    out = glMapBuffer(GL_ARRAY_BUFFER, GL_WRITE_ONLY);
+    for (i = 0; out && i < grid; i++, out += floats) {
+        memcpy(out, g->xyz + i * 3, 3 * sizeof *out);
+        if (is_morphing(g)) {
+            out[3] = g->moves[i].move;
+            out[4] = g->moves[i].beside[0];
+            out[5] = g->moves[i].beside[1];
+        }
+    }
+    glUnmapBuffer(GL_ARRAY_BUFFER);
+}
+
+static void point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset)
+{
+    glEnableVertexAttribArray(location);
+    glVertexAttribPointer(location, size, type, GL_FALSE, (GLsizei)stride,
+                          (const void *)(uintptr_t)offset);
+}
+
+static void point_to_weights(const gl_geomip *g)
+{
+    size_t stride = sizeof(terrimp_geomip_weights);
+    glBindBuffer(GL_ARRAY_BUFFER, g->weights);
+    point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
+    point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
+    point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
+    point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
+}
+
+/* Makes what a node lacks; from then on it is resident. */
+static terrimp_result make_node(gl_geomip *g, uint32_t node)
+{
+    size_t grid = (size_t)(g->tree.chunk_quads + 1) * (g->tree.chunk_quads + 1);
+    size_t stride = (is_morphing(g) ? 6 : 3) * sizeof(float);
+    terrimp_result result = terrimp_geomip_fill_vertices(&g->tree, node, g->xyz,
+                                                         is_morphing(g) ? g->moves : NULL);
+    if (result != TERRIMP_OK)
+        return result;
+    glGenVertexArrays(1, &g->arrays[node]);
+    glBindVertexArray(g->arrays[node]);
+    glGenBuffers(1, &g->vertices[node]);
+    glBindBuffer(GL_ARRAY_BUFFER, g->vertices[node]);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, g->indices);
+    send_vertices(g, grid);
+    point(0, 3, GL_FLOAT, stride, 0);
+    if (is_morphing(g)) {
+        point(1, 3, GL_FLOAT, stride, 3 * sizeof(float));
+        point_to_weights(g);
+    }
+    g->resident++;
+    return TERRIMP_OK;
+}
+
+/* ---- A frame ------------------------------------------------------------ */
+
+terrimp_result gl_geomip_update(gl_geomip *g, const terrimp_camera *camera, terrimp_stats *stats)
+{
+    terrimp_result result = terrimp_geomip_select(&g->tree, &g->view, camera);
+    float closest = 1e30f, farthest = 0.0f;
+    uint32_t i;
+    memset(stats, 0, sizeof *stats);
+    for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
+        terrimp_box box;
+        float distance;
+        result = terrimp_geomip_box(&g->tree, g->view.draws[i].node, &box);
+        distance = terrimp_box_distance(&box, camera->eye);
+        closest = distance < closest ? distance : closest;
+        distance = terrimp_box_farthest(&box, camera->eye);
+        farthest = distance > farthest ? distance : farthest;
+    }
+    if (result != TERRIMP_OK || i == 0)
+        return result;
+    stats->visible = stats->draws = g->view.draw_count;
+    stats->triangles = g->view.triangle_count;
+    stats->z_near = closest;
+    stats->z_far = farthest;
+    return result;
+}
+
+static void draw_node(const gl_geomip *g, int program, const terrimp_geomip_draw *draw)
+{
+    const terrimp_pattern *pattern = &g->patterns[draw->pattern];
+    const float *tint = gl_geomip_colour(draw->level);
+    if (program == 1)
+        glUniform3fv(g->line.tint, 1, tint);
+    if (is_morphing(g)) {
+        glUniform1f(g->morph[program], draw->morph);
+        glUniform4fv(g->side[program], 1, draw->side);
+        glUniform4fv(g->side_coarse[program], 1, draw->side_coarse);
+    }
+    glBindVertexArray(g->arrays[draw->node]);
+    glDrawElements(GL_TRIANGLES, (GLsizei)pattern->index_count, GL_UNSIGNED_SHORT,
+                   (const void *)(uintptr_t)(pattern->first_index * sizeof(uint16_t)));
+}
+
+static terrimp_result draw_all(gl_geomip *g, int program)
+{
+    const gl_program *p = program == 0 ? &g->ground : &g->line;
+    terrimp_result result = TERRIMP_OK;
+    uint32_t i;
+    gl_terrain_turn_to_frame(g->gl);
+    glUseProgram(p->id);
+    glUniformMatrix4fv(p->matrix, 1, GL_FALSE, g->gl->camera_matrix);
+    glUniform3fv(p->eye, 1, g->gl->camera_eye);
+    glUniform4fv(p->field, 1, g->gl->field);
+    glBindTexture(GL_TEXTURE_2D, g->gl->lightmap);
+    for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
+        const terrimp_geomip_draw *draw = &g->view.draws[i];
+        if (!g->arrays[draw->node])
+            result = make_node(g, draw->node);
+        if (result == TERRIMP_OK)
+            draw_node(g, program, draw);
+    }
+    return result;
+}
+
+terrimp_result gl_geomip_draw(gl_geomip *g)
+{
+    return draw_all(g, 0);
+}
+
+terrimp_result gl_geomip_wireframe(gl_geomip *g)
+{
+    terrimp_result result;
+    glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
+    glEnable(GL_POLYGON_OFFSET_LINE);
+    glPolygonOffset(-1.0f, -8.0f);
+    result = draw_all(g, 1);
+    glDisable(GL_POLYGON_OFFSET_LINE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    gl_terrain_end(g->gl);
+    return result;
+}
+
+const float *gl_geomip_colour(uint32_t level)
+{
+    static const float colours[6][3] = { { 0.80f, 0.10f, 0.05f }, { 0.05f, 0.20f, 0.75f },
+                                         { 0.95f, 0.75f, 0.05f }, { 0.55f, 0.05f, 0.60f },
+                                         { 0.05f, 0.60f, 0.65f }, { 0.05f, 0.05f, 0.05f } };
+    return colours[level % 6];
+}
