@@ -53,6 +53,13 @@ check "minimal captures in its first frame and hardly any later" minimal_capture
 check "minimal draws something in each of its 8 frames" minimal_draws_all
 check "minimal prints the same again" minimal_repeats
 
+# ---- geomip: runs, and leaves a picture
+
+geomip_runs()
+{
+    (cd $work && ../../geomip) > $work/geomip.txt && [ -s $work/geomip.png ]
+}
+
 # ---- flyover: the pictures are looked at by tests/render.c, here it is its manners
 
 fly()
@@ -109,6 +116,9 @@ unknown_options()
 }
 
 check "make builds every example" make -s all
+if [ -x build/geomip ]; then
+    check "geomip draws its frames and leaves a picture" geomip_runs
+fi
 if [ -x build/flyover ]; then
     check "flyover flies over its own terrain" prints_nothing flies_quietly
     check "flyover writes a line of statistics a frame" statistics_are_a_table

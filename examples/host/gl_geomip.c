@@ -100,8 +100,8 @@ static terrimp_result build(gl_geomip *g)
     return result;
 }
 
-/* Plain lists for morphing too: triangles of no area, as in the stitched form, leave a pixel open
-   now and then, since no rasteriser has exact depths for them. */
+/* Plain lists for morphing too: beside the triangles of no area that the stitched form has, a
+   rasteriser was seen to leave a pixel open now and then. */
 static terrimp_result fill_indices(gl_geomip *g)
 {
     const int form = TERRIMP_FORM_LIST;
