@@ -6681,11 +6681,10 @@ static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
 static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 {
     size_t at = 0, ranges, chunks, vertices, indices;
-    uint32_t skirted_vertices, skirted_indices;
     int ok = 1;
     terrimpi_count_levels(t);
-    /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices. */
-    terrimp_mesh_capacity(t->desc.triangle_budget, &skirted_vertices, &skirted_indices);
+    /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices in all, of
+       which b is a part: at most n + 2. */
     t->vertex_limit = t->desc.triangle_budget + 2u;
     t->index_limit = 3u * t->desc.triangle_budget;
     terrimpi_place(&at, 1, sizeof *t, &ok);

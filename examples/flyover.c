@@ -88,16 +88,14 @@ static void *allocate(size_t bytes)
 /* Samples from a file; voids are filled in place. */
 static void load_dem(flyover *f)
 {
-    size_t bytes, filled;
-    void *scratch;
+    const char *trouble;
+    size_t filled;
     if (!dem_load(&f->dem, f->options.dem, &f->options.file))
         stop(f->dem.error);
+    filled = dem_fill_voids(&f->dem, &trouble);
+    if (trouble)
+        stop(trouble);
     f->field = dem_heightfield(&f->dem);
-    bytes = terrimp_heightfield_fill_voids_scratch_bytes(f->dem.width, f->dem.depth);
-    scratch = allocate(bytes);
-    need(terrimp_heightfield_fill_voids(&f->field, f->dem.samples, scratch, bytes, &filled));
-    free(scratch);
-    f->field.has_no_data = 0;
     printf("voids_filled %zu\n", filled);
 }
 

@@ -171,9 +171,8 @@ static void open_rough(scene *s, int width, int height, float fov_degrees)
 static int open_tile(scene *s, const char *file, const dem_desc *part)
 {
     const char *directory = getenv("TERRIMP_DATA");
+    const char *trouble;
     char path[1024];
-    size_t bytes, filled;
-    void *scratch;
     FILE *probe;
     memset(s, 0, sizeof *s);
     snprintf(path, sizeof path, "%s/%s", directory ? directory : "../shared/data", file);
@@ -183,12 +182,9 @@ static int open_tile(scene *s, const char *file, const dem_desc *part)
     fclose(probe);
     if (!dem_load(&s->dem, path, part))
         need(s->dem.error);
+    dem_fill_voids(&s->dem, &trouble);
+    need(trouble);
     s->field = dem_heightfield(&s->dem);
-    bytes = terrimp_heightfield_fill_voids_scratch_bytes(s->dem.width, s->dem.depth);
-    scratch = allocate(bytes);
-    need_ok(terrimp_heightfield_fill_voids(&s->field, s->dem.samples, scratch, bytes, &filled));
-    free(scratch);
-    s->field.has_no_data = 0;
     scene_build(s, file, 0);
     return 1;
 }

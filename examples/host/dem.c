@@ -334,6 +334,22 @@ terrimp_heightfield dem_heightfield(const dem *d)
     return field;
 }
 
+size_t dem_fill_voids(dem *d, const char **trouble)
+{
+    terrimp_heightfield field = dem_heightfield(d);
+    size_t filled = 0;
+    size_t bytes = terrimp_heightfield_fill_voids_scratch_bytes(d->width, d->depth);
+    void *scratch = malloc(bytes);
+    terrimp_result result = TERRIMP_E_MEMORY;
+    if (scratch)
+        result = terrimp_heightfield_fill_voids(&field, d->samples, scratch, bytes, &filled);
+    free(scratch);
+    *trouble = result == TERRIMP_OK ? NULL : terrimp_result_text((int)result);
+    if (result == TERRIMP_OK)
+        d->has_voids = 0;
+    return filled;
+}
+
 void dem_free(dem *d)
 {
     free(d->samples);

@@ -36,6 +36,9 @@ int dem_parse(dem *d, const char *path, uint8_t *bytes, size_t size, const dem_d
 /* A view of the samples; voids are marked if there are any. */
 terrimp_heightfield dem_heightfield(const dem *d);
 
+/* Fills the voids in place; returns how many there were. *trouble: null, or what went wrong. */
+size_t dem_fill_voids(dem *d, const char **trouble);
+
 /* Frees the samples; fine after a failed load, and twice. */
 void dem_free(dem *d);
 

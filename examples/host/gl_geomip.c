@@ -43,13 +43,6 @@ static const char morphing_vertex[] = VERTEX_HEAD
     "    return position.y + factor * (move.x + dot(move.yz, along));\n"
     "}\n" VERTEX_MAIN;
 
-static const char ground_fragment[] =
-    "#version 330 core\n"
-    "uniform sampler2D lightmap;\n"
-    "in vec2 uv;\n"
-    "out vec4 colour;\n"
-    "void main() { colour = vec4(texture(lightmap, uv).rgb, 1.0); }\n";
-
 static const char line_fragment[] =
     "#version 330 core\n"
     "uniform vec3 tint;\n"
@@ -154,7 +147,7 @@ static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t
         result = fill_weights(g);
     if (result != TERRIMP_OK)
         return terrimp_result_text((int)result);
-    g->ground = make_program(g, 0, ground_fragment);
+    g->ground = make_program(g, 0, gl_ground_fragment);
     g->line = make_program(g, 1, line_fragment);
     if (!g->ground.id || !g->line.id)
         return "a shader does not compile";

@@ -23,7 +23,7 @@ static const char ground_vertex[] =
     "    gl_Position = matrix * vec4(p * scale, 1.0);\n"
     "}\n";
 
-static const char ground_fragment[] =
+const char gl_ground_fragment[] =
     "#version 330 core\n"
     "uniform sampler2D lightmap;\n"
     "in vec2 uv;\n"
@@ -256,7 +256,7 @@ static const char *fill(gl_terrain *g, const terrimp_terrain *terrain,
     make_lightmap(g, field, lightmap);
     if (!make_atlases(g, (GLsizei)atlas_size))
         return "the atlas cannot be rendered to";
-    g->ground = gl_program_make(ground_vertex, ground_fragment);
+    g->ground = gl_program_make(ground_vertex, gl_ground_fragment);
     g->fading = gl_program_make(ground_vertex, fading_fragment);
     g->impostor = gl_program_make(impostor_vertex, impostor_fragment);
     g->line = gl_program_make(ground_vertex, line_fragment);

@@ -15,6 +15,9 @@ typedef struct gl_program {
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
 } gl_program;
 
+/* The shading of opaque ground, alike in every mode: the lightmap at `uv`. */
+extern const char gl_ground_fragment[];
+
 /* Makes a program whose input `position` is at location 0; the id is 0 when it does not compile. */
 gl_program gl_program_make(const char *vertex_source, const char *fragment_source);
 
