@@ -45,7 +45,8 @@
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
        >>atlas        first-fit decreasing height packing; two atlases in turn
-       >>terrain      building, the per-frame decision, the draw commands
+       >>terrain      the quadtree, building, what the host's buffers hold
+       >>view         the per-frame decision, the schedule, the draw commands
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
 
@@ -1122,7 +1123,6 @@ TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terri
 /* ==== Terrain ============================================================ >>terrain */
 
 typedef struct terrimp_terrain terrimp_terrain; /* built from a heightfield; read-only then */
-typedef struct terrimp_view terrimp_view;       /* the pictures and lists of one camera */
 
 /* What a terrain is built from. */
 typedef struct terrimp_terrain_desc {
@@ -1235,6 +1235,30 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
 TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *terrain, float *xyz,
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity);
+
+#ifndef TERRIMP_NO_MALLOC
+
+/* Where create functions get memory. */
+typedef struct terrimp_allocator {
+    void *user;
+    void *(*allocate)(void *user, size_t bytes);               /* NULL when there is none */
+    void (*release)(void *user, void *pointer, size_t bytes);
+} terrimp_allocator;
+
+/* Allocates, lays out and builds a terrain in one call.
+
+   allocator    NULL: TERRIMP_MALLOC and TERRIMP_FREE
+   Errors       those of init and build; E_MEMORY when there is none */
+TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *desc,
+                                                  const terrimp_allocator *allocator,
+                                                  terrimp_terrain **terrain);
+TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain);
+
+#endif /* TERRIMP_NO_MALLOC */
+
+/* ==== View =============================================================== >>view */
+
+typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
 
 /* How distant terrain is drawn. */
 typedef enum terrimp_mode {
@@ -1389,22 +1413,6 @@ TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terr
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
 
 #ifndef TERRIMP_NO_MALLOC
-
-/* Where create functions get memory. */
-typedef struct terrimp_allocator {
-    void *user;
-    void *(*allocate)(void *user, size_t bytes);               /* NULL when there is none */
-    void (*release)(void *user, void *pointer, size_t bytes);
-} terrimp_allocator;
-
-/* Allocates, lays out and builds a terrain in one call.
-
-   allocator    NULL: TERRIMP_MALLOC and TERRIMP_FREE
-   Errors       those of init and build; E_MEMORY when there is none */
-TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *desc,
-                                                  const terrimp_allocator *allocator,
-                                                  terrimp_terrain **terrain);
-TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain);
 
 /* Allocates and lays out a view. Errors: those of init; E_MEMORY when there is none. */
 TERRIMP_API terrimp_result terrimp_view_create(const terrimp_terrain *terrain,
@@ -6556,13 +6564,10 @@ TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terri
 }
 
 /* ==== Terrain ============================================================ >>impl-terrain */
-/* Based on: Hess 2010, chapters 3 and 4; de Boer 2000, section 2.2 (quadtree). */
+/* Based on: Hess 2010, section 3.1 and 4.2; de Boer 2000, section 2.2 (quadtree). */
 
 #define TERRIMPI_MAX_LEVELS 18u     /* 65537 samples in chunks of 2 quads: 2^16 chunks a side */
 #define TERRIMPI_ALIGN 8u           /* of blocks: pointers, and the simplifier's 64-bit sums */
-#define TERRIMPI_MARGIN 2u          /* texels around the fitted picture in its slot */
-#define TERRIMPI_SMALLEST_PICTURE 8u
-#define TERRIMPI_NO_RECORD 0xffffu
 #define TERRIMPI_DIRECTIONS 8u      /* neighbours of a chunk */
 #define TERRIMPI_FLOOR_QUADS 32u    /* along a side of the floor at most: 2048 triangles in all */
 
@@ -7281,7 +7286,89 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
     return TERRIMP_OK;
 }
 
-/* ---- views ---- */
+#ifndef TERRIMP_NO_MALLOC
+
+static void *terrimpi_default_allocate(void *user, size_t bytes)
+{
+    (void)user;
+    return TERRIMP_MALLOC(bytes);
+}
+
+static void terrimpi_default_release(void *user, void *pointer, size_t bytes)
+{
+    (void)user;
+    (void)bytes;
+    TERRIMP_FREE(pointer);
+}
+
+/* The allocator to use; returns 0 when one of its functions is missing. */
+static int terrimpi_pick_allocator(const terrimp_allocator *wanted, terrimp_allocator *out)
+{
+    if (wanted) {
+        *out = *wanted;
+        return out->allocate && out->release;
+    }
+    out->user = NULL;
+    out->allocate = terrimpi_default_allocate;
+    out->release = terrimpi_default_release;
+    return 1;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *desc,
+                                                  const terrimp_allocator *allocator,
+                                                  terrimp_terrain **terrain)
+{
+    terrimp_allocator from;
+    terrimp_terrain_desc resolved;
+    terrimp_terrain *made = NULL;
+    terrimp_result result;
+    size_t bytes, scratch_bytes;
+    void *memory, *scratch;
+    if (!terrain || !terrimpi_pick_allocator(allocator, &from))
+        return TERRIMP_E_NULL;
+    result = terrimp_terrain_desc_resolve(desc, &resolved);
+    if (result != TERRIMP_OK)
+        return result;
+    bytes = terrimp_terrain_bytes(&resolved);
+    scratch_bytes = terrimp_terrain_scratch_bytes(&resolved);
+    if (bytes == 0 || scratch_bytes == 0)
+        return TERRIMP_E_OVERFLOW;
+    memory = from.allocate(from.user, bytes);
+    scratch = from.allocate(from.user, scratch_bytes);
+    result = memory && scratch ? terrimp_terrain_init(&resolved, memory, bytes, &made)
+                               : TERRIMP_E_MEMORY;
+    if (result == TERRIMP_OK)
+        result = terrimp_terrain_build(made, scratch, scratch_bytes);
+    if (scratch)
+        from.release(from.user, scratch, scratch_bytes);
+    if (result != TERRIMP_OK) {
+        if (memory)
+            from.release(from.user, memory, bytes);
+        return result;
+    }
+    made->allocator = from;
+    made->bytes = bytes;
+    *terrain = made;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
+{
+    if (terrain && terrain->allocator.release) {
+        terrimp_allocator allocator = terrain->allocator;
+        allocator.release(allocator.user, terrain, terrain->bytes);
+    }
+}
+
+#endif /* TERRIMP_NO_MALLOC */
+
+/* ==== View =============================================================== >>impl-view */
+/* Based on: Hess 2010, chapters 3 and 4. */
+
+#define TERRIMPI_MARGIN 2u /* texels around the fitted picture in its slot */
+#define TERRIMPI_SMALLEST_PICTURE 8u
+#define TERRIMPI_NO_RECORD 0xffffu
+
 
 enum {
     TERRIMPI_DRAW_GROUND = 1,
@@ -8061,78 +8148,6 @@ TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terr
 }
 
 #ifndef TERRIMP_NO_MALLOC
-
-static void *terrimpi_default_allocate(void *user, size_t bytes)
-{
-    (void)user;
-    return TERRIMP_MALLOC(bytes);
-}
-
-static void terrimpi_default_release(void *user, void *pointer, size_t bytes)
-{
-    (void)user;
-    (void)bytes;
-    TERRIMP_FREE(pointer);
-}
-
-/* The allocator to use; returns 0 when one of its functions is missing. */
-static int terrimpi_pick_allocator(const terrimp_allocator *wanted, terrimp_allocator *out)
-{
-    if (wanted) {
-        *out = *wanted;
-        return out->allocate && out->release;
-    }
-    out->user = NULL;
-    out->allocate = terrimpi_default_allocate;
-    out->release = terrimpi_default_release;
-    return 1;
-}
-
-TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *desc,
-                                                  const terrimp_allocator *allocator,
-                                                  terrimp_terrain **terrain)
-{
-    terrimp_allocator from;
-    terrimp_terrain_desc resolved;
-    terrimp_terrain *made = NULL;
-    terrimp_result result;
-    size_t bytes, scratch_bytes;
-    void *memory, *scratch;
-    if (!terrain || !terrimpi_pick_allocator(allocator, &from))
-        return TERRIMP_E_NULL;
-    result = terrimp_terrain_desc_resolve(desc, &resolved);
-    if (result != TERRIMP_OK)
-        return result;
-    bytes = terrimp_terrain_bytes(&resolved);
-    scratch_bytes = terrimp_terrain_scratch_bytes(&resolved);
-    if (bytes == 0 || scratch_bytes == 0)
-        return TERRIMP_E_OVERFLOW;
-    memory = from.allocate(from.user, bytes);
-    scratch = from.allocate(from.user, scratch_bytes);
-    result = memory && scratch ? terrimp_terrain_init(&resolved, memory, bytes, &made)
-                               : TERRIMP_E_MEMORY;
-    if (result == TERRIMP_OK)
-        result = terrimp_terrain_build(made, scratch, scratch_bytes);
-    if (scratch)
-        from.release(from.user, scratch, scratch_bytes);
-    if (result != TERRIMP_OK) {
-        if (memory)
-            from.release(from.user, memory, bytes);
-        return result;
-    }
-    made->allocator = from;
-    made->bytes = bytes;
-    *terrain = made;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
-{
-    if (terrain && terrain->allocator.release) {
-        terrimp_allocator allocator = terrain->allocator;
-        allocator.release(allocator.user, terrain, terrain->bytes);
-    }
-}
 
 TERRIMP_API terrimp_result terrimp_view_create(const terrimp_terrain *terrain,
                                                const terrimp_view_desc *desc,
