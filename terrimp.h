@@ -4158,11 +4158,19 @@ typedef struct terrimpi_parabola {
     float a, b, c;
 } terrimpi_parabola;
 
+/* Where columns and rows of a tile really lie, when the last ones lie closer to those before them
+   than the others: column x at x * step, but the last one at last_x. A triangle that faces up on
+   the tile's even grid need not do so there; the mesh has to face up on both. */
+typedef struct terrimpi_squeeze {
+    int32_t step, last_x, last_z;
+} terrimpi_squeeze;
+
 /* The mesh at work. Half-edge 4 t + k (k = 0, 1, 2) is side k of triangle t; it runs from origin[]
    to the origin of the next one, counter-clockwise. The border's vertices come first. */
 typedef struct terrimpi_simplifier {
     int32_t cols, rows;
     float middle, unit;     /* height = middle + unit * steps */
+    const terrimpi_squeeze *squeeze; /* NULL: none */
     terrimpi_row_sum *row_sums; /* [rows][cols] */
 
     int32_t border_count, vertex_count, triangle_count;
@@ -4192,6 +4200,28 @@ static int32_t terrimpi_area(const terrimpi_simplifier *s, int32_t a, int32_t b,
     int32_t bx = s->x[b] - s->x[a], bz = s->z[b] - s->z[a];
     int32_t cx = s->x[c] - s->x[a], cz = s->z[c] - s->z[a];
     return bz * cx - bx * cz;
+}
+
+/* Where a vertex really lies. */
+static void terrimpi_true_place(const terrimpi_simplifier *s, int32_t v, int64_t place[2])
+{
+    const terrimpi_squeeze *squeeze = s->squeeze;
+    place[0] = s->x[v] == s->cols - 1 ? squeeze->last_x : s->x[v] * squeeze->step;
+    place[1] = s->z[v] == s->rows - 1 ? squeeze->last_z : s->z[v] * squeeze->step;
+}
+
+/* Does a triangle face up, on the tile's grid and where its corners really lie? */
+static int terrimpi_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
+{
+    int64_t p[3][2];
+    if (terrimpi_area(s, a, b, c) <= 0)
+        return 0;
+    if (!s->squeeze)
+        return 1;
+    terrimpi_true_place(s, a, p[0]);
+    terrimpi_true_place(s, b, p[1]);
+    terrimpi_true_place(s, c, p[2]);
+    return (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]) > (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]);
 }
 
 /* --- which samples belong to a triangle, and sums over them --- */
@@ -4458,7 +4488,7 @@ static int terrimpi_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_r
         return 0;
     s->x[v] = x;
     s->z[v] = z;
-    for (i = 0, j = n - 1; i < n && terrimpi_area(s, v, ring->vertex[j], ring->vertex[i]) > 0; i++)
+    for (i = 0, j = n - 1; i < n && terrimpi_faces_up(s, v, ring->vertex[j], ring->vertex[i]); i++)
         j = i;
     if (i == n)
         for (i = 0; i < n; i++)
@@ -4589,7 +4619,7 @@ static int terrimpi_can_flip(const terrimpi_simplifier *s, int32_t e)
     b = s->origin[f];
     c = s->origin[terrimpi_prev(e)];
     d = s->origin[terrimpi_prev(f)];
-    return terrimpi_area(s, a, d, c) > 0 && terrimpi_area(s, d, b, c) > 0;
+    return terrimpi_faces_up(s, a, d, c) && terrimpi_faces_up(s, d, b, c);
 }
 
 /* Triangles abc (half-edge e = ab) and bad become adc and bcd; `sums` are those of edge cd. */
@@ -4664,7 +4694,7 @@ static float terrimpi_fan_miss(const terrimpi_simplifier *s, int32_t v, const te
         b = c;
         c = ring->vertex[j];
         area = terrimpi_area(s, a, b, c);
-        if (area <= 0)
+        if (!terrimpi_faces_up(s, a, b, c))
             return -1.0f;
         after = before > 0 ? terrimpi_area(s, a, c, v) : -1;
         if (before > 0 && after <= 0) { /* v lies between ab and ac */
@@ -4873,6 +4903,17 @@ static int terrimpi_is_corner(const terrimpi_simplifier *s, const int32_t v[3], 
            (s->x[v[2]] == x && s->z[v[2]] == z);
 }
 
+/* Whether a corner lies on a last column or row that is squeezed: then a sample within the triangle
+   on the grid may lie outside of the true one. */
+static int terrimpi_is_squeezed(const terrimpi_simplifier *s, const int32_t v[3])
+{
+    int k;
+    for (k = 0; s->squeeze && k < 3; k++)
+        if (s->x[v[k]] == s->cols - 1 || s->z[v[k]] == s->rows - 1)
+            return 1;
+    return 0;
+}
+
 /* Looks for the worst sample strictly inside the tile among those of e's triangle. */
 static void terrimpi_scan_triangle(const terrimpi_simplifier *s, int32_t e, terrimpi_spot *best)
 {
@@ -4884,6 +4925,8 @@ static void terrimpi_scan_triangle(const terrimpi_simplifier *s, int32_t e, terr
     memset(&none, 0, sizeof none);
     for (k = 0; k < 3; k++)
         v[k] = s->origin[e + k];
+    if (terrimpi_is_squeezed(s, v))
+        return;
     for (k = 0; k < 3; k++) {
         int32_t p = v[k], q = v[k == 2 ? 0 : k + 1];
         int16_t *side = s->z[p] < s->z[q] ? left : right;
@@ -5680,14 +5723,32 @@ static void terrimpi_emit(const terrimpi_simplifier *s, const float *exact_heigh
     mesh->index_count = mesh->surface_index_count = (uint32_t)indices;
 }
 
-TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, void *scratch,
-                                            size_t scratch_bytes, terrimp_mesh *mesh)
+/* Makes the mesh between its borders: collapses, insertions, moves. On a squeezed tile a collapse
+   can be barred on every side: then the start mesh is made anew, so coarse that it needs none. */
+static void terrimpi_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
+                            const terrimpi_plan *plan, terrimp_mesh_vertex *loop)
+{
+    int32_t budget = (int32_t)plan->budget;
+    int32_t inserted = (int32_t)plan->inner / TERRIMPI_INSERT_SHARE;
+    terrimpi_fit_all(s);
+    terrimpi_collapse_to(s, budget - 2 * inserted);
+    if (s->triangle_count > budget) {
+        terrimpi_start(s, desc, (int32_t)plan->inner, loop);
+        terrimpi_fit_all(s);
+    }
+    terrimpi_refine(s, budget);
+    terrimpi_polish(s);
+}
+
+/* terrimp_simplify, of a tile whose last column and row may be squeezed. */
+static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
+                                        const terrimpi_squeeze *squeeze, void *scratch,
+                                        size_t scratch_bytes, terrimp_mesh *mesh)
 {
     terrimpi_simplifier s;
     terrimpi_plan plan;
     terrimp_result result;
     uint32_t budget, border = 0;
-    int32_t inserted;
     int whole, i;
     if (!desc || !scratch || !mesh)
         return TERRIMP_E_NULL;
@@ -5710,19 +5771,21 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
     terrimpi_lay_out(&s, &plan, scratch);
     s.cols = (int32_t)desc->cols;
     s.rows = (int32_t)desc->rows;
+    s.squeeze = squeeze;
     terrimpi_read_samples(&s, desc->heights);
     whole = terrimpi_start(&s, desc, (int32_t)plan.lattice, mesh->vertices) &&
             s.triangle_count <= (int32_t)budget;
-    if (!whole) {
-        inserted = (int32_t)plan.inner / TERRIMPI_INSERT_SHARE;
-        terrimpi_fit_all(&s);
-        terrimpi_collapse_to(&s, (int32_t)budget - 2 * inserted);
-        terrimpi_refine(&s, (int32_t)budget);
-        terrimpi_polish(&s);
-    }
+    if (!whole)
+        terrimpi_reduce(&s, desc, &plan, mesh->vertices);
     terrimpi_emit(&s, whole ? desc->heights : 0, mesh);
     terrimpi_measure(desc->heights, s.cols, s.rows, mesh);
     return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, void *scratch,
+                                            size_t scratch_bytes, terrimp_mesh *mesh)
+{
+    return terrimpi_simplify(desc, NULL, scratch, scratch_bytes, mesh);
 }
 
 /* --- skirts (Hess 4.2) --- */
