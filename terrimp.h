@@ -1613,7 +1613,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
    between them, front to back; the floor; the ground before them, front to back.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
-              before the first update */
+              before the first update, and after invalidate and touch until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
@@ -8687,6 +8687,7 @@ struct terrimp_view {
     uint32_t frame;             /* updates so far */
     uint32_t unit_count, leaf_count, want_count, job_count, item_count;
     uint32_t next_record;       /* where the search for a free record goes on */
+    int outdated;               /* what this frame would draw has been forgotten */
     int open;                   /* `opened` is a picture of which pieces are missing */
     terrimpi_job opened;
     terrimp_stats stats;
@@ -9048,6 +9049,25 @@ static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_
     return 0;
 }
 
+/* Gives back what a job has taken and not used. */
+static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
+{
+    const terrimpi_record *record = &v->records[job->record];
+    if (record->part_count != job->part_count ||
+        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
+        terrimpi_drop_seats(v, job->parts, job->part_count);
+}
+
+/* The same for all jobs of a frame that is not rendered. */
+static void terrimpi_cancel_jobs(terrimp_view *v)
+{
+    uint32_t i;
+    for (i = 0; i < v->job_count; i++)
+        if (!(v->open && v->opened.record == v->jobs[i].record))
+            terrimpi_cancel_job(v, &v->jobs[i]);
+    v->job_count = 0;
+}
+
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     uint32_t i;
@@ -9059,6 +9079,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
         terrimp_live_atlas_reset(&view->atlases[i]);
     view->job_count = 0;
     view->open = 0;
+    view->outdated = 1;
     return TERRIMP_OK;
 }
 
@@ -9074,6 +9095,8 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
         return TERRIMP_E_RANGE;
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
+    terrimpi_cancel_jobs(view);
+    view->outdated = 1;
     for (i = 0; i < view->desc.max_impostors; i++) {
         terrimpi_site s;
         uint32_t quads, reach;
@@ -9091,16 +9114,15 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 
 /* ---- the ground cut ---- */
 
-/* Lists all chunks in sight at full resolution, front to back. Returns 0 when there are more than
-   max_ground. */
-static int terrimpi_list_chunks(terrimp_view *v)
+/* Lists all chunks in sight at full resolution, front to back, when there is a list. Returns how
+   many there are. */
+static uint32_t terrimpi_list_chunks(terrimp_view *v, terrimp_geomip_draw *list)
 {
     struct {
         terrimpi_site site;
         int mask;
     } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1;
-    v->ground.draw_count = 0;
+    uint32_t depth = 1, count = 0;
     stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
     stack[0].mask = TERRIMP_PLANES_ALL;
     while (depth > 0) {
@@ -9114,13 +9136,13 @@ static int terrimpi_list_chunks(terrimp_view *v)
         if (top.mask == TERRIMP_PLANES_OUTSIDE)
             continue;
         if (top.site.level == 0) {
-            terrimp_geomip_draw *draw = &v->ground.draws[v->ground.draw_count];
-            if (v->ground.draw_count++ == v->desc.max_ground)
-                return 0;
-            memset(draw, 0, sizeof *draw);
-            draw->node = top.site.node;
-            draw->x = top.site.x;
-            draw->z = top.site.z;
+            if (list) {
+                memset(&list[count], 0, sizeof *list);
+                list[count].node = top.site.node;
+                list[count].x = top.site.x;
+                list[count].z = top.site.z;
+            }
+            count++;
             continue;
         }
         for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
@@ -9129,7 +9151,7 @@ static int terrimpi_list_chunks(terrimp_view *v)
             depth++;
         }
     }
-    return 1;
+    return count;
 }
 
 /* Makes the ground cut; where max_ground is too small, at a larger tolerance. */
@@ -9137,8 +9159,9 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
 {
     uint32_t i;
     if (v->desc.mode == TERRIMP_MODE_FULL || v->desc.mode == TERRIMP_MODE_IMPOSTOR) {
-        if (!terrimpi_list_chunks(v))
+        if (terrimpi_list_chunks(v, NULL) > v->desc.max_ground) /* the frame before stays */
             return TERRIMP_E_CAPACITY;
+        v->ground.draw_count = terrimpi_list_chunks(v, v->ground.draws);
     } else {
         terrimp_result result = TERRIMP_E_CAPACITY;
         v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
@@ -9318,7 +9341,7 @@ static float terrimpi_mesh_error(const terrimp_view *v, uint32_t node)
 static float terrimpi_sine_limit(const terrimp_view *v, float error, float closest)
 {
     float sine = TERRIMP_SINF(v->desc.max_angle_rad);
-    return terrimpi_min(sine, v->desc.tolerance_px * closest /
+    return terrimpi_min(sine, v->desc.tolerance_px * terrimpi_max(closest - error, 0.0f) /
                                   terrimpi_max(error * v->pixel_factor, 1e-20f));
 }
 
@@ -9356,16 +9379,19 @@ static float terrimpi_speed(const terrimp_view *v)
     return terrimpi_length(v->motion);
 }
 
-/* How good a picture is from the present eye: its view angle and parallax error. */
-static void terrimpi_judge(const terrimp_view *v, const terrimpi_record *record,
-                           const terrimpi_site *s, float *angle_rad, float *parallax_px)
+/* How good a picture is from the present eye: its view angle and parallax error, and the larger of
+   the two over its limit. */
+static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
+                            const terrimpi_site *s, float *angle_rad, float *parallax_px)
 {
     terrimp_box box;
     terrimpi_site_box(v, s, &box);
     *angle_rad = *parallax_px = 0.0f;
-    terrimp_view_angle(&box, record->eye, v->camera.eye, angle_rad);
-    terrimp_parallax_error(&box, terrimpi_mesh_error(v, s->node), record->eye, v->camera.eye,
+    terrimp_view_angle(&box, captured_eye, v->camera.eye, angle_rad);
+    terrimp_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye, v->camera.eye,
                            v->pixel_factor, parallax_px);
+    return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
+                        *parallax_px / v->desc.tolerance_px);
 }
 
 static float terrimpi_sharpness(const terrimp_view *v, float closest)
@@ -9379,8 +9405,7 @@ static float terrimpi_urgency(const terrimp_view *v, const terrimpi_record *reco
                               const terrimpi_site *s, float closest)
 {
     float angle, parallax, urgency, wanted = terrimpi_sharpness(v, closest);
-    terrimpi_judge(v, record, s, &angle, &parallax);
-    urgency = terrimpi_max(angle / v->desc.max_angle_rad, parallax / v->desc.tolerance_px);
+    urgency = terrimpi_judge(v, record->eye, s, &angle, &parallax);
     urgency = terrimpi_max(urgency, wanted / (record->sharpness * 1.3f));
     urgency = terrimpi_max(urgency, record->sharpness / (wanted * 3.0f));
     return terrimpi_min(urgency, 1e6f);
@@ -9746,15 +9771,6 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
     return 1;
 }
 
-/* Gives back what a job has taken and not used. */
-static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
-{
-    const terrimpi_record *record = &v->records[job->record];
-    if (record->part_count != job->part_count ||
-        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
-        terrimpi_drop_seats(v, job->parts, job->part_count);
-}
-
 /* Takes the cells of a picture that still fit into a number of triangles: one at least. */
 static void terrimpi_cut_piece(const terrimp_view *v, terrimpi_job *job, uint32_t triangles)
 {
@@ -9830,8 +9846,14 @@ static uint32_t terrimpi_fill_queue(terrimp_view *v)
 static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
 {
     const terrimp_view_desc *d = &v->desc;
-    uint32_t i, count = terrimpi_fill_queue(v), put_off = 0, due = 0, texels = 0, triangles = 0;
-    float allowance = terrimpi_max(1.5f * spread, drawn), spent = 0.0f;
+    uint32_t i, count, put_off = 0, due = 0, texels = 0, triangles = 0;
+    float allowance = terrimpi_max(1.5f * spread, drawn), spent = 0.0f, angle, parallax;
+    if (v->open && terrimpi_judge(v, v->opened.captures[0].eye, &v->opened.site, &angle,
+                                  &parallax) >= TERRIMPI_STALE) {
+        terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
+        v->open = 0;
+    }
+    count = terrimpi_fill_queue(v);
     if (v->open) {
         terrimpi_job *job = &v->jobs[v->job_count++];
         v->records[v->opened.record].seen = v->frame;
@@ -9869,6 +9891,12 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
         }
         if (d->max_capture_triangles && triangles + job->triangles > d->max_capture_triangles) {
             terrimpi_cut_piece(v, job, d->max_capture_triangles - triangles);
+            if (triangles > 0 &&
+                triangles + terrimpi_piece_triangles(v, job) > d->max_capture_triangles) {
+                terrimpi_cancel_job(v, job);
+                put_off += is_due ? 1u : 0u;
+                continue;
+            }
             v->opened = *job;
             v->open = job->cell_to < job->cell_count;
         }
@@ -9889,47 +9917,38 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- what is drawn ---- */
 
-/* Whether a record will have a fresh picture when impostors are drawn. */
-static int terrimpi_arriving(const terrimp_view *v, uint32_t record)
+/* The eye of the picture that a record will have when impostors are drawn; NULL: it has none. */
+static const float *terrimpi_picture_eye(const terrimp_view *v, uint32_t record)
 {
     uint32_t i;
     for (i = 0; i < v->job_count; i++)
-        if (v->jobs[i].record == record)
-            return v->jobs[i].cell_to == v->jobs[i].cell_count;
-    return 0;
+        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
+            return v->jobs[i].captures[0].eye;
+    return v->records[record].part_count > 0 ? v->records[record].eye : NULL;
 }
 
-/* Puts a node's impostor on the list of this frame, if it has a picture; once. `fresh` says that no
-   error of an older one is to be noted. */
+/* Puts a node's impostor on the list of this frame, if it has a picture that is good enough; once. */
 static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urgent)
 {
     uint32_t index = v->record_of[node];
     terrimpi_site s;
     terrimpi_record *record;
-    float angle = 0.0f, parallax = 0.0f;
-    int arriving;
+    const float *eye;
+    float angle, parallax;
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
     if (record->listed == v->frame)
         return 1;
-    arriving = terrimpi_arriving(v, index);
     s = terrimpi_site_of(&v->terrain->tree, node);
-    if (!arriving) {
-        if (record->part_count == 0)
-            return 0;
-        terrimpi_judge(v, record, &s, &angle, &parallax);
-        if (terrimpi_max(angle / v->desc.max_angle_rad, parallax / v->desc.tolerance_px) >
-            most_urgent)
-            return 0;
-    }
+    eye = terrimpi_picture_eye(v, index);
+    if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
+        return 0;
     record->listed = record->seen = v->frame;
     v->items[v->item_count].index = index;
     v->items[v->item_count++].is_impostor = 1;
     v->stats.impostors++;
     v->stats.impostors_by_level[s.level]++;
-    v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
-    v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
     return 1;
 }
 
@@ -9986,6 +10005,17 @@ static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, flo
     }
 }
 
+/* Takes back the impostors from an item on: ground is drawn in their place. */
+static void terrimpi_unlist(terrimp_view *v, uint32_t first)
+{
+    while (v->item_count > first) {
+        terrimpi_record *record = &v->records[v->items[--v->item_count].index];
+        record->listed = 0;
+        v->stats.impostors--;
+        v->stats.impostors_by_level[terrimpi_site_of(&v->terrain->tree, record->node).level]--;
+    }
+}
+
 /* Settles what each unit is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_settle(terrimp_view *v)
 {
@@ -9994,13 +10024,15 @@ static void terrimpi_settle(terrimp_view *v)
     v->item_count = 0;
     for (u = 0; u < v->unit_count; u++) {
         const terrimpi_unit *unit = &v->units[u];
+        uint32_t before = v->item_count;
         int covered = unit->want_count > 0, impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
         for (i = 0; i < unit->want_count; i++)
             covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
-        if (!covered)
+        if (!covered) {
+            terrimpi_unlist(v, before);
             terrimpi_show_ground(v, unit,
                                  impostors && unit->closest >= v->desc.fade_end ? -1.0f : 1.0f);
-        else
+        } else
             terrimpi_show_ground(v, unit,
                                  terrimpi_max(0.0f, (v->desc.fade_end - unit->closest) /
                                                         (v->desc.fade_end - v->desc.fade_start)));
@@ -10009,7 +10041,11 @@ static void terrimpi_settle(terrimp_view *v)
         if (v->items[i].is_impostor) {
             terrimpi_site s = terrimpi_site_of(&v->terrain->tree,
                                                v->records[v->items[i].index].node);
+            float angle, parallax;
             terrimp_box box;
+            terrimpi_judge(v, terrimpi_picture_eye(v, v->items[i].index), &s, &angle, &parallax);
+            v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
+            v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
             terrimpi_site_box(v, &s, &box);
             closest = terrimpi_min(closest, terrimp_box_distance(&box, v->camera.eye));
         }
@@ -10135,10 +10171,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         return result;
     }
     view->frame++;
-    for (i = 0; i < view->job_count; i++) /* of a frame that was not rendered */
-        if (!(view->open && view->opened.record == view->jobs[i].record))
-            terrimpi_cancel_job(view, &view->jobs[i]);
-    view->job_count = 0;
+    view->outdated = 0;
+    terrimpi_cancel_jobs(view);
     stats = view->stats;
     memset(&view->stats, 0, sizeof view->stats);
     view->stats.reuse = stats.reuse;
@@ -10302,7 +10336,7 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     uint32_t i;
     if (!view || !callbacks)
         return TERRIMP_E_NULL;
-    if (view->frame == 0)
+    if (view->frame == 0 || view->outdated)
         return TERRIMP_E_STATE;
     if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
