@@ -1215,6 +1215,22 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
 
+/* Frees what costs least so that a rectangle fits, for an atlas that is full or fragmented: of the
+   places where it would border on slots or on free rectangles, the one whose slots have the lowest
+   sum of costs. It does not allocate: alloc will then find room.
+
+   costs      [max_slots] of losing each slot that is in use; one whose cost is negative, infinite
+              or NaN stays. Texels times how likely they are to be made again is a good cost
+   victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
+              only handles were wanting
+   count      out: how many
+   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
+              larger than the atlas or every such place holds a slot that stays: nothing changes
+   Cost       O(slots * (slots + free rectangles)) at worst */
+TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, const float *costs,
+                                                    uint32_t *victims, uint32_t *count);
+
 /* What the atlas holds. Errors: E_NULL; E_STATE before init. Cost: O(free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
                                                     terrimp_live_atlas_stats *stats);
@@ -6949,14 +6965,14 @@ TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terri
 
 /* ---- the live atlas ----
 
-   The free space is kept as all of its maximal rectangles: those that nothing free contains. A
-   rectangle fits somewhere if and only if it fits into one of them, and neighbouring free areas
-   need no merging. One operation makes them all: cutting a rectangle out of a list of them. An
-   allocation cuts the new slot out of the list. When a slot is freed, the maximal rectangles that
-   overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
+   The free space is kept as all of its maximal rectangles, here called holes: those that no other
+   free rectangle contains. A rectangle fits somewhere if and only if it fits into one of them, and
+   neighbouring free areas need no merging. One operation makes them all: cutting a rectangle out of
+   a list of holes. An allocation cuts the new slot out of the list. When a slot is freed, the holes
+   that overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
 
    Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
-   count as larger by it, so that the rest of the code has not to know of it. */
+   count as larger by it, so that the rest of the code need not know of it. */
 
 static int terrimpi_rects_overlap(const terrimp_rect *a, const terrimp_rect *b)
 {
@@ -6999,26 +7015,61 @@ static terrimp_rect terrimpi_rect_beside(const terrimp_rect *rect, const terrimp
     }
 }
 
-/* Removes the rectangles that a flag of width 0 marks, from `begin` on; the order stays. */
-static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t begin)
+/* Whether rectangles overlap or have a piece of an edge or a corner in common. */
+static int terrimpi_rects_touch(const terrimp_rect *a, const terrimp_rect *b)
 {
-    uint32_t i, kept = begin;
+    return a->x <= b->x + b->width && b->x <= a->x + a->width && a->y <= b->y + b->height &&
+           b->y <= a->y + a->height;
+}
+
+/* Moves the holes from `begin` on that touch a rectangle to the end; returns the first of them. */
+static uint32_t terrimpi_holes_part(terrimp_live_atlas *atlas, uint32_t begin,
+                                    const terrimp_rect *rect)
+{
+    uint32_t i, first = begin;
     for (i = begin; i < atlas->hole_count; i++)
+        if (!terrimpi_rects_touch(&atlas->holes[i], rect)) {
+            terrimp_rect swap = atlas->holes[i];
+            atlas->holes[i] = atlas->holes[first];
+            atlas->holes[first++] = swap;
+        }
+    return first;
+}
+
+/* Marks the holes from `first` to `last` that one from `by` on contains: their width becomes 0. */
+static void terrimpi_holes_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
+                                uint32_t by)
+{
+    terrimp_rect *holes = atlas->holes;
+    uint32_t i, k;
+    for (i = first; i < last; i++)
+        for (k = by; k < atlas->hole_count; k++)
+            if (k != i && holes[k].width > 0 && terrimpi_rect_contains(&holes[k], &holes[i])) {
+                holes[i].width = 0;
+                break;
+            }
+}
+
+/* Removes the marked holes from `first` on. */
+static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t first)
+{
+    uint32_t i, kept = first;
+    for (i = first; i < atlas->hole_count; i++)
         if (atlas->holes[i].width > 0)
             atlas->holes[kept++] = atlas->holes[i];
     atlas->hole_count = kept;
 }
 
-/* Cuts a rectangle out of the free ones from `begin` on. Of the pieces, those that are maximal and
-   overlap `window` are kept. A piece for which there is no memory is lost until a slot beside it is
-   freed. */
+/* Cuts a rectangle out of the holes from `begin` on. Of the pieces, those that are maximal and
+   overlap `window` are kept; what contains one of them touches the rectangle as they do. A piece
+   for which there is no memory is lost until a slot beside it is freed. */
 static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const terrimp_rect *taken,
                                const terrimp_rect *window)
 {
     terrimp_rect *holes = atlas->holes;
-    uint32_t i, k, old = atlas->hole_count;
-    int side;
-    for (i = begin; i < old; i++) {
+    uint32_t i, first = terrimpi_holes_part(atlas, begin, taken), old = atlas->hole_count;
+    int side, cut = 0;
+    for (i = first; i < old; i++) {
         if (!terrimpi_rects_overlap(&holes[i], taken))
             continue;
         for (side = 0; side < 4; side++) {
@@ -7028,15 +7079,12 @@ static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const 
                 holes[atlas->hole_count++] = piece;
         }
         holes[i].width = 0;
+        cut = 1;
     }
-    for (i = old; i < atlas->hole_count; i++)
-        for (k = begin; k < atlas->hole_count; k++)
-            if (k != i && holes[k].width > 0 && terrimpi_rect_contains(&holes[k], &holes[i])) {
-                holes[i].width = 0;
-                break;
-            }
-    if (atlas->hole_count > old || old > begin)
-        terrimpi_holes_compact(atlas, begin);
+    if (cut) {
+        terrimpi_holes_mark(atlas, old, atlas->hole_count, first);
+        terrimpi_holes_compact(atlas, first);
+    }
 }
 
 /* The largest number of free rectangles that are kept. */
@@ -7108,24 +7156,66 @@ TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
     return TERRIMP_OK;
 }
 
-/* The free rectangle that fits best: the one that leaves least of one of its sides, then least of
-   the other, then the first. Returns hole_count when there is none. */
-static uint32_t terrimpi_live_best(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
+/* The smallest hole that a size fits into, the first of equals; hole_count for none. */
+static uint32_t terrimpi_live_find(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
 {
-    uint32_t i, best = atlas->hole_count, best_less = 0xffffffffu, best_more = 0xffffffffu;
+    uint32_t i, best = atlas->hole_count, best_area = 0xffffffffu;
+    if (width > atlas->desc.width || height > atlas->desc.height)
+        return best;
+    width += atlas->desc.padding;
+    height += atlas->desc.padding;
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
-        uint32_t x, y, less, more;
-        if (hole->width < width || hole->height < height)
-            continue;
-        x = hole->width - width;
-        y = hole->height - height;
-        less = terrimpi_min_u32(x, y);
-        more = terrimpi_max_u32(x, y);
-        if (less < best_less || (less == best_less && more < best_more)) {
+        if (hole->width >= width && hole->height >= height &&
+            hole->width * hole->height < best_area) {
             best = i;
-            best_less = less;
-            best_more = more;
+            best_area = hole->width * hole->height;
+        }
+    }
+    return best;
+}
+
+/* Length that the ranges [a, a + a_size] and [b, b + b_size] have in common. */
+static uint32_t terrimpi_shared(uint32_t a, uint32_t a_size, uint32_t b, uint32_t b_size)
+{
+    uint32_t low = terrimpi_max_u32(a, b), high = terrimpi_min_u32(a + a_size, b + b_size);
+    return high > low ? high - low : 0u;
+}
+
+/* How much of a place's outline lies at slots or at the rim of the atlas. */
+static uint32_t terrimpi_live_contact(const terrimp_live_atlas *atlas, const terrimp_rect *place)
+{
+    terrimp_rect whole = terrimpi_live_whole(atlas);
+    uint32_t i, right = place->x + place->width, top = place->y + place->height, length = 0;
+    length += (place->x == 0 ? place->height : 0u) + (right == whole.width ? place->height : 0u);
+    length += (place->y == 0 ? place->width : 0u) + (top == whole.height ? place->width : 0u);
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0)
+            continue;
+        if (slot.x == right || slot.x + slot.width == place->x)
+            length += terrimpi_shared(slot.y, slot.height, place->y, place->height);
+        if (slot.y == top || slot.y + slot.height == place->y)
+            length += terrimpi_shared(slot.x, slot.width, place->x, place->width);
+    }
+    return length;
+}
+
+/* The corner of a hole where a padded size touches most: what stays free is in one piece there. */
+static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
+                                         uint32_t width, uint32_t height)
+{
+    terrimp_rect best = terrimpi_rect(hole->x, hole->y, width, height);
+    uint32_t corner, most = 0;
+    for (corner = 0; corner < 4u; corner++) {
+        terrimp_rect place = terrimpi_rect(hole->x, hole->y, width, height);
+        uint32_t length;
+        place.x += corner & 1u ? hole->width - width : 0u;
+        place.y += corner & 2u ? hole->height - height : 0u;
+        length = terrimpi_live_contact(atlas, &place);
+        if (length > most) {
+            most = length;
+            best = place;
         }
     }
     return best;
@@ -7134,7 +7224,7 @@ static uint32_t terrimpi_live_best(const terrimp_live_atlas *atlas, uint32_t wid
 TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, uint32_t *slot)
 {
-    uint32_t best, handle;
+    uint32_t hole, handle;
     terrimp_rect taken, whole;
     if (!atlas || !slot)
         return TERRIMP_E_NULL;
@@ -7142,21 +7232,19 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
         return TERRIMP_E_STATE;
     if (width < 1u || height < 1u)
         return TERRIMP_E_RANGE;
-    best = atlas->hole_count;
+    hole = terrimpi_live_find(atlas, width, height);
     handle = atlas->unused;
-    if (width <= atlas->desc.width && height <= atlas->desc.height)
-        best = terrimpi_live_best(atlas, width + atlas->desc.padding, height + atlas->desc.padding);
-    if (best == atlas->hole_count || handle == atlas->desc.max_slots) {
+    if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
         atlas->failures++;
         return TERRIMP_E_CAPACITY;
     }
+    taken = terrimpi_live_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
+                                 height + atlas->desc.padding);
     atlas->unused = atlas->slots[handle].x;
-    atlas->slots[handle] =
-        terrimpi_rect(atlas->holes[best].x, atlas->holes[best].y, width, height);
+    atlas->slots[handle] = terrimpi_rect(taken.x, taken.y, width, height);
     atlas->slot_end = terrimpi_max_u32(atlas->slot_end, handle + 1u);
     atlas->slot_count++;
     atlas->texels_used += width * height;
-    taken = terrimpi_live_padded(atlas, handle);
     whole = terrimpi_live_whole(atlas);
     terrimpi_holes_cut(atlas, 0, &taken, &whole);
     *slot = handle;
@@ -7175,26 +7263,28 @@ static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint3
     return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
-/* Adds the maximal free rectangles that overlap `freed`, which is no slot any more; they replace
-   those that they contain. */
+/* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
+   contain, which touch it. */
 static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, k, old = atlas->hole_count;
-    if (old == atlas->max_holes)
-        old = --atlas->hole_count;
+    uint32_t i, first, old;
+    int beside;
+    if (atlas->hole_count == atlas->max_holes)
+        atlas->hole_count--;
+    first = terrimpi_holes_part(atlas, 0, freed);
+    old = atlas->hole_count;
     atlas->holes[atlas->hole_count++] = terrimpi_live_whole(atlas);
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect taken = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width > 0)
-            terrimpi_holes_cut(atlas, old, &taken, freed);
-    }
-    for (i = 0; i < old; i++)
-        for (k = old; k < atlas->hole_count; k++)
-            if (terrimpi_rect_contains(&atlas->holes[k], &atlas->holes[i])) {
-                atlas->holes[i].width = 0;
-                break;
-            }
-    terrimpi_holes_compact(atlas, 0);
+    /* What lies beside, above or below cuts most: with it first, the list stays short. */
+    for (beside = 1; beside >= 0; beside--)
+        for (i = 0; i < atlas->slot_end; i++) {
+            terrimp_rect taken = terrimpi_live_padded(atlas, i);
+            if (atlas->slots[i].width > 0 &&
+                beside == (terrimpi_shared(taken.x, taken.width, freed->x, freed->width) > 0 ||
+                           terrimpi_shared(taken.y, taken.height, freed->y, freed->height) > 0))
+                terrimpi_holes_cut(atlas, old, &taken, freed);
+        }
+    terrimpi_holes_mark(atlas, first, old, old);
+    terrimpi_holes_compact(atlas, first);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
@@ -7254,6 +7344,115 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
         best_x = best_y = 0;
     size[0] = best_x;
     size[1] = best_y;
+    return TERRIMP_OK;
+}
+
+/* The cost of all slots that a place overlaps, or `limit` as soon as it is not below that. */
+static float terrimpi_live_cost(const terrimp_live_atlas *atlas, const terrimp_rect *place,
+                                const float *costs, float limit)
+{
+    float cost = 0.0f;
+    uint32_t i;
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect taken = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &taken))
+            continue;
+        cost += costs[i];
+        if (!(costs[i] >= 0.0f && cost < limit))
+            return limit;
+    }
+    return cost;
+}
+
+/* Tries a rectangle at the four corners of another one, shifted into the atlas. */
+static void terrimpi_live_try(const terrimp_live_atlas *atlas, const terrimp_rect *at,
+                              const float *costs, terrimp_rect *best, float *best_cost)
+{
+    terrimp_rect whole = terrimpi_live_whole(atlas);
+    uint32_t corner;
+    for (corner = 0; corner < 4u; corner++) {
+        uint32_t x = corner & 1u ? at->x + at->width : at->x;
+        uint32_t y = corner & 2u ? at->y + at->height : at->y;
+        terrimp_rect place = *best;
+        float cost;
+        place.x = corner & 1u ? x - terrimpi_min_u32(x, place.width) : x;
+        place.y = corner & 2u ? y - terrimpi_min_u32(y, place.height) : y;
+        place.x = terrimpi_min_u32(place.x, whole.width - place.width);
+        place.y = terrimpi_min_u32(place.y, whole.height - place.height);
+        cost = terrimpi_live_cost(atlas, &place, costs, *best_cost);
+        if (cost < *best_cost) {
+            *best_cost = cost;
+            *best = place;
+        }
+    }
+}
+
+/* The place of a size, at a corner of a hole or of a slot, whose slots cost least. Returns 0 when
+   all such places hold a slot that stays. */
+static int terrimpi_live_cheapest(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
+                                  const float *costs, terrimp_rect *place)
+{
+    const float none = 3e38f;
+    float cost = none;
+    uint32_t i;
+    *place = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
+    for (i = 0; i < atlas->hole_count; i++)
+        terrimpi_live_try(atlas, &atlas->holes[i], costs, place, &cost);
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width > 0)
+            terrimpi_live_try(atlas, &slot, costs, place, &cost);
+    }
+    return cost < none;
+}
+
+/* The same for a mere handle: the place of the slot that costs least. */
+static int terrimpi_live_cheapest_slot(const terrimp_live_atlas *atlas, const float *costs,
+                                       terrimp_rect *place)
+{
+    float cost = 3e38f;
+    int found = 0;
+    uint32_t i;
+    for (i = 0; i < atlas->slot_end; i++)
+        if (atlas->slots[i].width > 0 && costs[i] >= 0.0f && costs[i] < cost) {
+            cost = costs[i];
+            *place = terrimpi_live_padded(atlas, i);
+            found = 1;
+        }
+    return found;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, const float *costs,
+                                                    uint32_t *victims, uint32_t *count)
+{
+    terrimp_rect place;
+    uint32_t i, freed = 0;
+    int fits;
+    if (!atlas || !costs || !victims || !count)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    if (width < 1u || height < 1u)
+        return TERRIMP_E_RANGE;
+    if (width > atlas->desc.width || height > atlas->desc.height)
+        return TERRIMP_E_CAPACITY;
+    fits = terrimpi_live_find(atlas, width, height) < atlas->hole_count;
+    if (fits && atlas->unused < atlas->desc.max_slots) {
+        *count = 0;
+        return TERRIMP_OK;
+    }
+    if (!(fits ? terrimpi_live_cheapest_slot(atlas, costs, &place)
+               : terrimpi_live_cheapest(atlas, width, height, costs, &place)))
+        return TERRIMP_E_CAPACITY;
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(&place, &slot))
+            continue;
+        terrimp_live_atlas_free(atlas, i);
+        victims[freed++] = i;
+    }
+    *count = freed;
     return TERRIMP_OK;
 }
 
