@@ -1473,9 +1473,22 @@ TERRIMP_API const char *terrimp_result_text(int result)
     }
 }
 
+/* Rounds what a machine may hold with more precision or range than a float has, as the x87 does:
+   for values that are compared with what another place computes anew. */
+static float terrimpi_float(float value)
+{
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0
+    volatile float rounded = value;
+    return rounded;
+#else
+    return value;
+#endif
+}
+
 static int terrimpi_finite(float value)
 {
-    return value - value == 0.0f;
+    float rounded = terrimpi_float(value);
+    return rounded - rounded == 0.0f;
 }
 
 static int terrimpi_finite3(const float value[3])
@@ -1611,7 +1624,7 @@ static size_t terrimpi_sample_bytes(int format)
    agree on the rounded value. */
 static float terrimpi_line(float origin, float spacing, uint32_t i)
 {
-    return origin + (float)i * spacing;
+    return terrimpi_float(origin + (float)i * spacing);
 }
 
 /* Checks one axis: 2^-23 is the step of a float relative to its value. */
@@ -1716,7 +1729,7 @@ static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
 {
-    return field->height_offset + field->height_scale * raw;
+    return terrimpi_float(field->height_offset + field->height_scale * raw);
 }
 
 /* The world height of sample (x, z); a void gives the height of its no-data value. */
@@ -4536,7 +4549,7 @@ static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring
 static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
 {
     terrimpi_ring ring;
-    float error, dx, dz, length;
+    float error, dx = 0.0f, dz = 0.0f, length;
     int i;
     terrimpi_find_ring(s, v, &ring);
     error = TERRIMPI_GAIN * terrimpi_aim(s, v, &ring, &dx, &dz);
@@ -7081,7 +7094,7 @@ static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t 
 }
 
 /* Pattern 0 is the whole chunk; then come, for each strip width but the whole, the strips of the
-   eight neighbours. Returns where pattern `wanted` stands, or with UINT32_MAX the end of all. */
+   eight neighbours. Returns where pattern `wanted` stands, or with 0xffffffff the end of all. */
 static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
@@ -7150,7 +7163,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->level_count = terrain->level_count;
     info->node_count = terrain->node_count;
     info->ground_vertex_count = (quads + 1u) * (quads + 1u);
-    info->ground_index_count = terrimpi_find_pattern(quads, UINT32_MAX).first_index;
+    info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
     info->mesh_vertex_count = terrain->mesh_vertex_count + terrimpi_floor_vertices(terrain);
     info->mesh_index_count = terrain->mesh_index_count + terrimpi_floor_indices(terrain);
     info->mesh_triangle_count = terrain->mesh_triangle_count;
@@ -7167,7 +7180,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     if (!terrain->built)
         return TERRIMP_E_STATE;
     quads = terrain->desc.chunk_quads;
-    if (capacity < terrimpi_find_pattern(quads, UINT32_MAX).first_index)
+    if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
         return TERRIMP_E_CAPACITY;
     patterns = 1u + terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
     for (i = 0; i < patterns; i++) {
