@@ -1716,9 +1716,22 @@ TERRIMP_API const char *terrimp_result_text(int result)
     }
 }
 
+/* Rounds what a machine may hold with more precision or range than a float has, as the x87 does:
+   for values that are compared with what another place computes anew. */
+static float terrimpi_float(float value)
+{
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0
+    volatile float rounded = value;
+    return rounded;
+#else
+    return value;
+#endif
+}
+
 static int terrimpi_finite(float value)
 {
-    return value - value == 0.0f;
+    float rounded = terrimpi_float(value);
+    return rounded - rounded == 0.0f;
 }
 
 static int terrimpi_finite3(const float value[3])
@@ -1854,7 +1867,7 @@ static size_t terrimpi_sample_bytes(int format)
    agree on the rounded value. */
 static float terrimpi_line(float origin, float spacing, uint32_t i)
 {
-    return origin + (float)i * spacing;
+    return terrimpi_float(origin + (float)i * spacing);
 }
 
 /* Checks one axis: 2^-23 is the step of a float relative to its value. */
@@ -1959,7 +1972,7 @@ static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
 {
-    return field->height_offset + field->height_scale * raw;
+    return terrimpi_float(field->height_offset + field->height_scale * raw);
 }
 
 /* The world height of sample (x, z); a void gives the height of its no-data value. */
@@ -4809,7 +4822,7 @@ static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring
 static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
 {
     terrimpi_ring ring;
-    float error, dx, dz, length;
+    float error, dx = 0.0f, dz = 0.0f, length;
     int i;
     terrimpi_find_ring(s, v, &ring);
     error = TERRIMPI_GAIN * terrimpi_aim(s, v, &ring, &dx, &dz);
@@ -7610,7 +7623,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
            TERRIMPI_FLOOR_QUADS)
         t->floor_level++;
     (void)terrimpi_mul(t->tree.node_count + 3u, t->index_stride * sizeof(float), &ok);
-    return ok && t->tree.node_count < UINT32_MAX / t->index_stride - 3u;
+    return ok && t->tree.node_count < 0xffffffffu / t->index_stride - 3u;
 }
 
 /* The one description of what is built: sets the arrays when there is a base. Returns the bytes, 0
@@ -7780,7 +7793,7 @@ static void terrimpi_make_facets(const terrimpi_patch *p, const terrimp_mesh *me
     for (i = 0; i < mesh->surface_index_count; i += 3u, facets++) {
         const uint16_t *corner = mesh->indices + i;
         memset(facets, 0, sizeof *facets);
-        facets->low = UINT32_MAX;
+        facets->low = 0xffffffffu;
         for (k = 0; k < 3u; k++)
             terrimpi_add_side(p, mesh->vertices + corner[k],
                               mesh->vertices + corner[k == 2u ? 0 : k + 1u], facets);
@@ -8447,7 +8460,7 @@ static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t 
 
 /* Pattern 0 is the whole node, as geomip pattern 0; then come, for each strip width but the whole,
    the strips of the eight neighbours, behind all geomip patterns. Returns where pattern `wanted`
-   stands, or with UINT32_MAX the end of all. */
+   stands, or with 0xffffffffu the end of all. */
 static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
@@ -8526,7 +8539,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->level_count = tree->level_count;
     info->node_count = tree->node_count;
     info->ground_vertex_count = (quads + 1u) * (quads + 1u);
-    info->ground_index_count = terrimpi_find_pattern(quads, UINT32_MAX).first_index;
+    info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
     info->mesh_vertex_count = tree->node_count * terrain->vertex_stride +
@@ -8547,7 +8560,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     if (!terrain->built)
         return TERRIMP_E_STATE;
     quads = terrain->desc.chunk_quads;
-    if (capacity < terrimpi_find_pattern(quads, UINT32_MAX).first_index)
+    if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
         return TERRIMP_E_CAPACITY;
     terrimp_pattern_fill(quads, TERRIMP_FORM_LIST, indices, capacity);
     strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
@@ -8797,7 +8810,7 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 #define TERRIMPI_MARGIN 2u /* texels around the fitted picture in its slot */
 #define TERRIMPI_SMALLEST_PICTURE 8u
 #define TERRIMPI_NO_RECORD 0xffffu
-#define TERRIMPI_NO_LEAF UINT32_MAX
+#define TERRIMPI_NO_LEAF 0xffffffffu
 #define TERRIMPI_STALE 2.0f       /* error over tolerance from which a picture is not drawn */
 #define TERRIMPI_EARLY 0.8f       /* ... from which it may be renewed before it is due */
 #define TERRIMPI_AHEAD 0.6f       /* ... that a new picture starts with: its eye lies ahead */
