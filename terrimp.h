@@ -1450,9 +1450,9 @@ typedef enum terrimp_mode {
 typedef struct terrimp_costs {
     float draw;        /* one draw call [Limits: >= 0] [Default 0 -> 40] */
     float triangle;    /* one triangle with its share of vertices [Limits: >= 0] [Default 0 -> 1] */
-    float ground_px;   /* to shade a pixel of ground [Limits: >= 0] [Default 0 -> 0.08] */
-    float impostor_px; /* to shade a pixel of an impostor [Limits: >= 0] [Default 0 -> 0.08] */
-    float capture;     /* to begin and end a capture [Limits: >= 0] [Default 0 -> 1000] */
+    float ground_px;   /* to shade a pixel of ground [Limits: >= 0] [Default 0 -> 0.25] */
+    float impostor_px; /* to shade a pixel of an impostor [Limits: >= 0] [Default 0 -> 0.25] */
+    float capture;     /* to begin and end a capture [Limits: >= 0] [Default 0 -> 1400] */
 } terrimp_costs;
 
 /* The settings of a view. */
@@ -8819,7 +8819,8 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
-#define TERRIMPI_SPLIT_GAIN 0.7f  /* ... is split when its smears fall to this at most */
+#define TERRIMPI_SPLIT_SMEAR 4.0f /* ... is split when its smears exceed the tolerance by this */
+#define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
 
 /* A node and where it stands. */
 typedef struct terrimpi_site {
@@ -8955,9 +8956,9 @@ static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)
         return TERRIMP_E_RANGE;
     terrimpi_default(&c->draw, 40.0f);
     terrimpi_default(&c->triangle, 1.0f);
-    terrimpi_default(&c->ground_px, 0.08f);
-    terrimpi_default(&c->impostor_px, 0.08f);
-    terrimpi_default(&c->capture, 1000.0f);
+    terrimpi_default(&c->ground_px, 0.25f);
+    terrimpi_default(&c->impostor_px, 0.25f);
+    terrimpi_default(&c->capture, 1400.0f);
     return TERRIMP_OK;
 }
 
@@ -9824,6 +9825,13 @@ static uint32_t terrimpi_piece_triangles(const terrimp_view *v, const terrimpi_j
     return triangles;
 }
 
+/* The sine of the angle at which a capture looks down on the ground, not to be taken too small. */
+static float terrimpi_sine_of_view(const terrimp_capture *capture, const terrimp_box *box)
+{
+    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
+    return terrimpi_max(drop / capture->z_far, 0.1f);
+}
+
 /* The strip of neighbours that a capture needs, as a number of terrimpi_strip_quads: the texels
    that bilinear reads and the parallax can reach, in world units. At a grazing angle a texel is as
    many times longer on the ground as the sine of that angle is smaller. */
@@ -9836,8 +9844,7 @@ static uint32_t terrimpi_strip_width(const terrimp_view *v, const terrimpi_job *
     float texels = 1.5f + v->desc.tolerance_px * v->desc.texels_per_px;
     float per_texel_x = (capture->tan_right - capture->tan_left) / (float)job->rects[0].width;
     float per_texel_y = (capture->tan_up - capture->tan_down) / (float)job->rects[0].height;
-    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    float sine = terrimpi_max(drop / capture->z_far, 0.1f);
+    float sine = terrimpi_sine_of_view(capture, box);
     float reach = texels * capture->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
     float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << job->source);
     while (width < strips && (float)terrimpi_strip_quads(quads, width) * step < reach)
@@ -9929,7 +9936,8 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
                           3u * mesh->triangle_count, &split);
     sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
     *distance = split.distance;
-    return split.gap * sine * v->pixel_factor > v->desc.tolerance_px &&
+    return split.gap * sine * v->pixel_factor >
+               TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
            split.gap_left < split.gap * TERRIMPI_SPLIT_GAIN;
 }
 
@@ -9968,8 +9976,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
     *back = *front;
-    if (job->part_count == 2u) { /* the parts overlap by what the mesh may be off */
-        float overlap = 2.0f * terrimpi_mesh_error(v, want->site.node);
+    if (job->part_count == 2u) { /* the parts overlap by what the mesh may be off along a ray */
+        float overlap = 2.0f * terrimpi_mesh_error(v, want->site.node) /
+                        terrimpi_sine_of_view(front, &box);
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
     }
