@@ -44,7 +44,7 @@
        >>geomipmap    levels, errors, crack-free index patterns, selection, morphing
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
-       >>atlas        first-fit decreasing height packing; two atlases in turn
+       >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
        >>terrain      the quadtree, building, what the host's buffers hold
        >>view         the per-frame decision, the schedule, the draw commands
    The implementation has the same sections in the same order, tagged impl-. Each uses only
@@ -1222,11 +1222,11 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
    costs      [max_slots] of losing each slot that is in use; one whose cost is negative, infinite
               or NaN stays. Texels times how likely they are to be made again is a good cost
    victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
-              only handles were wanting
+              only handles were wanting. Scratch: it changes on E_CAPACITY too
    count      out: how many
    Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
               larger than the atlas or every such place holds a slot that stays: nothing changes
-   Cost       O(slots * (slots + free rectangles)) at worst */
+   Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count);
@@ -7360,87 +7360,143 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
     return TERRIMP_OK;
 }
 
-/* The cost of all slots that a place overlaps, or `limit` as soon as it is not below that. */
-static float terrimpi_live_cost(const terrimp_live_atlas *atlas, const terrimp_rect *place,
-                                const float *costs, float limit)
+/* The search for the place whose slots cost least. */
+typedef struct terrimpi_live_search {
+    const terrimp_live_atlas *atlas;
+    const float *costs;
+    uint32_t *by_x;    /* the slots in use from left to right */
+    uint32_t count;
+    uint32_t widest;   /* of these, with padding */
+    terrimp_rect best; /* its size is the one that is searched for */
+    float best_cost;
+} terrimpi_live_search;
+
+/* Lists the slots in use from left to right (Shell's sort: no recursion, no extra memory). */
+static void terrimpi_live_list(terrimpi_live_search *s)
+{
+    const terrimp_rect *slots = s->atlas->slots;
+    uint32_t i, k, gap;
+    s->count = s->widest = 0;
+    for (i = 0; i < s->atlas->slot_end; i++)
+        if (slots[i].width > 0) {
+            s->by_x[s->count++] = i;
+            s->widest = terrimpi_max_u32(s->widest, slots[i].width + s->atlas->desc.padding);
+        }
+    for (gap = 1; gap < s->count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < s->count; i++) {
+            uint32_t moved = s->by_x[i];
+            for (k = i; k >= gap && slots[s->by_x[k - gap]].x > slots[moved].x; k -= gap)
+                s->by_x[k] = s->by_x[k - gap];
+            s->by_x[k] = moved;
+        }
+}
+
+/* The first in the list of slots that may reach over a column. */
+static uint32_t terrimpi_live_reaching(const terrimpi_live_search *s, uint32_t x)
+{
+    uint32_t low = 0, high = s->count;
+    while (low < high) {
+        uint32_t middle = (low + high) / 2u;
+        if (s->atlas->slots[s->by_x[middle]].x + s->widest <= x)
+            low = middle + 1u;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Takes a place if its slots cost less than those of the best one so far. */
+static void terrimpi_live_weigh(terrimpi_live_search *s, const terrimp_rect *place)
 {
     float cost = 0.0f;
     uint32_t i;
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect taken = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &taken))
+    for (i = terrimpi_live_reaching(s, place->x); i < s->count; i++) {
+        uint32_t slot = s->by_x[i];
+        terrimp_rect taken = terrimpi_live_padded(s->atlas, slot);
+        if (taken.x >= place->x + place->width)
+            break;
+        if (!terrimpi_rects_overlap(place, &taken))
             continue;
-        cost += costs[i];
-        if (!(costs[i] >= 0.0f && cost < limit))
-            return limit;
+        cost += s->costs[slot];
+        if (!(s->costs[slot] >= 0.0f && cost < s->best_cost))
+            return;
     }
-    return cost;
+    if (cost < s->best_cost) {
+        s->best_cost = cost;
+        s->best = *place;
+    }
 }
 
-/* Tries a rectangle at the four corners of another one, shifted into the atlas. */
-static void terrimpi_live_try(const terrimp_live_atlas *atlas, const terrimp_rect *at,
-                              const float *costs, terrimp_rect *best, float *best_cost)
+/* Tries a place at the four corners of a rectangle, shifted into the atlas. */
+static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
 {
-    terrimp_rect whole = terrimpi_live_whole(atlas);
-    uint32_t corner;
+    terrimp_rect whole = terrimpi_live_whole(s->atlas);
+    uint32_t corner, right = at->x + at->width, top = at->y + at->height;
     for (corner = 0; corner < 4u; corner++) {
-        uint32_t x = corner & 1u ? at->x + at->width : at->x;
-        uint32_t y = corner & 2u ? at->y + at->height : at->y;
-        terrimp_rect place = *best;
-        float cost;
-        place.x = corner & 1u ? x - terrimpi_min_u32(x, place.width) : x;
-        place.y = corner & 2u ? y - terrimpi_min_u32(y, place.height) : y;
+        terrimp_rect place = s->best;
+        place.x = corner & 1u ? right - terrimpi_min_u32(right, place.width) : at->x;
+        place.y = corner & 2u ? top - terrimpi_min_u32(top, place.height) : at->y;
         place.x = terrimpi_min_u32(place.x, whole.width - place.width);
         place.y = terrimpi_min_u32(place.y, whole.height - place.height);
-        cost = terrimpi_live_cost(atlas, &place, costs, *best_cost);
-        if (cost < *best_cost) {
-            *best_cost = cost;
-            *best = place;
-        }
+        terrimpi_live_weigh(s, &place);
     }
 }
 
-/* The place of a size, at a corner of a hole or of a slot, whose slots cost least. Returns 0 when
-   all such places hold a slot that stays. */
-static int terrimpi_live_cheapest(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
-                                  const float *costs, terrimp_rect *place)
+/* Searches at the corners of holes and slots, where there are very many at every so manieth.
+   Returns 0 when all such places hold a slot that stays. */
+static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
 {
     const float none = 3e38f;
-    float cost = none;
-    uint32_t i;
-    *place = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
-    for (i = 0; i < atlas->hole_count; i++)
-        terrimpi_live_try(atlas, &atlas->holes[i], costs, place, &cost);
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width > 0)
-            terrimpi_live_try(atlas, &slot, costs, place, &cost);
+    const terrimp_live_atlas *atlas = s->atlas;
+    uint32_t i, step = 1u + (atlas->hole_count + atlas->slot_count) / 512u;
+    s->best_cost = none;
+    s->best = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
+    terrimpi_live_list(s);
+    for (i = 0; i < atlas->hole_count; i += step)
+        terrimpi_live_try(s, &atlas->holes[i]);
+    for (i = 0; i < s->count; i += step) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, s->by_x[i]);
+        terrimpi_live_try(s, &slot);
     }
-    return cost < none;
+    return s->best_cost < none;
 }
 
-/* The same for a mere handle: the place of the slot that costs least. */
-static int terrimpi_live_cheapest_slot(const terrimp_live_atlas *atlas, const float *costs,
-                                       terrimp_rect *place)
+/* The same for a mere handle: the slot that costs least. */
+static int terrimpi_live_cheapest_slot(terrimpi_live_search *s)
 {
-    float cost = 3e38f;
-    int found = 0;
+    const float none = 3e38f;
     uint32_t i;
-    for (i = 0; i < atlas->slot_end; i++)
-        if (atlas->slots[i].width > 0 && costs[i] >= 0.0f && costs[i] < cost) {
-            cost = costs[i];
-            *place = terrimpi_live_padded(atlas, i);
-            found = 1;
+    s->best_cost = none;
+    for (i = 0; i < s->atlas->slot_end; i++)
+        if (s->atlas->slots[i].width > 0 && s->costs[i] >= 0.0f && s->costs[i] < s->best_cost) {
+            s->best_cost = s->costs[i];
+            s->best = terrimpi_live_padded(s->atlas, i);
         }
-    return found;
+    return s->best_cost < none;
+}
+
+/* Frees the slots that overlap a place; returns how many. */
+static uint32_t terrimpi_live_clear(terrimp_live_atlas *atlas, const terrimp_rect *place,
+                                    uint32_t *victims)
+{
+    uint32_t i, count = 0;
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &slot))
+            continue;
+        terrimp_live_atlas_free(atlas, i);
+        victims[count++] = i;
+    }
+    return count;
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count)
 {
-    terrimp_rect place;
-    uint32_t i, freed = 0;
+    terrimpi_live_search search;
     int fits;
     if (!atlas || !costs || !victims || !count)
         return TERRIMP_E_NULL;
@@ -7455,17 +7511,13 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
         *count = 0;
         return TERRIMP_OK;
     }
-    if (!(fits ? terrimpi_live_cheapest_slot(atlas, costs, &place)
-               : terrimpi_live_cheapest(atlas, width, height, costs, &place)))
+    search.atlas = atlas;
+    search.costs = costs;
+    search.by_x = victims;
+    if (!(fits ? terrimpi_live_cheapest_slot(&search)
+               : terrimpi_live_cheapest(&search, width, height)))
         return TERRIMP_E_CAPACITY;
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(&place, &slot))
-            continue;
-        terrimp_live_atlas_free(atlas, i);
-        victims[freed++] = i;
-    }
-    *count = freed;
+    *count = terrimpi_live_clear(atlas, &search.best, victims);
     return TERRIMP_OK;
 }
 
