@@ -216,6 +216,8 @@ static void flight_begin_capture(void *user, const terrimp_capture_command *comm
     if (command->clear) {
         overwrite(f, f->latest, command);
         overwrite(f, f->opened, command);
+        for (i = 0; i < f->l->info.node_count && !command->complete; i++)
+            f->opened[i].alive = 0; /* one picture at a time is made in pieces */
         memset(picture, 0, sizeof *picture);
         picture->alive = 1;
         picture->begun = f->frame;
@@ -399,7 +401,8 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     step = mesh.vertex_count / 5u + 1u;
     for (i = 0; i < mesh.vertex_count; i += step) {
-        double p[3], seen[4], clip[4], out[4], x, y, rim = 0.02;
+        double p[3], seen[4], clip[4], out[4], x, y;
+        double rim = 0.01 + 3e-5 * (double)(capture->slot.width + capture->slot.height);
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
         oracle_transform(capture->view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
@@ -627,7 +630,6 @@ static void check_pictures_are_good(const flight *f)
     uint32_t i, node, in_pieces = 0;
     for (node = 0; node < f->l->info.node_count; node++)
         in_pieces += f->opened[node].alive ? 1u : 0u;
-    CHECK(in_pieces <= 1u);
     if (f->stats.shortfall > 0.0f || in_pieces)
         most = 2.0;
     if (f->stats.waiting > 0)
@@ -639,10 +641,8 @@ static void check_pictures_are_good(const flight *f)
             continue;
         error = picture_error(f, f->items[i].node, &angle, &parallax);
         CHECK(error <= (picture->begun == f->frame ? 1.0 : most) * 1.002 + 1e-5);
-        if (picture->made != f->frame) {
-            worst_angle = fmax(worst_angle, angle);
-            worst_parallax = fmax(worst_parallax, parallax);
-        }
+        worst_angle = fmax(worst_angle, angle);
+        worst_parallax = fmax(worst_parallax, parallax);
     }
     CHECK(fabs((double)f->stats.worst_angle_rad - worst_angle) <= 2e-3 * worst_angle + 1e-5);
     CHECK(fabs((double)f->stats.worst_parallax_px - worst_parallax) <= 2e-3 * worst_parallax + 1e-5);
@@ -727,14 +727,24 @@ typedef struct pilot {
     int frame;
 } pilot;
 
+/* Looks at a place of the terrain, or one time in four anywhere. */
+static void pilot_turn(pilot *p, const terrimp_box *box)
+{
+    int k;
+    if (random_range(0, 3) == 0)
+        random_vector(1.0f, 1.0f, p->camera.forward);
+    else
+        for (k = 0; k < 3; k++)
+            p->camera.forward[k] = random_float(box->min[k], box->max[k]) - p->camera.eye[k];
+}
+
 static void pilot_teleport(pilot *p, const terrimp_box *box)
 {
     int k;
     for (k = 0; k < 3; k++)
         p->camera.eye[k] = random_float(box->min[k], box->max[k]);
     p->camera.eye[1] += random_float(-20.0f, 150.0f);
-    random_vector(1.0f, 1.0f, p->camera.forward);
-    p->camera.forward[1] *= 0.5f;
+    pilot_turn(p, box);
 }
 
 /* The camera of the next frame of a flight that does everything a host might do. */
@@ -750,14 +760,14 @@ static const terrimp_camera *pilot_next(pilot *p, const land *l)
         p->camera.forward[0] = p->camera.forward[2] = 0.0f;
         p->camera.forward[1] = -1.0f;
     } else if (what == 2) { /* turn */
-        random_vector(1.0f, 1.0f, p->camera.forward);
+        pilot_turn(p, box);
     } else if (what == 3 && random_range(0, 1) == 0) { /* far away, looking back */
         random_vector(3.0f * size, 30.0f * size, p->camera.eye);
         for (k = 0; k < 3; k++)
             p->camera.forward[k] = 0.5f * (box->min[k] + box->max[k]) - p->camera.eye[k];
     } else if (what == 4 && random_range(0, 1) == 0) { /* below the ground */
         p->camera.eye[1] = box->min[1] - random_float(0.0f, 50.0f);
-        random_vector(1.0f, 1.0f, p->camera.forward);
+        pilot_turn(p, box);
     } else if (what == 5) { /* stop */
         memset(p->velocity, 0, sizeof p->velocity);
     } else if (what == 6) { /* another way */
@@ -871,6 +881,18 @@ static void random_land(land *l)
     }
 }
 
+/* Settings with which AUTO draws many impostors of small nodes: pictures are cheap. */
+static terrimp_view_desc eager_settings(void)
+{
+    terrimp_view_desc d;
+    memset(&d, 0, sizeof d);
+    d.mode = TERRIMP_MODE_AUTO;
+    d.ground_tolerance_px = 0.1f;
+    d.costs.capture = 20.0f;
+    d.costs.triangle = 4.0f;
+    return d;
+}
+
 /* One setting of two, of random size, is not the default. */
 static float maybe(float low, float high)
 {
@@ -906,8 +928,9 @@ static terrimp_view_desc random_settings(int mode)
     d.max_capture_triangles = maybe_u32(50, 3000);
     d.no_lookahead = (int)random_range(0, 1);
     d.no_spreading = (int)random_range(0, 1);
-    d.costs.capture = maybe(0.1f, 1e5f);
+    d.costs.capture = random_magnitude(0.1f, 1e4f);
     d.costs.draw = maybe(1.0f, 1000.0f);
+    d.costs.triangle = maybe(0.5f, 20.0f);
     if (mode == TERRIMP_MODE_GEOMIP || mode == TERRIMP_MODE_AUTO)
         d.max_ground = random_range(0, 2) ? 0 : random_range(20, 100);
     return d;
@@ -974,8 +997,12 @@ static void flights_keep_every_law(void)
     memset(&d, 0, sizeof d);
     if (land_build(&l)) {
         (void)fly_and_check(&l, &d, 100, f);
-        CHECK(f->total_captures > 50 && f->total_impostors > 200 && f->total_high > 100);
+        CHECK(f->total_captures > 20 && f->total_impostors > 40 && f->total_ground > 200);
+        d = eager_settings();
+        (void)fly_and_check(&l, &d, 101, f);
+        CHECK(f->total_captures > 100 && f->total_impostors > 500 && f->total_high > 200);
         CHECK(f->total_ground > 200 && f->total_fading > 20);
+        memset(&d, 0, sizeof d);
         d.mode = TERRIMP_MODE_IMPOSTOR;
         (void)fly_and_check(&l, &d, 101, f);
         CHECK(f->total_captures > 100 && f->total_impostors > 1000 && f->total_high == 0);
@@ -1039,21 +1066,21 @@ static void flights_with_random_settings_keep_every_law(void)
 static void flights_with_pictures_in_pieces_keep_every_law(void)
 {
     static const uint32_t limits[4] = {1, 200, 700, 3000};
+    uint32_t pieces = 0, made = 0;
     int run;
     land l;
     terrimp_view_desc d;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
-    d.costs.capture = 0.01f;
-    d.ground_tolerance_px = 0.05f;
+    d = eager_settings();
     if (land_build(&l))
         for (run = 0; run < 8; run++) {
             d.max_capture_triangles = limits[run / 2];
             d.mode = run % 2 ? TERRIMP_MODE_AUTO : TERRIMP_MODE_IMPOSTOR;
             (void)fly_and_check(&l, &d, 50, &flight_room);
-            CHECK(flight_room.total_pieces > 10);
-            CHECK(flight_room.total_captures > 2);
+            pieces += flight_room.total_pieces;
+            made += flight_room.total_captures;
         }
+    CHECK(pieces > 100 && made > 100);
     land_free(&l);
 }
 
@@ -1061,46 +1088,44 @@ static void flights_with_few_captures_a_frame_keep_every_law(void)
 {
     land l;
     terrimp_view_desc d;
+    int mode;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
-    if (land_build(&l)) {
-        for (d.mode = TERRIMP_MODE_IMPOSTOR; d.mode <= TERRIMP_MODE_AUTO; d.mode++) {
+    d = eager_settings();
+    if (land_build(&l))
+        for (mode = TERRIMP_MODE_IMPOSTOR; mode <= TERRIMP_MODE_AUTO; mode++) {
+            d.mode = mode;
+            d.max_capture_texels = 0;
             d.max_captures = 1;
             (void)fly_and_check(&l, &d, 60, &flight_room);
             CHECK(flight_room.total_waiting > 20);
             d.max_captures = 7;
             (void)fly_and_check(&l, &d, 60, &flight_room);
+            CHECK(flight_room.total_waiting > 20);
+            d.max_captures = 0;
+            d.max_capture_texels = 2000;
+            (void)fly_and_check(&l, &d, 60, &flight_room);
+            CHECK(flight_room.total_waiting > 20);
         }
-        d.max_captures = 0;
-        d.max_capture_texels = 2000;
-        (void)fly_and_check(&l, &d, 60, &flight_room);
-    }
     land_free(&l);
 }
 
 static void flights_with_little_room_keep_every_law(void)
 {
+    static const uint32_t rooms[][3] = {/* records, atlas size, atlases */
+        {0, 64, 1}, {0, 100, 3}, {1, 0, 0}, {11, 0, 0}};
     land l;
     terrimp_view_desc d;
+    uint32_t run;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
+    d = eager_settings();
     if (land_build(&l))
-        for (d.mode = TERRIMP_MODE_IMPOSTOR; d.mode <= TERRIMP_MODE_AUTO; d.mode++) {
-            d.max_impostors = d.atlas_count = 0;
-            d.atlas_size = 64;
+        for (run = 0; run < 8; run++) {
+            d.mode = run / 4u ? TERRIMP_MODE_AUTO : TERRIMP_MODE_IMPOSTOR;
+            d.max_impostors = rooms[run % 4u][0];
+            d.atlas_size = rooms[run % 4u][1];
+            d.atlas_count = rooms[run % 4u][2];
             (void)fly_and_check(&l, &d, 50, &flight_room);
-            CHECK(flight_room.total_captures > 10);
-            d.atlas_size = 100;
-            d.atlas_count = 3;
-            (void)fly_and_check(&l, &d, 50, &flight_room);
-            CHECK(flight_room.total_captures > 20);
-            d.max_impostors = 1;
-            d.atlas_size = 0;
-            (void)fly_and_check(&l, &d, 50, &flight_room);
-            CHECK(flight_room.total_captures > 3);
-            d.max_impostors = 11;
-            (void)fly_and_check(&l, &d, 50, &flight_room);
-            CHECK(flight_room.total_captures > 10);
+            CHECK(flight_room.total_captures > 3 && flight_room.total_impostors > 3);
         }
     land_free(&l);
 }
@@ -1133,7 +1158,7 @@ static void a_resting_eye_captures_nothing(void)
     land l;
     int run, frame;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
+    d = eager_settings();
     for (run = 0; run < 10 && (l.terrain || land_build(&l)); run++) {
         uint32_t hash = 0;
         d.mode = run < 5 ? TERRIMP_MODE_IMPOSTOR : TERRIMP_MODE_AUTO;
@@ -1172,7 +1197,7 @@ static void nothing_waits_after_some_frames_of_rest(void)
     pilot p;
     int run, move;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
+    d = eager_settings();
     memset(&p, 0, sizeof p);
     for (run = 0; run < 4 && (l.terrain || land_build(&l)); run++) {
         d.mode = run % 2 ? TERRIMP_MODE_AUTO : TERRIMP_MODE_IMPOSTOR;
@@ -1244,7 +1269,7 @@ static void touch_forgets_what_shows_the_samples_and_little_else(void)
                       samples_between(&f->places[node], first, last) <= 8u);
             }
         }
-        CHECK(made > 60 && kept > 10u * made);
+        CHECK(made > 60 && kept > 5u * made);
         flight_close(f);
     }
     land_free(&l);
@@ -1257,7 +1282,7 @@ static void invalidate_forgets_every_picture(void)
     terrimp_camera camera;
     land l;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
+    d = eager_settings();
     for (d.mode = TERRIMP_MODE_IMPOSTOR; d.mode <= TERRIMP_MODE_AUTO; d.mode++)
         if ((l.terrain || land_build(&l)) && flight_open(f, &l, &d)) {
             camera = camera_beside(&l);
@@ -1470,7 +1495,7 @@ static void geomip_draws_the_selection(void)
             const terrimp_camera *camera = pilot_next(&p, &l);
             flight_update(f, camera);
             flight_render(f);
-            CHECK(terrimp_geomip_select(&tree, &view, camera) == TERRIMP_OK);
+            CHECK(terrimp_geomip_select(&tree, &view, &f->camera) == TERRIMP_OK);
             CHECK(f->item_count == view.draw_count);
             CHECK(f->stats.triangles == view.triangle_count);
             for (i = 0; i < f->item_count && i < view.draw_count; i++) {
@@ -1539,7 +1564,7 @@ static void the_frame_before_stays_when_there_are_too_many_chunks(void)
     uint32_t first, second, ground;
     make_hills(&l);
     memset(&d, 0, sizeof d);
-    d.max_ground = 100;
+    d.max_ground = 70;
     for (d.mode = TERRIMP_MODE_FULL; d.mode <= TERRIMP_MODE_IMPOSTOR; d.mode++) {
         if (d.mode == TERRIMP_MODE_GEOMIP || (!l.terrain && !land_build(&l)) ||
             !flight_open(f, &l, &d))
@@ -1547,9 +1572,7 @@ static void the_frame_before_stays_when_there_are_too_many_chunks(void)
         camera = camera_beside(&l);
         CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_E_CAPACITY);
         away = camera;
-        away.fov_y_rad = 0.4f;
-        away.forward[0] *= -1.0f;
-        away.eye[0] = l.info.box.max[0] + 10.0f;
+        away.fov_y_rad = 0.05f;
         (void)rest(f, &away);
         f->hash = 1;
         flight_render(f);
@@ -1570,8 +1593,10 @@ static void the_frame_before_stays_when_there_are_too_many_chunks(void)
 
 /* ---- the schedule ---- */
 
-/* An eye that flies straight on over hills. Returns how many pictures that took. */
-static uint32_t captures_straight_on(const land *l, const terrimp_view_desc *d, flight *f)
+/* An eye that flies straight on over hills. Returns how many pictures that took for each impostor
+   drawn, without the first frames. */
+static double captures_straight_on(const land *l, const terrimp_view_desc *d, int start,
+                                   flight *f)
 {
     terrimp_camera camera = camera_beside(l);
     int i;
@@ -1584,11 +1609,11 @@ static uint32_t captures_straight_on(const land *l, const terrimp_view_desc *d, 
         camera.eye[2] += 0.04f;
         flight_update(f, &camera);
         flight_render(f);
-        if (i == 50) /* what the start costs is not asked for */
-            f->total_captures = f->most_captures = 0;
+        if (i == start)
+            f->total_captures = f->most_captures = f->total_impostors = 0;
     }
     flight_close(f);
-    return f->total_captures;
+    return (double)f->total_captures / ((double)f->total_impostors + 1.0);
 }
 
 /* Pictures made from ahead of the eye last longer. */
@@ -1596,38 +1621,44 @@ static void lookahead_saves_captures(void)
 {
     land l;
     terrimp_view_desc d;
-    uint32_t with, without;
+    double with, without;
+    int mode;
     make_hills(&l);
-    memset(&d, 0, sizeof d);
+    d = eager_settings();
     if (land_build(&l))
-        for (d.mode = TERRIMP_MODE_IMPOSTOR; d.mode <= TERRIMP_MODE_AUTO; d.mode++) {
+        for (mode = TERRIMP_MODE_IMPOSTOR; mode <= TERRIMP_MODE_AUTO; mode++) {
+            d.mode = mode;
             d.no_lookahead = 0;
-            with = captures_straight_on(&l, &d, &flight_room);
+            with = captures_straight_on(&l, &d, 50, &flight_room);
             d.no_lookahead = 1;
-            without = captures_straight_on(&l, &d, &flight_room);
-            CHECK(with > 20 && (double)with < 0.8 * (double)without);
+            without = captures_straight_on(&l, &d, 50, &flight_room);
+            CHECK(with > 0.0 && with < 0.8 * without);
         }
     land_free(&l);
 }
 
-/* Spread captures do not come in bursts. */
+/* Spread captures do not come in bursts, where all pictures are missing neither. */
 static void spreading_evens_the_load(void)
 {
     land l;
     terrimp_view_desc d;
-    uint32_t spread, together;
+    uint32_t spread;
+    int mode;
     make_hills(&l);
     memset(&d, 0, sizeof d);
-    d.mode = TERRIMP_MODE_IMPOSTOR;
-    d.max_captures = 1000;
-    if (land_build(&l)) {
-        (void)captures_straight_on(&l, &d, &flight_room);
-        spread = flight_room.most_captures;
-        d.no_spreading = 1;
-        (void)captures_straight_on(&l, &d, &flight_room);
-        together = flight_room.most_captures;
-        CHECK(spread > 0 && spread * 3u < together * 2u);
-    }
+    if (land_build(&l))
+        for (mode = TERRIMP_MODE_IMPOSTOR; mode <= TERRIMP_MODE_AUTO; mode++) {
+            d = eager_settings();
+            d.mode = mode;
+            d.costs.capture = 1000.0f;
+            d.costs.triangle = 20.0f;
+            d.max_captures = 1000;
+            (void)captures_straight_on(&l, &d, -1, &flight_room);
+            spread = flight_room.most_captures;
+            d.no_spreading = 1;
+            (void)captures_straight_on(&l, &d, -1, &flight_room);
+            CHECK(spread > 0 && spread * 2u < flight_room.most_captures);
+        }
     land_free(&l);
 }
 
