@@ -176,6 +176,7 @@ static void open_contender(flyover *f, contender *c, const char *name, int mode)
     desc.max_capture_texels = o->max_capture_texels;
     desc.max_capture_triangles = o->max_capture_triangles;
     desc.no_lookahead = o->no_lookahead;
+    desc.no_splits = o->no_splits;
     desc.no_spreading = o->no_spreading;
     c->name = name;
     c->picture = allocate((size_t)o->width * o->height * 3);

@@ -65,22 +65,22 @@ static const char impostor_vertex[] =
     "uniform mat4 matrix, texture_matrix;\n"
     "uniform vec3 eye;\n"
     "uniform float scale;\n"
-    "out vec3 stq;\n"
+    "out vec4 strq;\n"
     "void main() {\n"
-    "    stq = (texture_matrix * vec4(position, 1.0)).xyw;\n"
+    "    strq = texture_matrix * vec4(position, 1.0);\n"
     "    gl_Position = matrix * vec4((position - eye) * scale, 1.0);\n"
     "}\n";
 
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
-   them; the division brings them back. */
+   them; the division brings them back. Of a picture in two parts each keeps to its own depths. */
 static const char impostor_fragment[] =
     "#version 330 core\n"
     "uniform sampler2D atlas;\n"
-    "in vec3 stq;\n"
+    "in vec4 strq;\n"
     "out vec4 colour;\n"
     "void main() {\n"
-    "    vec4 c = textureProj(atlas, stq);\n"
-    "    if (c.a < 0.5) discard;\n"
+    "    vec4 c = textureProj(atlas, strq.xyw);\n"
+    "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
     "    colour = vec4(c.rgb / c.a, 1.0);\n"
     "}\n";
 

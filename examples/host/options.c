@@ -147,7 +147,7 @@ typedef enum option_id {
     DEM, FORMAT, RAW_SIZE, CROP, TERRAIN_SIZE, SEED, SPACING, HEIGHT_SCALE, MODE, SIZE, FOV, SKY,
     FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
     IMPOSTOR_PX, ATLAS, ATLAS_COUNT, MAX_CAPTURES, MAX_CAPTURE_TEXELS, MAX_CAPTURE_TRIANGLES,
-    NO_LOOKAHEAD, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
+    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
 } option_id;
 
 typedef struct option {
@@ -185,6 +185,7 @@ static const option table[OPTION_COUNT] = {
     { MAX_CAPTURE_TEXELS, "--max-capture-texels", "N", "their texels [no limit]" },
     { MAX_CAPTURE_TRIANGLES, "--max-capture-triangles", "N", "their triangles [no limit]" },
     { NO_LOOKAHEAD, "--no-lookahead", NULL, "pictures are made from where the eye is" },
+    { NO_SPLITS, "--no-splits", NULL, "no picture in two parts" },
     { NO_SPREADING, "--no-spreading", NULL, "pictures are renewed when they are due" },
     { RULE, "--rule", "picture|bound|distance", "of ground: what is tolerated [picture]" },
     { MORPH, "--morph", "RATIO", "of ground: of the distances where nodes morph [1: not]" },
@@ -254,6 +255,7 @@ static int take(options *o, option_id id, const char *text)
     case MAX_CAPTURE_TEXELS: return take_unsigned(text, &o->max_capture_texels);
     case MAX_CAPTURE_TRIANGLES: return take_unsigned(text, &o->max_capture_triangles);
     case NO_LOOKAHEAD: return take_flag(&o->no_lookahead);
+    case NO_SPLITS: return take_flag(&o->no_splits);
     case NO_SPREADING: return take_flag(&o->no_spreading);
     case RULE: return take_rule(text, &o->rule);
     case MORPH: return take_number(text, 1.0f, 4.0f, &o->morph);
