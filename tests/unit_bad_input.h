@@ -3,7 +3,9 @@
 #ifndef UNIT_BAD_INPUT_H
 #define UNIT_BAD_INPUT_H
 
-#include "unit_terrain.h"
+#include "unit_view.h"
+
+#include <stddef.h>
 
 static int provoked[TERRIMP_RESULT_COUNT]; /* which results the tests below have seen */
 
@@ -939,13 +941,69 @@ static void check_view_refused(terrimp_result wanted, const terrimp_terrain *ter
     CHECK(terrimp_view_bytes(terrain, desc) == 0);
 }
 
+/* A number that a view's descriptor holds, with the limits that its comment names. */
+typedef struct view_number {
+    size_t offset;
+    float low, high;
+} view_number;
+
+static float *view_float(terrimp_view_desc *d, const view_number *number)
+{
+    return (float *)(void *)((char *)d + number->offset);
+}
+
+/* Every number refuses what is not finite, negative or outside of its limits, and takes what is
+   just inside. */
+static void check_view_numbers(const land *l)
+{
+    static const view_number numbers[] = {
+        {offsetof(terrimp_view_desc, tolerance_px), 0.05f, 100.0f},
+        {offsetof(terrimp_view_desc, ground_tolerance_px), 0.05f, 100.0f},
+        {offsetof(terrimp_view_desc, morph_ratio), 1.0f, 4.0f},
+        {offsetof(terrimp_view_desc, fade_start), 1e-30f, 1e30f},
+        {offsetof(terrimp_view_desc, fade_end), 1e3f, 1e30f},
+        {offsetof(terrimp_view_desc, max_angle_rad), 0.001f, 1.5f},
+        {offsetof(terrimp_view_desc, texels_per_px), 0.1f, 8.0f},
+        {offsetof(terrimp_view_desc, impostor_px), 8.0f, 4096.0f},
+        {offsetof(terrimp_view_desc, costs.draw), 0.0f, 1e30f},
+        {offsetof(terrimp_view_desc, costs.triangle), 0.0f, 1e30f},
+        {offsetof(terrimp_view_desc, costs.ground_px), 0.0f, 1e30f},
+        {offsetof(terrimp_view_desc, costs.impostor_px), 0.0f, 1e30f},
+        {offsetof(terrimp_view_desc, costs.capture), 0.0f, 1e30f}};
+    terrimp_view_desc good, bad, out;
+    size_t n;
+    int i;
+    memset(&good, 0, sizeof good);
+    for (n = 0; n < sizeof numbers / sizeof numbers[0]; n++) {
+        const view_number *number = &numbers[n];
+        for (i = 0; i < 3; i++) {
+            bad = good;
+            *view_float(&bad, number) = not_finite(i);
+            check_view_refused(TERRIMP_E_NOT_FINITE, l->terrain, &bad);
+        }
+        bad = good;
+        *view_float(&bad, number) = -1.0f;
+        check_view_refused(TERRIMP_E_RANGE, l->terrain, &bad);
+        *view_float(&bad, number) = number->low * 0.999f;
+        if (number->low > 1e-20f && number->low < 1e2f)
+            check_view_refused(TERRIMP_E_RANGE, l->terrain, &bad);
+        *view_float(&bad, number) = number->high * 1.001f;
+        if (number->high < 1e20f)
+            check_view_refused(TERRIMP_E_RANGE, l->terrain, &bad);
+        *view_float(&bad, number) = number->low;
+        GIVES(TERRIMP_OK, terrimp_view_desc_resolve(l->terrain, &bad, &out));
+        *view_float(&bad, number) = number->high;
+        GIVES(TERRIMP_OK, terrimp_view_desc_resolve(l->terrain, &bad, &out));
+    }
+}
+
 static void view_descriptors_are_refused(void)
 {
     land l;
     terrimp_view_desc good, bad;
     terrimp_allocator allocator;
     terrimp_view *view;
-    int i, member;
+    int i;
     make_hills(&l);
     memset(&good, 0, sizeof good);
     memset(&allocator, 0, sizeof allocator);
@@ -957,35 +1015,23 @@ static void view_descriptors_are_refused(void)
         GIVES(TERRIMP_E_NULL, terrimp_view_init(l.terrain, &good, NULL, 0, NULL));
         REFUSES(TERRIMP_E_NULL, view, terrimp_view_init(l.terrain, &good, NULL, 1u << 30, &view));
         REFUSES(TERRIMP_E_NULL, view, terrimp_view_create(l.terrain, &good, &allocator, &view));
-        for (member = 0; member < 5; member++)
-            for (i = 0; i < 6; i++) {
-                static const float negative_or_huge[3] = {-1.0f, -FLT_MAX, FLT_MAX};
-                float *where;
-                bad = good;
-                where = member == 0   ? &bad.fade_start
-                        : member == 1 ? &bad.fade_end
-                        : member == 2 ? &bad.max_angle_rad
-                        : member == 3 ? &bad.tolerance_px
-                                      : &bad.texels_per_px;
-                *where = i < 3 ? not_finite(i) : negative_or_huge[i - 3];
-                if (member == 1 && i == 5)
-                    continue; /* the fade band may be as long as one likes */
-                check_view_refused(i < 3 ? TERRIMP_E_NOT_FINITE : TERRIMP_E_RANGE, l.terrain, &bad);
-            }
-        for (i = 0; i < 11; i++) {
+        check_view_numbers(&l);
+        for (i = 0; i < 13; i++) {
             bad = good;
             switch (i) {
             case 0: bad.mode = -1; break;
             case 1: bad.mode = TERRIMP_MODE_COUNT; break;
-            case 2: bad.fade_start = bad.fade_end = 5.0f; break;
-            case 3: bad.max_angle_rad = 0.0009f; break;
-            case 4: bad.max_angle_rad = 1.51f; break;
-            case 5: bad.tolerance_px = 0.04f; break;
-            case 6: bad.texels_per_px = 0.09f; break;
-            case 7: bad.atlas_size = 63; break;
-            case 8: bad.atlas_size = 32769; break;
-            case 9: bad.max_impostors = 65536; break;
-            default: bad.max_impostors = 0xffffffffu; break;
+            case 2: bad.ground_rule = -1; break;
+            case 3: bad.ground_rule = TERRIMP_GEOMIP_RULE_COUNT; break;
+            case 4: bad.fade_start = bad.fade_end = 5.0f; break;
+            case 5: bad.fade_start = 3e38f; break; /* the default of fade_end overflows */
+            case 6: bad.atlas_size = 63; break;
+            case 7: bad.atlas_size = 32769; break;
+            case 8: bad.atlas_count = 17; break;
+            case 9: bad.max_impostors = 65535; break;
+            case 10: bad.max_impostors = 0xffffffffu; break;
+            case 11: bad.max_captures = 1025; break;
+            default: bad.max_captures = 0xffffffffu; break;
             }
             check_view_refused(TERRIMP_E_RANGE, l.terrain, &bad);
         }
@@ -993,78 +1039,110 @@ static void view_descriptors_are_refused(void)
     land_free(&l);
 }
 
+static terrimp_callbacks counting_callbacks(int *calls)
+{
+    terrimp_callbacks all;
+    memset(&all, 0, sizeof all); /* the floor may be left out */
+    all.user = calls;
+    all.begin_capture = all.end_capture = count_capture;
+    all.draw_impostor = count_impostor;
+    all.draw_ground = count_ground;
+    return all;
+}
+
+/* A callback that is needed is missing: nothing is called. */
+static void check_missing_callbacks(terrimp_view *view, const terrimp_callbacks *all)
+{
+    int i;
+    for (i = 0; i < 4; i++) {
+        terrimp_callbacks some = *all;
+        if (i == 0)
+            some.begin_capture = NULL;
+        if (i == 1)
+            some.end_capture = NULL;
+        if (i == 2)
+            some.draw_impostor = NULL;
+        if (i == 3)
+            some.draw_ground = NULL;
+        GIVES(TERRIMP_E_NULL, terrimp_view_render(view, &some));
+    }
+    CHECK(*(int *)all->user == 0);
+}
+
+/* Cameras at the ends of what a float holds. */
+static void check_huge_cameras(terrimp_view *view, const terrimp_callbacks *all,
+                               const terrimp_camera *camera)
+{
+    int i;
+    for (i = 0; i < 12; i++) {
+        terrimp_camera bad = *camera;
+        bad.eye[i % 3] = i % 2 ? 3e38f : -3e38f;
+        bad.forward[0] = i % 2 ? -1e-38f : 3e38f;
+        bad.z_near = i % 4 ? 1e-30f : 1.0f;
+        bad.z_far = 3e38f;
+        GIVES(TERRIMP_OK, terrimp_view_update(view, &bad));
+        GIVES(TERRIMP_OK, terrimp_view_render(view, all));
+    }
+}
+
+static void check_view_refuses(const land *l, terrimp_view *view, int mode)
+{
+    int calls = 0;
+    terrimp_callbacks all = counting_callbacks(&calls);
+    terrimp_camera camera = camera_beside(l), bad;
+    terrimp_stats stats;
+    GIVES(TERRIMP_E_STATE, terrimp_view_render(view, &all));
+    REFUSES(TERRIMP_E_STATE, stats, terrimp_view_get_stats(view, &stats));
+    GIVES(TERRIMP_E_NULL, terrimp_view_update(NULL, &camera));
+    GIVES(TERRIMP_E_NULL, terrimp_view_update(view, NULL));
+    bad = camera;
+    bad.z_near = 0.0f;
+    GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
+    bad = camera;
+    bad.eye[1] = not_finite(0);
+    GIVES(TERRIMP_E_NOT_FINITE, terrimp_view_update(view, &bad));
+    GIVES(TERRIMP_E_STATE, terrimp_view_render(view, &all)); /* still before the first update */
+    GIVES(TERRIMP_OK, terrimp_view_update(view, &camera));
+    GIVES(TERRIMP_OK, terrimp_view_get_stats(view, &stats));
+    if (mode == TERRIMP_MODE_IMPOSTOR) {
+        CHECK(stats.captures > 0 && stats.impostors > 0);
+        check_missing_callbacks(view, &all);
+    }
+    GIVES(TERRIMP_E_NULL, terrimp_view_render(NULL, &all));
+    GIVES(TERRIMP_E_NULL, terrimp_view_render(view, NULL));
+    memset(&bad, 0, sizeof bad);
+    GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
+    CHECK(calls == 0);
+    GIVES(TERRIMP_OK, terrimp_view_render(view, &all)); /* the frame before has stayed */
+    CHECK(calls > 3);
+    REFUSES(TERRIMP_E_NULL, stats, terrimp_view_get_stats(NULL, &stats));
+    GIVES(TERRIMP_E_NULL, terrimp_view_get_stats(view, NULL));
+    GIVES(TERRIMP_E_NULL, terrimp_view_invalidate(NULL));
+    GIVES(TERRIMP_E_NULL, terrimp_view_touch(NULL, 0, 0, 1, 1));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 97, 0, 1, 1));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 0, 81, 1, 1));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 0xffffffffu, 0xffffffffu, 2, 2));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 0, 0, 0, 1));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 0, 0, 1, 0));
+    GIVES(TERRIMP_OK, terrimp_view_render(view, &all)); /* nothing has been touched */
+    GIVES(TERRIMP_OK, terrimp_view_touch(view, 96, 80, 0xffffffffu, 0xffffffffu));
+    check_huge_cameras(view, &all, &camera);
+}
+
 static void views_refuse(void)
 {
     land l;
     terrimp_view_desc desc;
-    terrimp_view *view = NULL;
-    terrimp_stats stats;
-    terrimp_callbacks all, some;
-    terrimp_camera camera, bad;
-    int calls = 0, i;
     make_hills(&l);
     memset(&desc, 0, sizeof desc);
-    memset(&all, 0, sizeof all); /* the floor may be left out */
-    all.user = &calls;
-    all.begin_capture = all.end_capture = count_capture;
-    all.draw_impostor = count_impostor;
-    all.draw_ground = count_ground;
-    if (land_build(&l) && terrimp_view_create(l.terrain, &desc, NULL, &view) == TERRIMP_OK) {
-        GIVES(TERRIMP_E_STATE, terrimp_view_render(view, &all));
-        REFUSES(TERRIMP_E_STATE, stats, terrimp_view_get_stats(view, &stats));
-        memset(&camera, 0, sizeof camera);
-        fly(&l, 0, &camera);
-        camera.eye[0] = -30.0f; /* in sight: ground in the fade band, impostors, captures */
-        camera.eye[1] = 130.0f;
-        camera.eye[2] = 40.0f;
-        camera.forward[0] = 1.0f;
-        camera.forward[1] = camera.forward[2] = 0.0f;
-        GIVES(TERRIMP_E_NULL, terrimp_view_update(NULL, &camera));
-        GIVES(TERRIMP_E_NULL, terrimp_view_update(view, NULL));
-        bad = camera;
-        bad.z_near = 0.0f;
-        GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
-        bad = camera;
-        bad.eye[1] = not_finite(0);
-        GIVES(TERRIMP_E_NOT_FINITE, terrimp_view_update(view, &bad));
-        GIVES(TERRIMP_E_STATE, terrimp_view_render(view, &all)); /* still before the first update */
-        GIVES(TERRIMP_OK, terrimp_view_update(view, &camera));
-        GIVES(TERRIMP_OK, terrimp_view_get_stats(view, &stats));
-        CHECK(stats.captures > 0 && stats.impostors > 0);
-        for (i = 0; i < 4; i++) { /* a callback that is needed is missing: nothing is called */
-            some = all;
-            if (i == 0)
-                some.begin_capture = NULL;
-            if (i == 1)
-                some.end_capture = NULL;
-            if (i == 2)
-                some.draw_impostor = NULL;
-            if (i == 3)
-                some.draw_ground = NULL;
-            GIVES(TERRIMP_E_NULL, terrimp_view_render(view, &some));
+    if (land_build(&l))
+        for (desc.mode = TERRIMP_MODE_FULL; desc.mode < TERRIMP_MODE_COUNT; desc.mode++) {
+            terrimp_view *view = NULL;
+            GIVES(TERRIMP_OK, terrimp_view_create(l.terrain, &desc, NULL, &view));
+            if (view)
+                check_view_refuses(&l, view, desc.mode);
+            terrimp_view_destroy(view);
         }
-        GIVES(TERRIMP_E_NULL, terrimp_view_render(NULL, &all));
-        GIVES(TERRIMP_E_NULL, terrimp_view_render(view, NULL));
-        memset(&bad, 0, sizeof bad);
-        GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
-        CHECK(calls == 0);
-        GIVES(TERRIMP_OK, terrimp_view_render(view, &all)); /* the frame before has stayed */
-        CHECK(calls > 3);
-        REFUSES(TERRIMP_E_NULL, stats, terrimp_view_get_stats(NULL, &stats));
-        GIVES(TERRIMP_E_NULL, terrimp_view_get_stats(view, NULL));
-        GIVES(TERRIMP_E_NULL, terrimp_view_invalidate(NULL));
-        /* Cameras at the ends of what a float holds. */
-        for (i = 0; i < 12; i++) {
-            bad = camera;
-            bad.eye[i % 3] = i % 2 ? 3e38f : -3e38f;
-            bad.forward[0] = i % 2 ? -1e-38f : 3e38f;
-            bad.z_near = i % 4 ? 1e-30f : 1.0f;
-            bad.z_far = 3e38f;
-            GIVES(TERRIMP_OK, terrimp_view_update(view, &bad));
-            GIVES(TERRIMP_OK, terrimp_view_render(view, &all));
-        }
-        terrimp_view_destroy(view);
-    }
     land_free(&l);
 }
 
