@@ -60,6 +60,14 @@ geomip_runs()
     (cd $work && ../../geomip) > $work/geomip.txt && [ -s $work/geomip.png ]
 }
 
+# ---- hosts of other kinds: each compares its pictures with its own full mesh
+
+# Runs in the work folder and leaves its picture there.
+host_runs() # name
+{
+    (cd $work && ../../$1) > $work/$1.txt && [ -s $work/$1.png ] || { cat $work/$1.txt; false; }
+}
+
 # ---- flyover: the pictures are looked at by tests/render.c, here it is its manners
 
 fly()
@@ -119,6 +127,7 @@ check "make builds every example" make -s all
 if [ -x build/geomip ]; then
     check "geomip draws its frames and leaves a picture" geomip_runs
 fi
+check "software draws its frames without a GPU, close to the full mesh" host_runs software
 if [ -x build/flyover ]; then
     check "flyover flies over its own terrain" prints_nothing flies_quietly
     check "flyover writes a line of statistics a frame" statistics_are_a_table

@@ -1,0 +1,241 @@
+/* Shows a host without any GPU: 320 x 240 pixels of RGB565, a depth buffer and an atlas, all in
+   RAM, and the span rasteriser of host/raster.c. To lift it into an engine take host/raster.[ch]
+   and the four callbacks; the lines after them make the terrain and check the pictures.
+   Build:  make software
+   Expect: 60 frames of a flight, some of them compared with the full mesh; the last one in
+           software.png. Exit code 1 when a picture has holes or is too far from the full mesh. */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+#include "host/image.h"
+#include "host/lightmap.h"
+#include "host/procedural.h"
+#include "host/raster.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { WIDTH = 320, HEIGHT = 240, ATLAS = 512, LOG2_ATLAS = 9, ATLASES = 2 };
+enum { SIDE = 512, LOG2_SIDE = 9, QUADS = 32, GRID = (QUADS + 1) * (QUADS + 1) };
+enum { SKY = 0xae9d, FRAMES = 60 };
+
+typedef struct host {
+    const terrimp_terrain *terrain;
+    uint16_t screen[WIDTH * HEIGHT], atlas[ATLASES][ATLAS * ATLAS];
+    uint16_t depth[ATLAS * ATLAS]; /* first of each capture, then of the screen */
+    uint16_t *indices, *mesh_indices;
+    float *mesh_xyz, ground_xyz[GRID * 3];
+    uint16_t lightmap_texels[SIDE * SIDE * 4 / 3];
+    raster_texture lightmap, atlas_texture[ATLASES];
+    float lightmap_matrix[16];     /* world to (s, t, r, q) of the lightmap */
+    raster r;
+    int on_screen, capturing;
+    float view[16], projection[16];
+    terrimp_camera camera;
+} host;
+
+/* ---- What a host has to do ---------------------------------------------- */
+
+static void begin_capture(void *user, const terrimp_capture_command *c)
+{
+    host *h = (host *)user;
+    const terrimp_rect *slot = &c->slot;
+    raster_begin(&h->r, h->atlas[c->atlas] + slot->y * ATLAS + slot->x, h->depth, ATLAS,
+                 (int)slot->width, (int)slot->height, 0, c->view, c->projection, c->eye);
+    raster_clear(&h->r, RASTER_KEY);
+    raster_clear_depth(&h->r);
+    h->on_screen = 0;
+    h->capturing = 1;
+}
+
+static void end_capture(void *user, const terrimp_capture_command *c)
+{
+    (void)c;
+    ((host *)user)->capturing = 0;
+}
+
+/* The commands for the screen come after all captures: the depth buffer serves both. */
+static void turn_to_screen(host *h)
+{
+    if (h->on_screen)
+        return;
+    h->on_screen = 1;
+    raster_begin(&h->r, h->screen, h->depth, WIDTH, WIDTH, HEIGHT, 1, h->view, h->projection,
+                 h->camera.eye);
+    raster_clear(&h->r, SKY);
+    raster_clear_depth(&h->r);
+}
+
+static void draw_impostor(void *user, const terrimp_impostor_command *c)
+{
+    host *h = (host *)user;
+    raster_style style = { 0 };
+    turn_to_screen(h);
+    style.texture = &h->atlas_texture[c->atlas];
+    style.texture_matrix = c->texture_matrix;
+    style.depth_bias = c->depth_bias;
+    style.alpha = RASTER_OPAQUE;
+    raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
+                h->mesh_indices + c->first_index, c->index_count);
+}
+
+static void draw_floor(void *user, const terrimp_floor_command *c)
+{
+    host *h = (host *)user;
+    raster_style style = { 0 };
+    turn_to_screen(h);
+    style.texture = &h->lightmap;
+    style.texture_matrix = h->lightmap_matrix;
+    style.depth_bias = c->depth_bias;
+    style.alpha = RASTER_OPAQUE;
+    raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
+                h->mesh_indices + c->first_index, c->index_count);
+}
+
+static int alpha_of(const host *h, const terrimp_ground_command *c)
+{
+    terrimp_box box;
+    float d, a;
+    if (c->fade_end <= 0.0f) return RASTER_OPAQUE;
+    terrimp_terrain_get_box(h->terrain, c->node, &box);
+    d = terrimp_box_distance(&box, h->camera.eye);
+    a = (c->fade_end - d) / (c->fade_end - c->fade_start);
+    return (int)((a < 0 ? 0 : a > 1 ? 1 : a) * RASTER_OPAQUE + 0.5f);
+}
+
+/* Vertices are read from the samples for each draw: no memory for vertex buffers. */
+static void draw_ground(void *user, const terrimp_ground_command *c)
+{
+    host *h = (host *)user;
+    raster_style style = { 0 };
+    if (!h->capturing)
+        turn_to_screen(h);
+    style.texture = &h->lightmap;
+    style.texture_matrix = h->lightmap_matrix;
+    style.depth_bias = c->depth_bias;
+    style.alpha = h->capturing ? RASTER_OPAQUE : alpha_of(h, c);
+    if (terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3) == TERRIMP_OK)
+        raster_draw(&h->r, &style, h->ground_xyz, h->indices + c->first_index, c->index_count);
+}
+
+/* ---- A terrain, a flight and a look at the pictures --------------------- */
+
+static uint8_t ours[WIDTH * HEIGHT * 3], full[WIDTH * HEIGHT * 3];
+
+static int prepare(host *h, const terrimp_terrain *terrain, const terrimp_heightfield *field)
+{
+    terrimp_terrain_info info;
+    uint8_t *rgb = lightmap_bake(field);
+    int i;
+    terrimp_terrain_get_info(terrain, &info);
+    h->terrain = terrain;
+    h->indices = (uint16_t *)malloc(info.ground_index_count * sizeof(uint16_t));
+    h->mesh_indices = (uint16_t *)malloc(info.mesh_index_count * sizeof(uint16_t));
+    h->mesh_xyz = (float *)malloc(info.mesh_vertex_count * 3 * sizeof(float));
+    if (!rgb || !h->indices || !h->mesh_indices || !h->mesh_xyz)
+        return 0;
+    raster_make_texture(&h->lightmap, h->lightmap_texels, rgb, LOG2_SIDE);
+    free(rgb);
+    h->lightmap_matrix[0] = h->lightmap_matrix[9] = 1.0f / SIDE; /* texel centres on samples */
+    h->lightmap_matrix[12] = h->lightmap_matrix[13] = 0.5f / SIDE;
+    h->lightmap_matrix[15] = 1.0f;
+    for (i = 0; i < ATLASES; i++) {
+        h->atlas_texture[i].levels[0] = h->atlas[i];
+        h->atlas_texture[i].level_count = 1;
+        h->atlas_texture[i].log2_side = LOG2_ATLAS;
+    }
+    return terrimp_terrain_fill_indices(terrain, h->indices, info.ground_index_count)
+               == TERRIMP_OK
+           && terrimp_terrain_fill_meshes(terrain, h->mesh_xyz, info.mesh_vertex_count * 3,
+                                          h->mesh_indices, info.mesh_index_count) == TERRIMP_OK;
+}
+
+/* Draws a frame and returns its milliseconds, or a negative number on errors. */
+static double draw_frame(host *h, terrimp_view *view, uint8_t *rgb)
+{
+    terrimp_callbacks callbacks = { 0 };
+    clock_t start = clock();
+    callbacks.user = h;
+    callbacks.begin_capture = begin_capture, callbacks.end_capture = end_capture;
+    callbacks.draw_impostor = draw_impostor, callbacks.draw_ground = draw_ground;
+    callbacks.draw_floor = draw_floor;
+    h->on_screen = 0;
+    if (terrimp_camera_matrices(&h->camera, h->view, h->projection) != TERRIMP_OK
+        || terrimp_view_update(view, &h->camera) != TERRIMP_OK
+        || terrimp_view_render(view, &callbacks) != TERRIMP_OK)
+        return -1.0;
+    turn_to_screen(h); /* also when there is nothing to draw */
+    start = clock() - start;
+    raster_read(&h->r, rgb);
+    return (double)start * 1000.0 / CLOCKS_PER_SEC;
+}
+
+static int is_sky(const uint8_t *rgb, int pixel)
+{
+    return rgb[pixel * 3] == 173 && rgb[pixel * 3 + 1] == 211 && rgb[pixel * 3 + 2] == 239;
+}
+
+/* Pixels of sky where the full mesh has terrain all round. */
+static int count_holes(void)
+{
+    int x, y, i, holes = 0;
+    for (y = 1; y + 1 < HEIGHT; y++)
+        for (x = 1; x + 1 < WIDTH; x++) {
+            int pixel = y * WIDTH + x, terrain = 0;
+            for (i = 0; i < 9; i++)
+                terrain += !is_sky(full, pixel + (i / 3 - 1) * WIDTH + i % 3 - 1);
+            holes += terrain == 9 && is_sky(ours, pixel);
+        }
+    return holes;
+}
+
+int main(void)
+{
+    static host h;
+    const uint8_t sky[3] = { 173, 211, 239 };
+    uint16_t *samples = procedural_terrain(SIDE, SIDE, 3);
+    terrimp_terrain_desc desc = { 0 };
+    terrimp_view_desc settings = { 0 }, yardstick = { 0 };
+    terrimp_terrain *terrain = NULL;
+    terrimp_view *view = NULL, *full_view = NULL;
+    terrimp_stats stats;
+    double ms, full_ms, psnr, worst = 99.0;
+    int frame, holes = 0;
+
+    desc.field.samples = samples, desc.field.width = desc.field.depth = SIDE;
+    desc.field.format = TERRIMP_FORMAT_U16;
+    desc.field.height_scale = 0.4f * PROCEDURAL_HEIGHT_SCALE;
+    desc.chunk_quads = QUADS;
+    settings.mode = TERRIMP_MODE_IMPOSTOR, yardstick.mode = TERRIMP_MODE_FULL;
+    settings.texels_per_px = 1.0f; /* the nearest texel is taken: more would only flicker */
+    settings.atlas_size = yardstick.atlas_size = ATLAS;
+    if (!samples || terrimp_terrain_create(&desc, NULL, &terrain) != TERRIMP_OK
+        || terrimp_view_create(terrain, &settings, NULL, &view) != TERRIMP_OK
+        || terrimp_view_create(terrain, &yardstick, NULL, &full_view) != TERRIMP_OK
+        || !prepare(&h, terrain, &desc.field))
+        return 2;
+    h.camera.width_px = WIDTH, h.camera.height_px = HEIGHT;
+    h.camera.z_near = 0.5f, h.camera.z_far = 1000.0f;
+    h.camera.eye[1] = 75.0f;
+    h.camera.forward[0] = h.camera.forward[2] = 1.0f, h.camera.forward[1] = -0.4f;
+    for (frame = 0; frame < FRAMES; frame++) {
+        h.camera.eye[0] = h.camera.eye[2] = 60.0f + (float)frame;
+        ms = draw_frame(&h, view, ours);
+        if (ms < 0.0)
+            return 2;
+        if (frame % 10 != 9)
+            continue;
+        full_ms = draw_frame(&h, full_view, full);
+        psnr = image_psnr(image_mean_square(ours, full, WIDTH * HEIGHT, sky));
+        worst = psnr < worst ? psnr : worst;
+        holes += count_holes();
+        terrimp_view_get_stats(view, &stats);
+        printf("frame %2d: %4.1f ms, full mesh %4.1f ms, %.1f dB; %u triangles, %u captures\n",
+               frame, ms, full_ms, psnr, stats.triangles, stats.captures);
+    }
+    printf("%d holes, at worst %.1f dB\n", holes, worst);
+    terrimp_view_destroy(full_view), terrimp_view_destroy(view), terrimp_terrain_destroy(terrain);
+    free(h.indices), free(h.mesh_indices), free(h.mesh_xyz), free(samples);
+    return image_write_png("software.png", ours, WIDTH, HEIGHT) || holes || worst < 30.0;
+}
