@@ -1120,6 +1120,83 @@ TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
 /* The atlas that holds the slot's latest picture, 0 or 1, or -1 when it has none. */
 TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terrimp_pair_slot *slot);
 
+/* An atlas whose slots are allocated and freed one by one, in any order, while the others stay
+   where they are. */
+typedef struct terrimp_live_atlas_desc {
+    uint32_t width, height; /* (required) [texels] [Limits: 1..32768] */
+    uint32_t padding;       /* texels kept free between two slots [Limits: 0..1024] */
+    uint32_t max_slots;     /* (required) slots at a time [Limits: 1..65536] */
+} terrimp_live_atlas_desc;
+
+typedef struct terrimp_live_atlas {
+    terrimp_live_atlas_desc desc;
+    terrimp_rect *slots; /* [max_slots] width 0: unused, x is the next unused one */
+    terrimp_rect *holes; /* [max_holes] the maximal free rectangles, which overlap each other */
+    uint32_t hole_count, max_holes;
+    uint32_t unused;     /* the first unused slot, max_slots for none */
+    uint32_t slot_end;   /* above every slot that was ever used */
+    uint32_t slot_count, texels_used, failures;
+} terrimp_live_atlas;
+
+typedef struct terrimp_live_atlas_stats {
+    uint32_t slots;          /* in use */
+    uint32_t texels_used;    /* within these, without padding */
+    uint32_t texels_free;    /* all others */
+    uint32_t largest_width;  /* of the free rectangle of most texels; */
+    uint32_t largest_height; /* 0 when nothing is free */
+    uint32_t failures;       /* allocations that found no room, since init or reset */
+} terrimp_live_atlas_stats;
+
+/* The size of the block of memory that an atlas needs beside its struct; 0 when init would refuse
+   the descriptor, or for NULL. */
+TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc);
+
+/* An empty atlas.
+
+   memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
+   bytes      at least terrimp_live_atlas_bytes(desc)
+   Errors     E_NULL; E_RANGE; E_OVERFLOW; E_ALIGN; E_MEMORY
+   Cost       O(max_slots) */
+TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
+                                                   const terrimp_live_atlas_desc *desc,
+                                                   void *memory, size_t bytes);
+
+/* Frees all slots and sets the failures to 0. Errors: E_NULL; E_STATE before init. */
+TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas);
+
+/* Finds room for a rectangle and keeps it.
+
+   slot       out: its handle, < max_slots, until it is freed
+   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it fits
+              nowhere or all slots are in use: counted as a failure, nothing else changes
+   Cost       O(free rectangles), which are about twice as many as slots */
+TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, uint32_t *slot);
+
+/* Frees a slot: what borders on it grows together with it.
+   Errors: E_NULL; E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
+   Cost: O(slots + free rectangles). */
+TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
+
+/* Where a slot lies. Errors: those of terrimp_live_atlas_free. */
+TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
+                                                   terrimp_rect *rect);
+
+/* The largest rectangle of a shape that could be allocated now, for hosts that take a smaller slot
+   rather than none.
+
+   width, height  the size wanted [Limits: 1..65536]
+   size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
+              its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
+   Errors     E_NULL; E_STATE before init; E_RANGE
+   Cost       O(free rectangles) */
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2]);
+
+/* What the atlas holds. Errors: E_NULL; E_STATE before init. Cost: O(free rectangles). */
+TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
+                                                    terrimp_live_atlas_stats *stats);
+
 /* ==== Terrain ============================================================ >>terrain */
 
 typedef struct terrimp_terrain terrimp_terrain; /* built from a heightfield; read-only then */
@@ -6561,6 +6638,342 @@ TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terri
     if (slot->filled[pair->newest])
         return (int)pair->newest;
     return slot->filled[1u - pair->newest] ? (int)(1u - pair->newest) : -1;
+}
+
+/* ---- the live atlas ----
+
+   The free space is kept as all of its maximal rectangles: those that nothing free contains. A
+   rectangle fits somewhere if and only if it fits into one of them, and neighbouring free areas
+   need no merging. One operation makes them all: cutting a rectangle out of a list of them. An
+   allocation cuts the new slot out of the list. When a slot is freed, the maximal rectangles that
+   overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
+
+   Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
+   count as larger by it, so that the rest of the code has not to know of it. */
+
+static int terrimpi_rects_overlap(const terrimp_rect *a, const terrimp_rect *b)
+{
+    return a->x < b->x + b->width && b->x < a->x + a->width && a->y < b->y + b->height &&
+           b->y < a->y + a->height;
+}
+
+static int terrimpi_rect_contains(const terrimp_rect *outer, const terrimp_rect *inner)
+{
+    return outer->x <= inner->x && outer->y <= inner->y &&
+           inner->x + inner->width <= outer->x + outer->width &&
+           inner->y + inner->height <= outer->y + outer->height;
+}
+
+static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+    terrimp_rect rect;
+    rect.x = x;
+    rect.y = y;
+    rect.width = width;
+    rect.height = height;
+    return rect;
+}
+
+/* The part of a rectangle to the left of, to the right of, below or above what overlaps it; of
+   width or height 0 when there is none. */
+static terrimp_rect terrimpi_rect_beside(const terrimp_rect *rect, const terrimp_rect *taken,
+                                         int side)
+{
+    uint32_t right = rect->x + rect->width, top = rect->y + rect->height;
+    uint32_t left_cut = terrimpi_max_u32(rect->x, taken->x);
+    uint32_t right_cut = terrimpi_min_u32(right, taken->x + taken->width);
+    uint32_t low_cut = terrimpi_max_u32(rect->y, taken->y);
+    uint32_t top_cut = terrimpi_min_u32(top, taken->y + taken->height);
+    switch (side) {
+    case 0: return terrimpi_rect(rect->x, rect->y, left_cut - rect->x, rect->height);
+    case 1: return terrimpi_rect(right_cut, rect->y, right - right_cut, rect->height);
+    case 2: return terrimpi_rect(rect->x, rect->y, rect->width, low_cut - rect->y);
+    default: return terrimpi_rect(rect->x, top_cut, rect->width, top - top_cut);
+    }
+}
+
+/* Removes the rectangles that a flag of width 0 marks, from `begin` on; the order stays. */
+static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t begin)
+{
+    uint32_t i, kept = begin;
+    for (i = begin; i < atlas->hole_count; i++)
+        if (atlas->holes[i].width > 0)
+            atlas->holes[kept++] = atlas->holes[i];
+    atlas->hole_count = kept;
+}
+
+/* Cuts a rectangle out of the free ones from `begin` on. Of the pieces, those that are maximal and
+   overlap `window` are kept. A piece for which there is no memory is lost until a slot beside it is
+   freed. */
+static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const terrimp_rect *taken,
+                               const terrimp_rect *window)
+{
+    terrimp_rect *holes = atlas->holes;
+    uint32_t i, k, old = atlas->hole_count;
+    int side;
+    for (i = begin; i < old; i++) {
+        if (!terrimpi_rects_overlap(&holes[i], taken))
+            continue;
+        for (side = 0; side < 4; side++) {
+            terrimp_rect piece = terrimpi_rect_beside(&holes[i], taken, side);
+            if (piece.width > 0 && piece.height > 0 && terrimpi_rects_overlap(&piece, window) &&
+                atlas->hole_count < atlas->max_holes)
+                holes[atlas->hole_count++] = piece;
+        }
+        holes[i].width = 0;
+    }
+    for (i = old; i < atlas->hole_count; i++)
+        for (k = begin; k < atlas->hole_count; k++)
+            if (k != i && holes[k].width > 0 && terrimpi_rect_contains(&holes[k], &holes[i])) {
+                holes[i].width = 0;
+                break;
+            }
+    if (atlas->hole_count > old || old > begin)
+        terrimpi_holes_compact(atlas, begin);
+}
+
+/* The largest number of free rectangles that are kept. */
+static uint32_t terrimpi_live_holes(const terrimp_live_atlas_desc *desc)
+{
+    return 6u * desc->max_slots + 64u;
+}
+
+static terrimp_rect terrimpi_live_whole(const terrimp_live_atlas *atlas)
+{
+    return terrimpi_rect(0, 0, atlas->desc.width + atlas->desc.padding,
+                         atlas->desc.height + atlas->desc.padding);
+}
+
+static terrimp_rect terrimpi_live_padded(const terrimp_live_atlas *atlas, uint32_t slot)
+{
+    terrimp_rect rect = atlas->slots[slot];
+    rect.width += atlas->desc.padding;
+    rect.height += atlas->desc.padding;
+    return rect;
+}
+
+static int terrimpi_live_desc_ok(const terrimp_live_atlas_desc *desc)
+{
+    return desc->width >= 1u && desc->width <= 32768u && desc->height >= 1u &&
+           desc->height <= 32768u && desc->padding <= 1024u && desc->max_slots >= 1u &&
+           desc->max_slots <= 65536u;
+}
+
+TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
+{
+    if (!desc || !terrimpi_live_desc_ok(desc))
+        return 0;
+    return ((size_t)desc->max_slots + terrimpi_live_holes(desc)) * sizeof(terrimp_rect);
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
+                                                   const terrimp_live_atlas_desc *desc,
+                                                   void *memory, size_t bytes)
+{
+    if (!atlas || !desc || !memory)
+        return TERRIMP_E_NULL;
+    if (!terrimpi_live_desc_ok(desc))
+        return TERRIMP_E_RANGE;
+    if ((uintptr_t)memory % 8u != 0)
+        return TERRIMP_E_ALIGN;
+    if (bytes < terrimp_live_atlas_bytes(desc))
+        return TERRIMP_E_MEMORY;
+    atlas->desc = *desc;
+    atlas->slots = (terrimp_rect *)memory;
+    atlas->holes = atlas->slots + desc->max_slots;
+    atlas->max_holes = terrimpi_live_holes(desc);
+    return terrimp_live_atlas_reset(atlas);
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
+{
+    uint32_t i;
+    if (!atlas)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    for (i = 0; i < atlas->desc.max_slots; i++)
+        atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
+    atlas->holes[0] = terrimpi_live_whole(atlas);
+    atlas->hole_count = 1;
+    atlas->unused = atlas->slot_end = 0;
+    atlas->slot_count = atlas->texels_used = atlas->failures = 0;
+    return TERRIMP_OK;
+}
+
+/* The free rectangle that fits best: the one that leaves least of one of its sides, then least of
+   the other, then the first. Returns hole_count when there is none. */
+static uint32_t terrimpi_live_best(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
+{
+    uint32_t i, best = atlas->hole_count, best_less = 0xffffffffu, best_more = 0xffffffffu;
+    for (i = 0; i < atlas->hole_count; i++) {
+        const terrimp_rect *hole = &atlas->holes[i];
+        uint32_t x, y, less, more;
+        if (hole->width < width || hole->height < height)
+            continue;
+        x = hole->width - width;
+        y = hole->height - height;
+        less = terrimpi_min_u32(x, y);
+        more = terrimpi_max_u32(x, y);
+        if (less < best_less || (less == best_less && more < best_more)) {
+            best = i;
+            best_less = less;
+            best_more = more;
+        }
+    }
+    return best;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, uint32_t *slot)
+{
+    uint32_t best, handle;
+    terrimp_rect taken, whole;
+    if (!atlas || !slot)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    if (width < 1u || height < 1u)
+        return TERRIMP_E_RANGE;
+    best = atlas->hole_count;
+    handle = atlas->unused;
+    if (width <= atlas->desc.width && height <= atlas->desc.height)
+        best = terrimpi_live_best(atlas, width + atlas->desc.padding, height + atlas->desc.padding);
+    if (best == atlas->hole_count || handle == atlas->desc.max_slots) {
+        atlas->failures++;
+        return TERRIMP_E_CAPACITY;
+    }
+    atlas->unused = atlas->slots[handle].x;
+    atlas->slots[handle] =
+        terrimpi_rect(atlas->holes[best].x, atlas->holes[best].y, width, height);
+    atlas->slot_end = terrimpi_max_u32(atlas->slot_end, handle + 1u);
+    atlas->slot_count++;
+    atlas->texels_used += width * height;
+    taken = terrimpi_live_padded(atlas, handle);
+    whole = terrimpi_live_whole(atlas);
+    terrimpi_holes_cut(atlas, 0, &taken, &whole);
+    *slot = handle;
+    return TERRIMP_OK;
+}
+
+/* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
+static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint32_t slot)
+{
+    if (!atlas)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    if (slot >= atlas->desc.max_slots)
+        return TERRIMP_E_RANGE;
+    return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
+}
+
+/* Adds the maximal free rectangles that overlap `freed`, which is no slot any more; they replace
+   those that they contain. */
+static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
+{
+    uint32_t i, k, old = atlas->hole_count;
+    if (old == atlas->max_holes)
+        old = --atlas->hole_count;
+    atlas->holes[atlas->hole_count++] = terrimpi_live_whole(atlas);
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect taken = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width > 0)
+            terrimpi_holes_cut(atlas, old, &taken, freed);
+    }
+    for (i = 0; i < old; i++)
+        for (k = old; k < atlas->hole_count; k++)
+            if (terrimpi_rect_contains(&atlas->holes[k], &atlas->holes[i])) {
+                atlas->holes[i].width = 0;
+                break;
+            }
+    terrimpi_holes_compact(atlas, 0);
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
+{
+    terrimp_result result = terrimpi_live_check(atlas, slot);
+    terrimp_rect freed;
+    if (result != TERRIMP_OK)
+        return result;
+    freed = terrimpi_live_padded(atlas, slot);
+    atlas->texels_used -= atlas->slots[slot].width * atlas->slots[slot].height;
+    atlas->slot_count--;
+    atlas->slots[slot] = terrimpi_rect(atlas->unused, 0, 0, 0);
+    atlas->unused = slot;
+    terrimpi_live_reclaim(atlas, &freed);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
+                                                   terrimp_rect *rect)
+{
+    terrimp_result result = terrimpi_live_check(atlas, slot);
+    if (!rect)
+        return TERRIMP_E_NULL;
+    if (result == TERRIMP_OK)
+        *rect = atlas->slots[slot];
+    return result;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2])
+{
+    uint32_t i, best_x = 0, best_y = 0;
+    if (!atlas || !size)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    if (width < 1u || width > 65536u || height < 1u || height > 65536u)
+        return TERRIMP_E_RANGE;
+    for (i = 0; i < atlas->hole_count; i++) {
+        const terrimp_rect *hole = &atlas->holes[i];
+        uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
+        uint32_t y = terrimpi_min_u32(hole->height, atlas->desc.padding + height);
+        if (x <= atlas->desc.padding || y <= atlas->desc.padding)
+            continue;
+        x -= atlas->desc.padding;
+        y -= atlas->desc.padding;
+        if (x * height < y * width) /* both products are below 2^31 + 2^16 */
+            y = x * height / width;
+        else
+            x = y * width / height;
+        if (x > 0 && y > 0 && (x > best_x || y > best_y)) {
+            best_x = x;
+            best_y = y;
+        }
+    }
+    if (atlas->unused == atlas->desc.max_slots)
+        best_x = best_y = 0;
+    size[0] = best_x;
+    size[1] = best_y;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
+                                                    terrimp_live_atlas_stats *stats)
+{
+    uint32_t i, padding;
+    if (!atlas || !stats)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    padding = atlas->desc.padding;
+    stats->slots = atlas->slot_count;
+    stats->texels_used = atlas->texels_used;
+    stats->texels_free = atlas->desc.width * atlas->desc.height - atlas->texels_used;
+    stats->largest_width = stats->largest_height = 0;
+    stats->failures = atlas->failures;
+    for (i = 0; i < atlas->hole_count; i++) {
+        const terrimp_rect *hole = &atlas->holes[i];
+        if (hole->width > padding && hole->height > padding &&
+            (hole->width - padding) * (hole->height - padding) >
+                stats->largest_width * stats->largest_height) {
+            stats->largest_width = hole->width - padding;
+            stats->largest_height = hole->height - padding;
+        }
+    }
+    return TERRIMP_OK;
 }
 
 /* ==== Terrain ============================================================ >>impl-terrain */
