@@ -171,25 +171,6 @@ static double draw_frame(host *h, terrimp_view *view, uint8_t *rgb)
     return (double)start * 1000.0 / CLOCKS_PER_SEC;
 }
 
-static int is_sky(const uint8_t *rgb, int pixel)
-{
-    return rgb[pixel * 3] == 173 && rgb[pixel * 3 + 1] == 211 && rgb[pixel * 3 + 2] == 239;
-}
-
-/* Pixels of sky where the full mesh has terrain all round. */
-static int count_holes(void)
-{
-    int x, y, i, holes = 0;
-    for (y = 1; y + 1 < HEIGHT; y++)
-        for (x = 1; x + 1 < WIDTH; x++) {
-            int pixel = y * WIDTH + x, terrain = 0;
-            for (i = 0; i < 9; i++)
-                terrain += !is_sky(full, pixel + (i / 3 - 1) * WIDTH + i % 3 - 1);
-            holes += terrain == 9 && is_sky(ours, pixel);
-        }
-    return holes;
-}
-
 int main(void)
 {
     static host h;
@@ -201,7 +182,8 @@ int main(void)
     terrimp_view *view = NULL, *full_view = NULL;
     terrimp_stats stats;
     double ms, full_ms, psnr, worst = 99.0;
-    int frame, holes = 0;
+    size_t holes = 0;
+    int frame;
 
     desc.field.samples = samples, desc.field.width = desc.field.depth = SIDE;
     desc.field.format = TERRIMP_FORMAT_U16;
@@ -229,12 +211,12 @@ int main(void)
         full_ms = draw_frame(&h, full_view, full);
         psnr = image_psnr(image_mean_square(ours, full, WIDTH * HEIGHT, sky));
         worst = psnr < worst ? psnr : worst;
-        holes += count_holes();
+        holes += image_holes(ours, full, WIDTH, HEIGHT, sky);
         terrimp_view_get_stats(view, &stats);
         printf("frame %2d: %4.1f ms, full mesh %4.1f ms, %.1f dB; %u triangles, %u captures\n",
                frame, ms, full_ms, psnr, stats.triangles, stats.captures);
     }
-    printf("%d holes, at worst %.1f dB\n", holes, worst);
+    printf("%zu holes, at worst %.1f dB\n", holes, worst);
     terrimp_view_destroy(full_view), terrimp_view_destroy(view), terrimp_terrain_destroy(terrain);
     free(h.indices), free(h.mesh_indices), free(h.mesh_xyz), free(samples);
     return image_write_png("software.png", ours, WIDTH, HEIGHT) || holes || worst < 30.0;
