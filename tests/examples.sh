@@ -145,6 +145,11 @@ if [ -x build/fixed_function ]; then
     check "fixed_function calls nothing newer than OpenGL 1.1" \
         prints_nothing newer_than_opengl_1_1
 fi
+if [ -x build/cpp_host ]; then
+    check "cpp_host draws its frames, close to the full mesh" host_runs cpp_host
+else
+    skip "cpp_host: there is no C++ compiler"
+fi
 if [ -x build/flyover ]; then
     check "flyover flies over its own terrain" prints_nothing flies_quietly
     check "flyover writes a line of statistics a frame" statistics_are_a_table
