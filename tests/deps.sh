@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs what the examples and tests need and this Debian lacks: compilers, libc's headers, libpng,
-# and OpenGL without a window from OSMesa and from EGL, of which one is enough.
+# Installs what the examples and tests need and this Debian lacks: compilers, libc's headers,
+# libpng, and OpenGL without a window from OSMesa and from EGL, of which one is enough.
 # Each need is tested by building (and running) the smallest program that has it.
 
 CC=${CC:-cc}

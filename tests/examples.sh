@@ -68,8 +68,8 @@ host_runs() # name
     (cd $work && ../../$1) > $work/$1.txt && [ -s $work/$1.png ] || { cat $work/$1.txt; false; }
 }
 
-# OpenGL functions that fixed_function calls and OpenGL 1.1 lacks. Whoever needs another old one adds
-# it to the list.
+# OpenGL functions that fixed_function calls and OpenGL 1.1 lacks. Whoever needs another old one
+# adds it to the list.
 newer_than_opengl_1_1()
 {
     nm -u build/fixed_function.o | awk '$2 ~ /^gl/ { print $2 }' | grep -vxE \

@@ -141,8 +141,7 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
    get the same number: no gap and no pixel twice. */
 static int first_pixel(float edge, int limit)
 {
-    edge = ceilf(edge - 0.5f);
-    return edge > 0.0f ? edge < (float)limit ? (int)edge : limit : 0;
+    return edge > 0.0f ? edge < (float)limit ? (int)(edge + 0.5f) : limit : 0;
 }
 
 static float edge_at(const raster_corner *top, const raster_corner *bottom, float y)
@@ -177,6 +176,7 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
 {
     float bx = b->x - a->x, by = b->y - a->y, cx = c->x - a->x, cy = c->y - a->y;
     float area = bx * cy - cx * by, scale = 1.0f / area;
+    float left = b->x < c->x ? b->x : c->x, right = b->x < c->x ? c->x : b->x;
     const raster_corner *top = a, *middle = b, *bottom = c, *swap;
     gradient dx, dy;
     sampler from;
@@ -191,8 +191,9 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
         swap = top, top = middle, middle = swap;
     y = first_pixel(top->y, r->height);
     end = first_pixel(bottom->y, r->height);
-    if (y >= end)
-        return;
+    left = a->x < left ? a->x : left, right = a->x > right ? a->x : right;
+    if (y >= end || first_pixel(left, r->width) >= first_pixel(right, r->width))
+        return; /* between the centres of pixels, as most triangles of a full mesh, or outside */
     dx.depth = ((b->depth - a->depth) * cy - (c->depth - a->depth) * by) * scale;
     dy.depth = ((c->depth - a->depth) * bx - (b->depth - a->depth) * cx) * scale;
     dx.s = ((b->s - a->s) * cy - (c->s - a->s) * by) * scale;
@@ -208,14 +209,14 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
                                          : edge_at(middle, bottom, centre);
         int x = first_pixel(one < other ? one : other, r->width);
         int x_end = first_pixel(one < other ? other : one, r->width);
-        float right = (float)x + 0.5f - a->x, down = centre - a->y;
+        float across = (float)x + 0.5f - a->x, down = centre - a->y;
         gradient at;
         if (x >= x_end)
             continue;
-        at.depth = a->depth + right * dx.depth + down * dy.depth;
-        at.s = a->s + right * dx.s + down * dy.s;
-        at.t = a->t + right * dx.t + down * dy.t;
-        at.q = a->q + right * dx.q + down * dy.q;
+        at.depth = a->depth + across * dx.depth + down * dy.depth;
+        at.s = a->s + across * dx.s + down * dy.s;
+        at.t = a->t + across * dx.t + down * dy.t;
+        at.q = a->q + across * dx.q + down * dy.q;
         fill_span(r, &from, at, &dx, x, x_end, y, style->alpha);
     }
 }
