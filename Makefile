@@ -7,6 +7,12 @@
 ##                  ARGS='...'   more options for build/flyover
 ## make test      runs every test
 ## make bench     measures
+## make check-portable   every compiler, other machines under an emulator, no operating system
+## make sizes     bytes of code for small machines
+## make fuzz SECONDS=60   looks for input that breaks the library, so long for each fuzzer
+## make coverage  which lines and branches the unit tests reach
+## make analyse   static analysis and valgrind
+## make deps-portable    installs what these five use, on Debian
 ## make clean     removes build/
 ##
 ## With any of them: CC=clang, CFLAGS='...', CONFIG=release|debug|sanitize|coverage, and
@@ -52,7 +58,7 @@ EXAMPLES_CPP := $(patsubst examples/%.cpp,%,$(wildcard examples/*.cpp))
 BENCHES  := $(patsubst tests/%.c,%,$(wildcard tests/bench_*.c))
 TESTS    := unit unit_host render
 HOST     := $(patsubst examples/%.c,$(BUILD)/%.o,$(wildcard examples/host/*.c))
-DEPS     := $(filter deps,$(MAKECMDGOALS))
+DEPS     := $(filter deps deps-portable,$(MAKECMDGOALS))
 
 all: $(EXAMPLES) $(if $(shell command -v $(firstword $(CXX))),$(EXAMPLES_CPP))
 
@@ -76,6 +82,16 @@ test: | $(DEPS)
 bench: $(BENCHES) flyover
 	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
 	@BUILD=$(BUILD) sh tests/bench_frames.sh
+
+deps-portable:
+	@sh tests/deps_portable.sh
+
+check-portable sizes coverage analyse: | $(DEPS)
+	@sh tests/$(subst check-,,$@).sh
+
+SECONDS ?= 60
+fuzz: | $(DEPS)
+	@sh tests/fuzz.sh $(SECONDS)
 
 clean:
 	rm -rf build
@@ -112,5 +128,6 @@ $(BUILD)/bench_%: LIBS = $(BENCH_LIBS)
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
-.PHONY: all help deps demo test bench clean $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
+.PHONY: all help deps demo test bench clean deps-portable check-portable sizes coverage analyse fuzz \
+        $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
 .SECONDARY:

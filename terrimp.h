@@ -1012,6 +1012,28 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
                                                 float max_angle_rad, float speed,
                                                 float *captures_per_s);
 
+/* How a mesh hides itself from a capture, and where the picture would best be split in two. */
+typedef struct terrimp_split {
+    float distance; /* [wu] along forward; 0 when no vertex is hidden */
+    float gap;      /* root mean square, over all vertices, of the part of its distance by which a
+                       vertex lies behind what hides it: such a vertex wears the picture of that,
+                       and once the eye has turned by an angle a it is about K sin(a) gap pixels
+                       off */
+    float gap_left; /* the same for pictures split there */
+} terrimp_split;
+
+/* Finds the best place to split a picture: the front part shows what lies before it, the back part
+   what lies behind it, with the same frustum. A slope behind a ridge then has a picture of its own.
+
+   xyz, vertex_count       [vertex_count][3] a mesh in front of the eye [wu]
+   indices, index_count    its triangles
+   Errors     E_NULL; E_RANGE for an index beyond the vertices or a count not of triangles
+   Cost       O(vertices * triangles): 0.07 ms for 85 triangles
+   Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
+TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
+                                                 uint32_t vertex_count, const uint16_t *indices,
+                                                 uint32_t index_count, terrimp_split *split);
+
 /* ==== Atlas ============================================================== >>atlas */
 
 /* One rectangle to be packed. */
@@ -1192,6 +1214,22 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
+
+/* Frees what costs least so that a rectangle fits, for an atlas that is full or fragmented: of the
+   places where it would border on slots or on free rectangles, the one whose slots have the lowest
+   sum of costs. It does not allocate: alloc will then find room.
+
+   costs      [max_slots] of losing each slot that is in use; one whose cost is negative, infinite
+              or NaN stays. Texels times how likely they are to be made again is a good cost
+   victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
+              only handles were wanting
+   count      out: how many
+   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
+              larger than the atlas or every such place holds a slot that stays: nothing changes
+   Cost       O(slots * (slots + free rectangles)) at worst */
+TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, const float *costs,
+                                                    uint32_t *victims, uint32_t *count);
 
 /* What the atlas holds. Errors: E_NULL; E_STATE before init. Cost: O(free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
@@ -1395,52 +1433,96 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain);
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
 
-/* How distant terrain is drawn. */
+/* How the terrain is drawn. */
 typedef enum terrimp_mode {
-    TERRIMP_MODE_DEFAULT = 0, /* same as IMPOSTOR */
-    TERRIMP_MODE_FULL,        /* all ground, at full resolution: the yardstick */
-    TERRIMP_MODE_IMPOSTOR,    /* impostors beyond the fade band */
+    TERRIMP_MODE_DEFAULT = 0, /* same as AUTO */
+    TERRIMP_MODE_FULL,        /* ground at full resolution: the yardstick */
+    TERRIMP_MODE_GEOMIP,      /* ground at the tolerance, and no impostors */
+    TERRIMP_MODE_IMPOSTOR,    /* after Hess: full-resolution ground up to the fade band, beyond it
+                                 every chunk is an impostor */
+    TERRIMP_MODE_AUTO,        /* each node as what costs least within the tolerance: ground, or an
+                                 impostor of its level */
     TERRIMP_MODE_COUNT
 } terrimp_mode;
+
+/* What drawing costs on the host's machine, in a unit of its choice: only ratios matter. The
+   defaults are triangles, as a software rasteriser was measured to need. */
+typedef struct terrimp_costs {
+    float draw;        /* one draw call [Limits: >= 0] [Default 0 -> 40] */
+    float triangle;    /* one triangle with its share of vertices [Limits: >= 0] [Default 0 -> 1] */
+    float ground_px;   /* to shade a pixel of ground [Limits: >= 0] [Default 0 -> 0.08] */
+    float impostor_px; /* to shade a pixel of an impostor [Limits: >= 0] [Default 0 -> 0.08] */
+    float capture;     /* to begin and end a capture [Limits: >= 0] [Default 0 -> 1000] */
+} terrimp_costs;
 
 /* The settings of a view. */
 typedef struct terrimp_view_desc {
     int mode;               /* terrimp_mode */
-    float fade_start;       /* [wu] from the eye: up to here ground is opaque
+    float tolerance_px;     /* an impostor whose picture has a larger parallax error is renewed
+                               [Limits: 0.05..100] [Default 0 -> 1] */
+    float ground_tolerance_px; /* error of ground in GEOMIP and AUTO, by ground_rule
+                               [Limits: 0.05..100] [Default 0 -> half of tolerance_px] */
+    int ground_rule;        /* terrimp_geomip_rule */
+    float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
+                               [Limits: 1..4] [Default 0 -> 1] */
+    float fade_start;       /* [wu] from the eye: nodes that come closer are opaque ground
                                [Default 0 -> 2 chunk sides] */
-    float fade_end;         /* [wu] from the eye: from here ground is gone
-                               [Limits: > fade_start] [Default 0 -> 1.5 * fade_start] */
+    float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
+                               ground fades over the impostors [Limits: > fade_start]
+                               [Default 0 -> 1.5 * fade_start] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees)] */
-    float tolerance_px;     /* a picture with a larger parallax error is renewed
-                               [Limits: 0.05..100] [Default 0 -> 1] */
     float texels_per_px;    /* sharpness of a picture when it is made
                                [Limits: 0.1..8] [Default 0 -> 2] */
-    uint32_t atlas_size;    /* texels along the side of each of the host's two atlas textures
+    float impostor_px;      /* AUTO: an impostor whose side covers more pixels is split
+                               [Limits: 8..4096] [Default 0 -> 320] */
+    uint32_t atlas_size;    /* texels along the side of each of the host's atlas textures
                                [Limits: 64..32768] [Default 0 -> 4096] */
-    uint32_t max_impostors; /* pictures kept at most [Limits: 1..65535] [Default 0 -> 2048] */
-    uint32_t max_captures;  /* pictures made in one frame at most; the most urgent go first, and a
-                               chunk that waits for its first is drawn as ground
-                               [Default 0 -> no limit] */
+    uint32_t atlas_count;   /* atlas textures [Limits: 1..16] [Default 0 -> 1] */
+    uint32_t max_impostors; /* pictures kept at most [Limits: 1..65534] [Default 0 -> 1024] */
+    uint32_t max_ground;    /* ground nodes drawn at most; AUTO and GEOMIP coarsen the ground rather
+                               than exceed it, FULL and IMPOSTOR need the chunks in sight
+                               [Default 0 -> all chunks; in GEOMIP and AUTO 4096 if they are more] */
+    uint32_t max_captures;  /* pictures begun in one frame at most. What waits is drawn from older
+                               pictures or as ground [Limits: 1..1024] [Default 0 -> 64] */
+    uint32_t max_capture_texels;    /* the same in texels [Default 0 -> no limit] */
+    uint32_t max_capture_triangles; /* the same in triangles; a picture that needs more is made in
+                                       pieces, over several frames [Default 0 -> no limit] */
+    int no_lookahead;       /* nonzero: pictures are made from where the eye is; else from a place
+                               ahead of it, where they last longer */
+    int no_splits;          /* nonzero: no picture is made in two parts; else in AUTO a picture that
+                               would show a ridge smeared over the slope behind it is */
+    int no_spreading;       /* nonzero: a picture is renewed when it is due; else some frames earlier
+                               or later, so that the load of frames is even */
+    terrimp_costs costs;
 } terrimp_view_desc;
 
-/* Draw the full detail of a chunk. */
+/* Draw a ground node. */
 typedef struct terrimp_ground_command {
-    uint32_t node;        /* chunk: its vertices are those of terrimp_terrain_fill_ground */
+    uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
+    uint32_t level;
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
-    float fade_start;     /* alpha is 1 up to this distance from the eye, */
-    float fade_end;       /* 0 from this one on, linear between; both 0: opaque */
-    float depth_bias;     /* as for impostors; 0 but for distant chunks that wait for a picture */
+    float alpha;          /* 1: opaque; below: blended over what is there */
+    float depth_bias;     /* as for impostors; 0 but for ground beyond the fade band */
+    float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
+    float side[TERRIMP_SIDE_COUNT];
+    float side_coarse[TERRIMP_SIDE_COUNT];
 } terrimp_ground_command;
 
-/* Render a picture: bind the atlas, set viewport and scissor to the slot, clear it to transparent
-   black and the farthest depth. The ground commands up to end_capture are drawn with these
-   matrices, opaque, with alpha 1. */
+/* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
+   it to the farthest depth and, when `clear` is set, to transparent black. The ground commands up
+   to end_capture are drawn with these matrices, opaque. */
 typedef struct terrimp_capture_command {
     uint32_t node;
-    uint32_t atlas;               /* 0 or 1 */
-    terrimp_rect slot;            /* y = 0 is row 0 of the texture */
+    uint32_t level;
+    uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
+                                       matrices clip what belongs to the other one */
+    uint32_t atlas;                 /* < atlas_count */
+    terrimp_rect slot;              /* y = 0 is row 0 of the texture */
+    int clear;                      /* nonzero: the first piece of a picture. Pieces come back to
+                                       front, each over those before */
+    int complete;                   /* nonzero: the last piece */
     float view[16], projection[16];
     float eye[3];
     float clip_min[2], clip_max[2]; /* world (x, z): what belongs to the picture. The ground
@@ -1451,9 +1533,13 @@ typedef struct terrimp_capture_command {
    texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
    divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. A vertex p is
    drawn at eye + (p - eye) * (1 + depth_bias): at the same place of the screen, only deeper, so
-   that ground is drawn over it. */
+   that ground is drawn over it. Of a picture in two parts both are drawn, each only where r / q is
+   within 0..1: by a discard, or by the clip planes r >= 0 and q - r >= 0, which are rows of the
+   matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
+    uint32_t level;
+    uint32_t part, part_count;
     uint32_t atlas;
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
     uint32_t first_index;
@@ -1487,21 +1573,26 @@ typedef struct terrimp_callbacks {
 
 /* What the last update decided. */
 typedef struct terrimp_stats {
-    uint32_t visible;            /* chunks within the frustum */
-    uint32_t ground;             /* chunks drawn as ground, in the fade band too */
-    uint32_t impostors;          /* chunks drawn as impostors, in the fade band too */
-    uint32_t waiting;            /* chunks drawn as ground for want of a picture */
+    uint32_t visible;            /* nodes of which it was decided what they are drawn as */
+    uint32_t ground;             /* ground nodes drawn */
+    uint32_t impostors;          /* impostors drawn */
+    uint32_t impostors_by_level[TERRIMP_GEOMIP_LEVELS];
+    uint32_t waiting;            /* impostors that were wanted and have no picture yet */
     uint32_t draws;              /* commands on the screen */
     uint32_t triangles;          /* of those */
-    uint32_t captures;           /* pictures to be made */
+    uint32_t captures;           /* pictures, or pieces of them, to be made */
+    uint32_t splits;             /* pictures among them that are made in two parts */
     uint32_t captured_texels;
     uint32_t captured_triangles;
-    uint32_t repacks;            /* of an atlas, so far */
-    float texel_scale;           /* of the newest packing: below 1 the atlas was too small and
-                                    pictures are that much coarser */
-    float atlas_used;            /* fraction of the newest atlas that slots cover */
+    uint32_t captures_due;       /* pictures that the tolerances wanted renewed */
+    float shortfall;             /* part of these that was put off, 0..1 */
+    float reuse;                 /* for how many frames a picture is drawn, a running mean */
+    uint32_t texels_used, texels_free; /* of all atlases */
+    uint32_t atlas_failures;     /* pictures that found no room, so far */
+    uint32_t evictions;          /* pictures given up for others, so far */
+    float ground_tolerance_px;   /* what max_ground made of it */
     float worst_angle_rad;       /* of the impostors on the screen */
-    float worst_parallax_px;     /* the same: bound of the parallax error */
+    float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
                                     drawn, depth bias included: update with a camera that sees far
                                     enough, then draw with these; z_near is 0 within a box */
@@ -1529,15 +1620,16 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
-   Errors     E_NULL; those of terrimp_camera_resolve: the frame before stays
-   Cost       O(visible chunks); no allocation */
+   Errors     E_NULL; those of terrimp_camera_resolve; E_CAPACITY when more than max_ground chunks
+              are in sight in mode FULL or IMPOSTOR: the frame before stays
+   Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Calls back with the frame's commands: each capture with its ground, then impostors and waiting
-   chunks, then the floor, then ground; impostors and ground front to back.
+/* Calls back with the frame's commands: captures, each with its ground; impostors and the ground
+   between them, front to back; the floor; the ground before them, front to back.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
-              before the first update */
+              before the first update, and after invalidate and touch until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
@@ -1546,6 +1638,14 @@ TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terr
 
 /* Forgets every picture, for instance when the light has changed or textures were lost. */
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
+
+/* Forgets the pictures that show a rectangle of samples, after an edit.
+
+   x, z       column and row of the first sample [Limits: inside the field]
+   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
+   Errors     E_NULL; E_RANGE */
+TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
+                                              uint32_t cols, uint32_t rows);
 
 #ifndef TERRIMP_NO_MALLOC
 
@@ -1616,9 +1716,22 @@ TERRIMP_API const char *terrimp_result_text(int result)
     }
 }
 
+/* Rounds what a machine may hold with more precision or range than a float has, as the x87 does:
+   for values that are compared with what another place computes anew. */
+static float terrimpi_float(float value)
+{
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0
+    volatile float rounded = value;
+    return rounded;
+#else
+    return value;
+#endif
+}
+
 static int terrimpi_finite(float value)
 {
-    return value - value == 0.0f;
+    float rounded = terrimpi_float(value);
+    return rounded - rounded == 0.0f;
 }
 
 static int terrimpi_finite3(const float value[3])
@@ -1754,7 +1867,7 @@ static size_t terrimpi_sample_bytes(int format)
    agree on the rounded value. */
 static float terrimpi_line(float origin, float spacing, uint32_t i)
 {
-    return origin + (float)i * spacing;
+    return terrimpi_float(origin + (float)i * spacing);
 }
 
 /* Checks one axis: 2^-23 is the step of a float relative to its value. */
@@ -1859,7 +1972,7 @@ static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
 {
-    return field->height_offset + field->height_scale * raw;
+    return terrimpi_float(field->height_offset + field->height_scale * raw);
 }
 
 /* The world height of sample (x, z); a void gives the height of its no-data value. */
@@ -4709,7 +4822,7 @@ static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring
 static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
 {
     terrimpi_ring ring;
-    float error, dx, dz, length;
+    float error, dx = 0.0f, dz = 0.0f, length;
     int i;
     terrimpi_find_ring(s, v, &ring);
     error = TERRIMPI_GAIN * terrimpi_aim(s, v, &ring, &dx, &dz);
@@ -6287,7 +6400,9 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
 }
 
 /* ==== Impostor =========================================================== >>impl-impostor */
-/* Based on: Hess 2010, sections 3.3 to 3.5. */
+/* Based on: Hess 2010, sections 3.3 to 3.5 and 6.2. */
+
+#define TERRIMPI_SPLITS 24u /* places of a split that are tried */
 
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
@@ -6517,6 +6632,99 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
             rate += 1.0f / seconds;
     }
     *captures_per_s = rate;
+    return TERRIMP_OK;
+}
+
+/* Where the way from the eye to a point, both relative to the eye, passes through a triangle: the
+   fraction of the way, or 1 when it does not. */
+static float terrimpi_hidden_at(const float to[3], const float a[3], const float b[3],
+                                const float c[3])
+{
+    float ab[3], ac[3], p[3], q[3], det, u, v, t;
+    int i;
+    for (i = 0; i < 3; i++) {
+        ab[i] = b[i] - a[i];
+        ac[i] = c[i] - a[i];
+    }
+    terrimpi_cross(to, ac, p);
+    det = terrimpi_dot(ab, p);
+    if (!(terrimpi_abs(det) > 0.0f))
+        return 1.0f;
+    u = -terrimpi_dot(a, p) / det;
+    if (!(u >= 0.0f && u <= 1.0f))
+        return 1.0f;
+    terrimpi_cross(a, ab, q); /* of the eye minus a, and ab, with the sign turned */
+    v = -terrimpi_dot(to, q) / det;
+    if (!(v >= 0.0f && u + v <= 1.0f))
+        return 1.0f;
+    t = -terrimpi_dot(ac, q) / det;
+    return t > 0.0f && t < 1.0f ? t : 1.0f;
+}
+
+/* The fraction of the way to a vertex at which the mesh first hides it, or 1. */
+static float terrimpi_first_hit(const float eye[3], const float *xyz, uint32_t vertex,
+                                const uint16_t *indices, uint32_t index_count)
+{
+    float first = 1.0f, to[3], corner[3][3];
+    uint32_t i, k, axis;
+    for (axis = 0; axis < 3u; axis++)
+        to[axis] = xyz[vertex * 3u + axis] - eye[axis];
+    for (i = 0; i < index_count; i += 3u) {
+        if (indices[i] == vertex || indices[i + 1u] == vertex || indices[i + 2u] == vertex)
+            continue;
+        for (k = 0; k < 3u; k++)
+            for (axis = 0; axis < 3u; axis++)
+                corner[k][axis] = xyz[indices[i + k] * 3u + axis] - eye[axis];
+        first = terrimpi_min(first, terrimpi_hidden_at(to, corner[0], corner[1], corner[2]));
+    }
+    return first;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
+                                                 uint32_t vertex_count, const uint16_t *indices,
+                                                 uint32_t index_count, terrimp_split *split)
+{
+    float all = 0.0f, saved[TERRIMPI_SPLITS], first, last, step;
+    uint32_t i, k, best = 0;
+    if (!capture || !xyz || !indices || !split)
+        return TERRIMP_E_NULL;
+    if (vertex_count == 0 || index_count % 3u != 0)
+        return TERRIMP_E_RANGE;
+    for (i = 0; i < index_count; i++)
+        if (indices[i] >= vertex_count)
+            return TERRIMP_E_RANGE;
+    first = TERRIMPI_FLOAT_MAX;
+    last = 0.0f;
+    for (i = 0; i < vertex_count; i++) {
+        float to[3], depth;
+        for (k = 0; k < 3u; k++)
+            to[k] = xyz[i * 3u + k] - capture->eye[k];
+        depth = terrimpi_dot(to, capture->forward);
+        first = terrimpi_min(first, depth);
+        last = terrimpi_max(last, depth);
+    }
+    step = (last - first) / (float)(TERRIMPI_SPLITS + 1u);
+    memset(saved, 0, sizeof saved);
+    for (i = 0; i < vertex_count; i++) {
+        float hit = terrimpi_first_hit(capture->eye, xyz, i, indices, index_count), to[3], depth;
+        if (hit > 0.98f) /* a neighbour that leans over it */
+            continue;
+        for (k = 0; k < 3u; k++)
+            to[k] = xyz[i * 3u + k] - capture->eye[k];
+        depth = terrimpi_dot(to, capture->forward);
+        all += (1.0f - hit) * (1.0f - hit);
+        for (k = 0; k < TERRIMPI_SPLITS; k++) {
+            float at = first + (float)(k + 1u) * step;
+            if (depth * hit < at && depth > at)
+                saved[k] += (1.0f - hit) * (1.0f - hit);
+        }
+    }
+    for (k = 1; k < TERRIMPI_SPLITS; k++)
+        if (saved[k] > saved[best])
+            best = k;
+    split->distance = all > 0.0f ? first + (float)(best + 1u) * step : 0.0f;
+    split->gap = TERRIMP_SQRTF(all / (float)vertex_count);
+    split->gap_left = TERRIMP_SQRTF(terrimpi_max(0.0f, all - saved[best]) / (float)vertex_count);
     return TERRIMP_OK;
 }
 
@@ -6770,14 +6978,14 @@ TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terri
 
 /* ---- the live atlas ----
 
-   The free space is kept as all of its maximal rectangles: those that nothing free contains. A
-   rectangle fits somewhere if and only if it fits into one of them, and neighbouring free areas
-   need no merging. One operation makes them all: cutting a rectangle out of a list of them. An
-   allocation cuts the new slot out of the list. When a slot is freed, the maximal rectangles that
-   overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
+   The free space is kept as all of its maximal rectangles, here called holes: those that no other
+   free rectangle contains. A rectangle fits somewhere if and only if it fits into one of them, and
+   neighbouring free areas need no merging. One operation makes them all: cutting a rectangle out of
+   a list of holes. An allocation cuts the new slot out of the list. When a slot is freed, the holes
+   that overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
 
    Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
-   count as larger by it, so that the rest of the code has not to know of it. */
+   count as larger by it, so that the rest of the code need not know of it. */
 
 static int terrimpi_rects_overlap(const terrimp_rect *a, const terrimp_rect *b)
 {
@@ -6820,26 +7028,61 @@ static terrimp_rect terrimpi_rect_beside(const terrimp_rect *rect, const terrimp
     }
 }
 
-/* Removes the rectangles that a flag of width 0 marks, from `begin` on; the order stays. */
-static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t begin)
+/* Whether rectangles overlap or have a piece of an edge or a corner in common. */
+static int terrimpi_rects_touch(const terrimp_rect *a, const terrimp_rect *b)
 {
-    uint32_t i, kept = begin;
+    return a->x <= b->x + b->width && b->x <= a->x + a->width && a->y <= b->y + b->height &&
+           b->y <= a->y + a->height;
+}
+
+/* Moves the holes from `begin` on that touch a rectangle to the end; returns the first of them. */
+static uint32_t terrimpi_holes_part(terrimp_live_atlas *atlas, uint32_t begin,
+                                    const terrimp_rect *rect)
+{
+    uint32_t i, first = begin;
     for (i = begin; i < atlas->hole_count; i++)
+        if (!terrimpi_rects_touch(&atlas->holes[i], rect)) {
+            terrimp_rect swap = atlas->holes[i];
+            atlas->holes[i] = atlas->holes[first];
+            atlas->holes[first++] = swap;
+        }
+    return first;
+}
+
+/* Marks the holes from `first` to `last` that one from `by` on contains: their width becomes 0. */
+static void terrimpi_holes_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
+                                uint32_t by)
+{
+    terrimp_rect *holes = atlas->holes;
+    uint32_t i, k;
+    for (i = first; i < last; i++)
+        for (k = by; k < atlas->hole_count; k++)
+            if (k != i && holes[k].width > 0 && terrimpi_rect_contains(&holes[k], &holes[i])) {
+                holes[i].width = 0;
+                break;
+            }
+}
+
+/* Removes the marked holes from `first` on. */
+static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t first)
+{
+    uint32_t i, kept = first;
+    for (i = first; i < atlas->hole_count; i++)
         if (atlas->holes[i].width > 0)
             atlas->holes[kept++] = atlas->holes[i];
     atlas->hole_count = kept;
 }
 
-/* Cuts a rectangle out of the free ones from `begin` on. Of the pieces, those that are maximal and
-   overlap `window` are kept. A piece for which there is no memory is lost until a slot beside it is
-   freed. */
+/* Cuts a rectangle out of the holes from `begin` on. Of the pieces, those that are maximal and
+   overlap `window` are kept; what contains one of them touches the rectangle as they do. A piece
+   for which there is no memory is lost until a slot beside it is freed. */
 static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const terrimp_rect *taken,
                                const terrimp_rect *window)
 {
     terrimp_rect *holes = atlas->holes;
-    uint32_t i, k, old = atlas->hole_count;
-    int side;
-    for (i = begin; i < old; i++) {
+    uint32_t i, first = terrimpi_holes_part(atlas, begin, taken), old = atlas->hole_count;
+    int side, cut = 0;
+    for (i = first; i < old; i++) {
         if (!terrimpi_rects_overlap(&holes[i], taken))
             continue;
         for (side = 0; side < 4; side++) {
@@ -6849,15 +7092,12 @@ static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const 
                 holes[atlas->hole_count++] = piece;
         }
         holes[i].width = 0;
+        cut = 1;
     }
-    for (i = old; i < atlas->hole_count; i++)
-        for (k = begin; k < atlas->hole_count; k++)
-            if (k != i && holes[k].width > 0 && terrimpi_rect_contains(&holes[k], &holes[i])) {
-                holes[i].width = 0;
-                break;
-            }
-    if (atlas->hole_count > old || old > begin)
-        terrimpi_holes_compact(atlas, begin);
+    if (cut) {
+        terrimpi_holes_mark(atlas, old, atlas->hole_count, first);
+        terrimpi_holes_compact(atlas, first);
+    }
 }
 
 /* The largest number of free rectangles that are kept. */
@@ -6929,24 +7169,66 @@ TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
     return TERRIMP_OK;
 }
 
-/* The free rectangle that fits best: the one that leaves least of one of its sides, then least of
-   the other, then the first. Returns hole_count when there is none. */
-static uint32_t terrimpi_live_best(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
+/* The smallest hole that a size fits into, the first of equals; hole_count for none. */
+static uint32_t terrimpi_live_find(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
 {
-    uint32_t i, best = atlas->hole_count, best_less = 0xffffffffu, best_more = 0xffffffffu;
+    uint32_t i, best = atlas->hole_count, best_area = 0xffffffffu;
+    if (width > atlas->desc.width || height > atlas->desc.height)
+        return best;
+    width += atlas->desc.padding;
+    height += atlas->desc.padding;
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
-        uint32_t x, y, less, more;
-        if (hole->width < width || hole->height < height)
-            continue;
-        x = hole->width - width;
-        y = hole->height - height;
-        less = terrimpi_min_u32(x, y);
-        more = terrimpi_max_u32(x, y);
-        if (less < best_less || (less == best_less && more < best_more)) {
+        if (hole->width >= width && hole->height >= height &&
+            hole->width * hole->height < best_area) {
             best = i;
-            best_less = less;
-            best_more = more;
+            best_area = hole->width * hole->height;
+        }
+    }
+    return best;
+}
+
+/* Length that the ranges [a, a + a_size] and [b, b + b_size] have in common. */
+static uint32_t terrimpi_shared(uint32_t a, uint32_t a_size, uint32_t b, uint32_t b_size)
+{
+    uint32_t low = terrimpi_max_u32(a, b), high = terrimpi_min_u32(a + a_size, b + b_size);
+    return high > low ? high - low : 0u;
+}
+
+/* How much of a place's outline lies at slots or at the rim of the atlas. */
+static uint32_t terrimpi_live_contact(const terrimp_live_atlas *atlas, const terrimp_rect *place)
+{
+    terrimp_rect whole = terrimpi_live_whole(atlas);
+    uint32_t i, right = place->x + place->width, top = place->y + place->height, length = 0;
+    length += (place->x == 0 ? place->height : 0u) + (right == whole.width ? place->height : 0u);
+    length += (place->y == 0 ? place->width : 0u) + (top == whole.height ? place->width : 0u);
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0)
+            continue;
+        if (slot.x == right || slot.x + slot.width == place->x)
+            length += terrimpi_shared(slot.y, slot.height, place->y, place->height);
+        if (slot.y == top || slot.y + slot.height == place->y)
+            length += terrimpi_shared(slot.x, slot.width, place->x, place->width);
+    }
+    return length;
+}
+
+/* The corner of a hole where a padded size touches most: what stays free is in one piece there. */
+static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
+                                         uint32_t width, uint32_t height)
+{
+    terrimp_rect best = terrimpi_rect(hole->x, hole->y, width, height);
+    uint32_t corner, most = 0;
+    for (corner = 0; corner < 4u; corner++) {
+        terrimp_rect place = terrimpi_rect(hole->x, hole->y, width, height);
+        uint32_t length;
+        place.x += corner & 1u ? hole->width - width : 0u;
+        place.y += corner & 2u ? hole->height - height : 0u;
+        length = terrimpi_live_contact(atlas, &place);
+        if (length > most) {
+            most = length;
+            best = place;
         }
     }
     return best;
@@ -6955,7 +7237,7 @@ static uint32_t terrimpi_live_best(const terrimp_live_atlas *atlas, uint32_t wid
 TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, uint32_t *slot)
 {
-    uint32_t best, handle;
+    uint32_t hole, handle;
     terrimp_rect taken, whole;
     if (!atlas || !slot)
         return TERRIMP_E_NULL;
@@ -6963,21 +7245,19 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
         return TERRIMP_E_STATE;
     if (width < 1u || height < 1u)
         return TERRIMP_E_RANGE;
-    best = atlas->hole_count;
+    hole = terrimpi_live_find(atlas, width, height);
     handle = atlas->unused;
-    if (width <= atlas->desc.width && height <= atlas->desc.height)
-        best = terrimpi_live_best(atlas, width + atlas->desc.padding, height + atlas->desc.padding);
-    if (best == atlas->hole_count || handle == atlas->desc.max_slots) {
+    if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
         atlas->failures++;
         return TERRIMP_E_CAPACITY;
     }
+    taken = terrimpi_live_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
+                                 height + atlas->desc.padding);
     atlas->unused = atlas->slots[handle].x;
-    atlas->slots[handle] =
-        terrimpi_rect(atlas->holes[best].x, atlas->holes[best].y, width, height);
+    atlas->slots[handle] = terrimpi_rect(taken.x, taken.y, width, height);
     atlas->slot_end = terrimpi_max_u32(atlas->slot_end, handle + 1u);
     atlas->slot_count++;
     atlas->texels_used += width * height;
-    taken = terrimpi_live_padded(atlas, handle);
     whole = terrimpi_live_whole(atlas);
     terrimpi_holes_cut(atlas, 0, &taken, &whole);
     *slot = handle;
@@ -6996,26 +7276,28 @@ static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint3
     return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
-/* Adds the maximal free rectangles that overlap `freed`, which is no slot any more; they replace
-   those that they contain. */
+/* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
+   contain, which touch it. */
 static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, k, old = atlas->hole_count;
-    if (old == atlas->max_holes)
-        old = --atlas->hole_count;
+    uint32_t i, first, old;
+    int beside;
+    if (atlas->hole_count == atlas->max_holes)
+        atlas->hole_count--;
+    first = terrimpi_holes_part(atlas, 0, freed);
+    old = atlas->hole_count;
     atlas->holes[atlas->hole_count++] = terrimpi_live_whole(atlas);
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect taken = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width > 0)
-            terrimpi_holes_cut(atlas, old, &taken, freed);
-    }
-    for (i = 0; i < old; i++)
-        for (k = old; k < atlas->hole_count; k++)
-            if (terrimpi_rect_contains(&atlas->holes[k], &atlas->holes[i])) {
-                atlas->holes[i].width = 0;
-                break;
-            }
-    terrimpi_holes_compact(atlas, 0);
+    /* What lies beside, above or below cuts most: with it first, the list stays short. */
+    for (beside = 1; beside >= 0; beside--)
+        for (i = 0; i < atlas->slot_end; i++) {
+            terrimp_rect taken = terrimpi_live_padded(atlas, i);
+            if (atlas->slots[i].width > 0 &&
+                beside == (terrimpi_shared(taken.x, taken.width, freed->x, freed->width) > 0 ||
+                           terrimpi_shared(taken.y, taken.height, freed->y, freed->height) > 0))
+                terrimpi_holes_cut(atlas, old, &taken, freed);
+        }
+    terrimpi_holes_mark(atlas, first, old, old);
+    terrimpi_holes_compact(atlas, first);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
@@ -7075,6 +7357,115 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
         best_x = best_y = 0;
     size[0] = best_x;
     size[1] = best_y;
+    return TERRIMP_OK;
+}
+
+/* The cost of all slots that a place overlaps, or `limit` as soon as it is not below that. */
+static float terrimpi_live_cost(const terrimp_live_atlas *atlas, const terrimp_rect *place,
+                                const float *costs, float limit)
+{
+    float cost = 0.0f;
+    uint32_t i;
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect taken = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &taken))
+            continue;
+        cost += costs[i];
+        if (!(costs[i] >= 0.0f && cost < limit))
+            return limit;
+    }
+    return cost;
+}
+
+/* Tries a rectangle at the four corners of another one, shifted into the atlas. */
+static void terrimpi_live_try(const terrimp_live_atlas *atlas, const terrimp_rect *at,
+                              const float *costs, terrimp_rect *best, float *best_cost)
+{
+    terrimp_rect whole = terrimpi_live_whole(atlas);
+    uint32_t corner;
+    for (corner = 0; corner < 4u; corner++) {
+        uint32_t x = corner & 1u ? at->x + at->width : at->x;
+        uint32_t y = corner & 2u ? at->y + at->height : at->y;
+        terrimp_rect place = *best;
+        float cost;
+        place.x = corner & 1u ? x - terrimpi_min_u32(x, place.width) : x;
+        place.y = corner & 2u ? y - terrimpi_min_u32(y, place.height) : y;
+        place.x = terrimpi_min_u32(place.x, whole.width - place.width);
+        place.y = terrimpi_min_u32(place.y, whole.height - place.height);
+        cost = terrimpi_live_cost(atlas, &place, costs, *best_cost);
+        if (cost < *best_cost) {
+            *best_cost = cost;
+            *best = place;
+        }
+    }
+}
+
+/* The place of a size, at a corner of a hole or of a slot, whose slots cost least. Returns 0 when
+   all such places hold a slot that stays. */
+static int terrimpi_live_cheapest(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
+                                  const float *costs, terrimp_rect *place)
+{
+    const float none = 3e38f;
+    float cost = none;
+    uint32_t i;
+    *place = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
+    for (i = 0; i < atlas->hole_count; i++)
+        terrimpi_live_try(atlas, &atlas->holes[i], costs, place, &cost);
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width > 0)
+            terrimpi_live_try(atlas, &slot, costs, place, &cost);
+    }
+    return cost < none;
+}
+
+/* The same for a mere handle: the place of the slot that costs least. */
+static int terrimpi_live_cheapest_slot(const terrimp_live_atlas *atlas, const float *costs,
+                                       terrimp_rect *place)
+{
+    float cost = 3e38f;
+    int found = 0;
+    uint32_t i;
+    for (i = 0; i < atlas->slot_end; i++)
+        if (atlas->slots[i].width > 0 && costs[i] >= 0.0f && costs[i] < cost) {
+            cost = costs[i];
+            *place = terrimpi_live_padded(atlas, i);
+            found = 1;
+        }
+    return found;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, const float *costs,
+                                                    uint32_t *victims, uint32_t *count)
+{
+    terrimp_rect place;
+    uint32_t i, freed = 0;
+    int fits;
+    if (!atlas || !costs || !victims || !count)
+        return TERRIMP_E_NULL;
+    if (!atlas->slots)
+        return TERRIMP_E_STATE;
+    if (width < 1u || height < 1u)
+        return TERRIMP_E_RANGE;
+    if (width > atlas->desc.width || height > atlas->desc.height)
+        return TERRIMP_E_CAPACITY;
+    fits = terrimpi_live_find(atlas, width, height) < atlas->hole_count;
+    if (fits && atlas->unused < atlas->desc.max_slots) {
+        *count = 0;
+        return TERRIMP_OK;
+    }
+    if (!(fits ? terrimpi_live_cheapest_slot(atlas, costs, &place)
+               : terrimpi_live_cheapest(atlas, width, height, costs, &place)))
+        return TERRIMP_E_CAPACITY;
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(&place, &slot))
+            continue;
+        terrimp_live_atlas_free(atlas, i);
+        victims[freed++] = i;
+    }
+    *count = freed;
     return TERRIMP_OK;
 }
 
@@ -7232,7 +7623,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
            TERRIMPI_FLOOR_QUADS)
         t->floor_level++;
     (void)terrimpi_mul(t->tree.node_count + 3u, t->index_stride * sizeof(float), &ok);
-    return ok && t->tree.node_count < UINT32_MAX / t->index_stride - 3u;
+    return ok && t->tree.node_count < 0xffffffffu / t->index_stride - 3u;
 }
 
 /* The one description of what is built: sets the arrays when there is a base. Returns the bytes, 0
@@ -7402,7 +7793,7 @@ static void terrimpi_make_facets(const terrimpi_patch *p, const terrimp_mesh *me
     for (i = 0; i < mesh->surface_index_count; i += 3u, facets++) {
         const uint16_t *corner = mesh->indices + i;
         memset(facets, 0, sizeof *facets);
-        facets->low = UINT32_MAX;
+        facets->low = 0xffffffffu;
         for (k = 0; k < 3u; k++)
             terrimpi_add_side(p, mesh->vertices + corner[k],
                               mesh->vertices + corner[k == 2u ? 0 : k + 1u], facets);
@@ -8069,7 +8460,7 @@ static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t 
 
 /* Pattern 0 is the whole node, as geomip pattern 0; then come, for each strip width but the whole,
    the strips of the eight neighbours, behind all geomip patterns. Returns where pattern `wanted`
-   stands, or with UINT32_MAX the end of all. */
+   stands, or with 0xffffffffu the end of all. */
 static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
@@ -8148,7 +8539,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->level_count = tree->level_count;
     info->node_count = tree->node_count;
     info->ground_vertex_count = (quads + 1u) * (quads + 1u);
-    info->ground_index_count = terrimpi_find_pattern(quads, UINT32_MAX).first_index;
+    info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
     info->mesh_vertex_count = tree->node_count * terrain->vertex_stride +
@@ -8169,7 +8560,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     if (!terrain->built)
         return TERRIMP_E_STATE;
     quads = terrain->desc.chunk_quads;
-    if (capacity < terrimpi_find_pattern(quads, UINT32_MAX).first_index)
+    if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
         return TERRIMP_E_CAPACITY;
     terrimp_pattern_fill(quads, TERRIMP_FORM_LIST, indices, capacity);
     strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
@@ -8407,134 +8798,294 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 #endif /* TERRIMP_NO_MALLOC */
 
 /* ==== View =============================================================== >>impl-view */
-/* Based on: Hess 2010, chapters 3 and 4. */
+/* Based on: Hess 2010, chapters 3, 4 and 6; de Boer 2000, section 2.2; DESIGN of this header: one
+   currency, pixels, and one cost model.
+
+   A frame has two cuts through the quadtree. The ground cut is what terrimp_geomip_select draws (or
+   all chunks in sight). The impostor cut is where nodes are small enough on the screen to be
+   impostors. Both are nested in one tree, so it falls apart into units: a unit is the topmost node
+   that is in either cut, and it holds leaves (ground nodes) and wants (impostors). For each unit it
+   is decided which of the two is drawn. */
 
 #define TERRIMPI_MARGIN 2u /* texels around the fitted picture in its slot */
 #define TERRIMPI_SMALLEST_PICTURE 8u
 #define TERRIMPI_NO_RECORD 0xffffu
+#define TERRIMPI_NO_LEAF 0xffffffffu
+#define TERRIMPI_STALE 2.0f       /* error over tolerance from which a picture is not drawn */
+#define TERRIMPI_EARLY 0.8f       /* ... from which it may be renewed before it is due */
+#define TERRIMPI_AHEAD 0.6f       /* ... that a new picture starts with: its eye lies ahead */
+#define TERRIMPI_LONGEST_LIFE 600.0f /* [frames] of a picture, for the cost model */
+#define TERRIMPI_FLIP 1.25f       /* how much cheaper the other kind must be to be changed to */
+#define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
+#define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
+#define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
+#define TERRIMPI_SPLIT_GAIN 0.7f  /* ... is split when its smears fall to this at most */
 
+/* A node and where it stands. */
+typedef struct terrimpi_site {
+    uint32_t node, level, x, z;
+} terrimpi_site;
 
-enum {
-    TERRIMPI_DRAW_GROUND = 1,
-    TERRIMPI_DRAW_IMPOSTOR = 2,
-    TERRIMPI_WAITS = 4 /* ground in the place of an impostor */
-};
+/* A slot of an atlas. */
+typedef struct terrimpi_seat {
+    uint32_t atlas, slot;
+} terrimpi_seat;
 
-/* A visible chunk. */
-typedef struct terrimpi_item {
-    uint32_t node;
-    float closest;   /* [wu] from the eye to its box */
-    uint16_t record; /* its picture's record, or TERRIMPI_NO_RECORD */
-    uint16_t draw;
-} terrimpi_item;
-
-/* A picture, or the place of one. Its slots stand in the view's `slots`, at the same index. */
+/* The picture of a node: whole, or its front and its back part. */
 typedef struct terrimpi_record {
     uint32_t node;
-    uint32_t seen;            /* number of the last frame in which the chunk was visible; 0: free */
+    uint32_t seen;            /* the last frame that had a use for it; 0: the record is free */
+    uint32_t listed;          /* the last frame that draws it */
+    uint32_t part_count;      /* 0: no picture yet */
+    uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
-    float sharpness;          /* wanted texels per unit of size at distance 1, when captured */
-    float texture_matrix[16];
-    float wanted;             /* sharpness wanted this frame */
-    float urgency;            /* of a new picture this frame; 0: the present one is good */
+    float sharpness;          /* texels per unit of size at distance 1 */
+    float cost;               /* of the capture */
+    terrimpi_seat parts[TERRIMPI_PARTS];
+    float texture_matrix[TERRIMPI_PARTS][16];
 } terrimpi_record;
+
+/* An impostor that would be good to have. */
+typedef struct terrimpi_want {
+    terrimpi_site site;
+    float closest;    /* [wu] from the eye to its box */
+    float pixels;     /* that it covers, about */
+    float urgency;    /* error of its picture over the tolerance */
+    float priority;   /* among the captures of this frame; 0: needs none */
+    float life;       /* [frames] that a new picture would last */
+    float draw_cost, capture_cost;
+    uint32_t record;  /* or TERRIMPI_NO_RECORD */
+} terrimpi_want;
+
+/* A part of the frame: see above. */
+typedef struct terrimpi_unit {
+    terrimpi_site site;
+    float closest;
+    uint32_t first_leaf, leaf_count;
+    uint32_t first_want, want_count; /* want_count 0: ground is all it can be */
+} terrimpi_unit;
+
+/* A capture of this frame. Its cells are the source nodes of the picture and those around. */
+typedef struct terrimpi_job {
+    terrimpi_site site;
+    uint32_t record;
+    uint32_t part_count;
+    terrimpi_seat parts[TERRIMPI_PARTS];
+    terrimp_rect rects[TERRIMPI_PARTS];
+    terrimp_capture captures[TERRIMPI_PARTS]; /* that differ in their clip distances */
+    uint32_t source;             /* level of the ground that is drawn */
+    uint32_t strip;              /* width of the border: see terrimpi_strip_quads */
+    uint32_t cell_from, cell_to; /* of this piece */
+    uint32_t cell_count;
+    uint32_t triangles;          /* of the whole picture */
+    float wanted, cost;
+} terrimpi_job;
+
+/* What is drawn before the floor: an impostor or distant ground. */
+typedef struct terrimpi_item {
+    uint32_t index;  /* of the record or the ground draw */
+    int is_impostor;
+} terrimpi_item;
 
 struct terrimp_view {
     const terrimp_terrain *terrain;
-    terrimp_view_desc desc;    /* resolved */
-    terrimp_camera camera;     /* resolved, of the last update */
+    terrimp_view_desc desc;     /* resolved */
+    terrimp_camera camera;      /* resolved, of the last update */
+    terrimp_frustum frustum;
     float pixel_factor;
     float depth_bias;
-    uint32_t frame;            /* updates so far */
-    uint32_t item_count, queue_count;
-    uint32_t next_record;      /* where the search for a record goes on */
-    uint32_t records_tried;    /* in this frame */
-    terrimp_atlas_pair pair;
+    float motion[3];            /* [wu] a frame, smoothed */
+    float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
+    uint32_t frame;             /* updates so far */
+    uint32_t unit_count, leaf_count, want_count, job_count, item_count;
+    uint32_t next_record;       /* where the search for a free record goes on */
+    int outdated;               /* what this frame would draw has been forgotten */
+    int open;                   /* `opened` is a picture of which pieces are missing */
+    terrimpi_job opened;
     terrimp_stats stats;
-    terrimpi_item *items;      /* [chunk_count] visible chunks, front to back */
-    uint16_t *record_of;       /* [chunk_count] */
-    terrimpi_record *records;  /* [max_impostors] */
-    terrimp_pair_slot *slots;  /* [max_impostors] */
-    terrimp_pack_item *sizes;  /* [max_impostors] */
-    uint32_t *order;           /* [max_impostors] */
-    uint16_t *queue;           /* [max_impostors] records to capture, most urgent first */
-    terrimp_shelf *shelves;    /* [2 * max_impostors] */
+    terrimp_geomip_view ground;
+    terrimp_live_atlas *atlases;   /* [atlas_count] */
+    uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
+    uint16_t *record_of;           /* [node_count] */
+    unsigned char *prefers;        /* [node_count] the unit was drawn as impostors */
+    float *shown;                  /* [max_ground] alpha of each ground draw, 0: not drawn, -1:
+                                      opaque beyond the fade band */
+    uint32_t *leaves;              /* [max_ground] ground draws, by unit */
+    terrimpi_unit *units;          /* [max_ground] front to back */
+    terrimpi_item *items;          /* [max_ground + max_impostors] front to back */
+    terrimpi_want *wants;          /* [max_impostors] by unit */
+    uint32_t *queue;               /* [max_impostors] wants to capture, most urgent first */
+    terrimpi_record *records;      /* [max_impostors] */
+    terrimpi_job *jobs;            /* [max_captures] */
+    float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
+    uint16_t *mesh_indices;        /* [index_stride] */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
 
+/* ---- settings and memory ---- */
+
+static void terrimpi_default(float *value, float otherwise)
+{
+    if (*value == 0.0f)
+        *value = otherwise;
+}
+
+static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
+{
+    if (*value == 0)
+        *value = otherwise;
+}
+
+static int terrimpi_within(float value, float low, float high)
+{
+    return value >= low && value <= high;
+}
+
+static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)
+{
+    if (!terrimpi_finite(c->draw) || !terrimpi_finite(c->triangle) ||
+        !terrimpi_finite(c->ground_px) || !terrimpi_finite(c->impostor_px) ||
+        !terrimpi_finite(c->capture))
+        return TERRIMP_E_NOT_FINITE;
+    if (c->draw < 0.0f || c->triangle < 0.0f || c->ground_px < 0.0f || c->impostor_px < 0.0f ||
+        c->capture < 0.0f)
+        return TERRIMP_E_RANGE;
+    terrimpi_default(&c->draw, 40.0f);
+    terrimpi_default(&c->triangle, 1.0f);
+    terrimpi_default(&c->ground_px, 0.08f);
+    terrimpi_default(&c->impostor_px, 0.08f);
+    terrimpi_default(&c->capture, 1000.0f);
+    return TERRIMP_OK;
+}
+
+static void terrimpi_view_defaults(const terrimp_terrain *t, terrimp_view_desc *d)
+{
+    uint32_t chunks = t->tree.level_first[1];
+    if (d->mode == TERRIMP_MODE_DEFAULT)
+        d->mode = TERRIMP_MODE_AUTO;
+    if (d->ground_rule == TERRIMP_GEOMIP_DEFAULT)
+        d->ground_rule = TERRIMP_GEOMIP_PICTURE;
+    terrimpi_default(&d->tolerance_px, 1.0f);
+    terrimpi_default(&d->ground_tolerance_px,
+                     terrimpi_max(0.05f, 0.5f * d->tolerance_px));
+    terrimpi_default(&d->morph_ratio, 1.0f);
+    terrimpi_default(&d->fade_start,
+                     2.0f * (float)t->desc.chunk_quads *
+                         terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z));
+    terrimpi_default(&d->fade_end, 1.5f * d->fade_start);
+    terrimpi_default(&d->max_angle_rad, 0.0873f);
+    terrimpi_default(&d->texels_per_px, 2.0f);
+    terrimpi_default(&d->impostor_px, 320.0f);
+    terrimpi_default_u32(&d->atlas_size, 4096);
+    terrimpi_default_u32(&d->atlas_count, 1);
+    terrimpi_default_u32(&d->max_impostors, 1024);
+    terrimpi_default_u32(&d->max_captures, 64);
+    if (d->max_ground == 0)
+        d->max_ground = d->mode == TERRIMP_MODE_GEOMIP || d->mode == TERRIMP_MODE_AUTO
+                            ? terrimpi_min_u32(chunks, 4096)
+                            : chunks;
+}
+
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out)
 {
     terrimp_view_desc d;
-    const terrimp_heightfield *field;
+    terrimp_result result;
     if (!terrain || !desc || !out)
         return TERRIMP_E_NULL;
     if (!terrain->built)
         return TERRIMP_E_STATE;
     d = *desc;
-    field = &terrain->desc.field;
+    result = terrimpi_costs_resolve(&d.costs);
+    if (result != TERRIMP_OK)
+        return result;
     if (!terrimpi_finite(d.fade_start) || !terrimpi_finite(d.fade_end) ||
         !terrimpi_finite(d.max_angle_rad) || !terrimpi_finite(d.tolerance_px) ||
-        !terrimpi_finite(d.texels_per_px))
+        !terrimpi_finite(d.ground_tolerance_px) || !terrimpi_finite(d.morph_ratio) ||
+        !terrimpi_finite(d.texels_per_px) || !terrimpi_finite(d.impostor_px))
         return TERRIMP_E_NOT_FINITE;
-    if (d.mode == TERRIMP_MODE_DEFAULT)
-        d.mode = TERRIMP_MODE_IMPOSTOR;
-    if (d.fade_start == 0.0f)
-        d.fade_start = 2.0f * (float)terrain->desc.chunk_quads *
-                       terrimpi_max(field->spacing_x, field->spacing_z);
-    if (d.fade_end == 0.0f)
-        d.fade_end = 1.5f * d.fade_start;
-    if (d.max_angle_rad == 0.0f)
-        d.max_angle_rad = 0.0873f;
-    if (d.tolerance_px == 0.0f)
-        d.tolerance_px = 1.0f;
-    if (d.texels_per_px == 0.0f)
-        d.texels_per_px = 2.0f;
-    if (d.atlas_size == 0)
-        d.atlas_size = 4096;
-    if (d.max_impostors == 0)
-        d.max_impostors = 2048;
-    if (d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || !(d.fade_start > 0.0f) ||
+    terrimpi_view_defaults(terrain, &d);
+    if (d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
+        d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || !(d.fade_start > 0.0f) ||
         !(d.fade_end > d.fade_start) || !terrimpi_finite(d.fade_end) ||
-        d.max_angle_rad < 0.001f || d.max_angle_rad > 1.5f ||
-        d.tolerance_px < 0.05f || d.tolerance_px > 100.0f || d.texels_per_px < 0.1f ||
-        d.texels_per_px > 8.0f || d.atlas_size < 64u || d.atlas_size > 32768u ||
-        d.max_impostors > 65535u)
+        !terrimpi_within(d.max_angle_rad, 0.001f, 1.5f) ||
+        !terrimpi_within(d.tolerance_px, 0.05f, 100.0f) ||
+        !terrimpi_within(d.ground_tolerance_px, 0.05f, 100.0f) ||
+        !terrimpi_within(d.morph_ratio, 1.0f, 4.0f) ||
+        !terrimpi_within(d.texels_per_px, 0.1f, 8.0f) ||
+        !terrimpi_within(d.impostor_px, 8.0f, 4096.0f) || d.atlas_size < 64u ||
+        d.atlas_size > 32768u || d.atlas_count > 16u || d.max_impostors > 65534u ||
+        d.max_captures > 1024u)
         return TERRIMP_E_RANGE;
     *out = d;
     return TERRIMP_OK;
 }
 
+static terrimp_live_atlas_desc terrimpi_atlas_desc(const terrimp_view_desc *d)
+{
+    terrimp_live_atlas_desc atlas;
+    memset(&atlas, 0, sizeof atlas);
+    atlas.width = atlas.height = d->atlas_size;
+    atlas.max_slots = (d->max_impostors + d->max_captures) * /* old and new of what is renewed */
+                      TERRIMPI_PARTS;
+    return atlas;
+}
+
 /* The one description of a view's block; as terrimpi_terrain_layout. */
 static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
 {
-    size_t at = 0, items, record_of, records, slots, sizes, order, queue, shelves;
-    size_t chunks = v->terrain->tree.level_first[1], most = v->desc.max_impostors;
+    size_t nodes = v->terrain->tree.node_count, impostors = v->desc.max_impostors;
+    size_t ground = v->desc.max_ground, at = 0, slots;
+    size_t offset[16], k = 0;
+    terrimp_live_atlas_desc atlas = terrimpi_atlas_desc(&v->desc);
+    uint32_t i;
     int ok = 1;
+    slots = terrimp_live_atlas_bytes(&atlas);
     terrimpi_place(&at, 1, sizeof *v, &ok);
-    items = terrimpi_place(&at, chunks, sizeof *v->items, &ok);
-    record_of = terrimpi_place(&at, chunks, sizeof *v->record_of, &ok);
-    records = terrimpi_place(&at, most, sizeof *v->records, &ok);
-    slots = terrimpi_place(&at, most, sizeof *v->slots, &ok);
-    sizes = terrimpi_place(&at, most, sizeof *v->sizes, &ok);
-    order = terrimpi_place(&at, most, sizeof *v->order, &ok);
-    queue = terrimpi_place(&at, most, sizeof *v->queue, &ok);
-    shelves = terrimpi_place(&at, 2u * most, sizeof *v->shelves, &ok);
+    offset[k++] = terrimpi_place(&at, v->desc.atlas_count, sizeof *v->atlases, &ok);
+    offset[k++] = terrimpi_place(&at, v->desc.atlas_count, slots + TERRIMPI_ALIGN, &ok);
+    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->ground.marks, &ok);
+    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->ground.distances, &ok);
+    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->leaf_at, &ok);
+    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->record_of, &ok);
+    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->prefers, &ok);
+    offset[k++] = terrimpi_place(&at, ground, sizeof *v->ground.draws, &ok);
+    offset[k++] = terrimpi_place(&at, ground, sizeof *v->shown + sizeof *v->leaves, &ok);
+    offset[k++] = terrimpi_place(&at, ground, sizeof *v->units, &ok);
+    offset[k++] = terrimpi_place(&at, ground + impostors, sizeof *v->items, &ok);
+    offset[k++] = terrimpi_place(&at, impostors, sizeof *v->wants + sizeof *v->queue, &ok);
+    offset[k++] = terrimpi_place(&at, impostors, sizeof *v->records, &ok);
+    offset[k++] = terrimpi_place(&at, v->desc.max_captures, sizeof *v->jobs, &ok);
+    offset[k++] = terrimpi_place(&at, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz, &ok);
+    offset[k++] = terrimpi_place(&at, v->terrain->index_stride, sizeof *v->mesh_indices, &ok);
     if (base) {
-        v->items = (terrimpi_item *)(void *)(base + items);
-        v->record_of = (uint16_t *)(void *)(base + record_of);
-        v->records = (terrimpi_record *)(void *)(base + records);
-        v->slots = (terrimp_pair_slot *)(void *)(base + slots);
-        v->sizes = (terrimp_pack_item *)(void *)(base + sizes);
-        v->order = (uint32_t *)(void *)(base + order);
-        v->queue = (uint16_t *)(void *)(base + queue);
-        v->shelves = (terrimp_shelf *)(void *)(base + shelves);
+        v->atlases = (terrimp_live_atlas *)(void *)(base + offset[0]);
+        v->ground.marks = (terrimp_geomip_mark *)(void *)(base + offset[2]);
+        v->ground.distances = (float *)(void *)(base + offset[3]);
+        v->leaf_at = (uint32_t *)(void *)(base + offset[4]);
+        v->record_of = (uint16_t *)(void *)(base + offset[5]);
+        v->prefers = base + offset[6];
+        v->ground.draws = (terrimp_geomip_draw *)(void *)(base + offset[7]);
+        v->shown = (float *)(void *)(base + offset[8]);
+        v->leaves = (uint32_t *)(void *)(v->shown + ground);
+        v->units = (terrimpi_unit *)(void *)(base + offset[9]);
+        v->items = (terrimpi_item *)(void *)(base + offset[10]);
+        v->wants = (terrimpi_want *)(void *)(base + offset[11]);
+        v->queue = (uint32_t *)(void *)(v->wants + impostors);
+        v->records = (terrimpi_record *)(void *)(base + offset[12]);
+        v->jobs = (terrimpi_job *)(void *)(base + offset[13]);
+        v->mesh_xyz = (float *)(void *)(base + offset[14]);
+        v->mesh_indices = (uint16_t *)(void *)(base + offset[15]);
+        for (i = 0; i < v->desc.atlas_count; i++) {
+            size_t each = slots + TERRIMPI_ALIGN - slots % TERRIMPI_ALIGN;
+            terrimp_live_atlas_init(&v->atlases[i], &atlas, base + offset[1] + i * each, slots);
+        }
     }
-    return ok ? at : 0;
+    return ok && slots ? at : 0;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -8568,153 +9119,758 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
         return result;
     memset(memory, 0, needed);
     terrimpi_view_layout(&v, (unsigned char *)memory);
+    v.ground.rule = v.desc.ground_rule;
+    v.ground.morph_ratio = v.desc.morph_ratio;
+    v.ground.hysteresis = 0.1f;
+    v.ground.draw_capacity = v.desc.max_ground;
+    v.ground_scale = 1.0f;
     *(terrimp_view *)memory = v;
     *view = (terrimp_view *)memory;
     return terrimp_view_invalidate(*view);
 }
 
-TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
+/* ---- places in the quadtree ---- */
+
+static terrimpi_site terrimpi_site_at(const terrimp_geomip *tree, uint32_t level, uint32_t x,
+                                      uint32_t z)
 {
-    if (!view)
-        return TERRIMP_E_NULL;
-    memset(view->record_of, 0xff, view->terrain->tree.level_first[1] * sizeof *view->record_of);
-    memset(view->records, 0, view->desc.max_impostors * sizeof *view->records);
-    memset(view->slots, 0, view->desc.max_impostors * sizeof *view->slots);
-    view->item_count = view->queue_count = 0;
-    return terrimp_pair_init(&view->pair, view->desc.atlas_size, view->desc.atlas_size,
-                             view->shelves, view->desc.max_impostors);
+    terrimpi_site s;
+    s.level = level;
+    s.x = x;
+    s.z = z;
+    s.node = tree->level_first[level] + z * tree->level_x[level] + x;
+    return s;
 }
 
-/* Notes a visible chunk and how its distance wants it drawn. */
-static void terrimpi_add_item(terrimp_view *v, uint32_t node, const terrimp_box *box)
+static terrimpi_site terrimpi_site_of(const terrimp_geomip *tree, uint32_t node)
 {
-    terrimpi_item *item = &v->items[v->item_count++];
-    item->node = node;
-    item->closest = terrimp_box_distance(box, v->camera.eye);
-    item->record = TERRIMPI_NO_RECORD;
-    item->draw = 0;
-    if (v->desc.mode == TERRIMP_MODE_FULL || item->closest < v->desc.fade_end)
-        item->draw |= TERRIMPI_DRAW_GROUND;
-    if (v->desc.mode == TERRIMP_MODE_IMPOSTOR &&
-        terrimp_box_farthest(box, v->camera.eye) > v->desc.fade_start)
-        item->draw |= TERRIMPI_DRAW_IMPOSTOR;
+    uint32_t level = 0, within;
+    while (node >= tree->level_first[level + 1u])
+        level++;
+    within = node - tree->level_first[level];
+    return terrimpi_site_at(tree, level, within % tree->level_x[level],
+                            within / tree->level_x[level]);
 }
 
-/* Walks the quadtree, children nearest to the eye first, so that chunks come front to back. */
-static void terrimpi_cull(terrimp_view *v, const terrimp_frustum *frustum)
+/* The children of a node, nearest to the eye first. Returns how many there are. */
+static uint32_t terrimpi_children(const terrimp_view *v, const terrimpi_site *s,
+                                  terrimpi_site children[4])
 {
     const terrimp_terrain *t = v->terrain;
+    uint32_t level = s->level - 1u, quads = t->desc.chunk_quads << level, count = 0, i;
+    uint32_t closest = 0;
+    if (v->camera.eye[0] >= terrimpi_world_x(t, (s->x * 2u + 1u) * quads))
+        closest |= 1u;
+    if (v->camera.eye[2] >= terrimpi_world_z(t, (s->z * 2u + 1u) * quads))
+        closest |= 2u;
+    for (i = 0; i < 4u; i++) {
+        uint32_t child = closest ^ i, x = s->x * 2u + (child & 1u), z = s->z * 2u + (child >> 1);
+        if (x < t->tree.level_x[level] && z < t->tree.level_z[level])
+            children[count++] = terrimpi_site_at(&t->tree, level, x, z);
+    }
+    return count;
+}
+
+static void terrimpi_site_box(const terrimp_view *v, const terrimpi_site *s, terrimp_box *box)
+{
+    terrimpi_node_box(v->terrain, s->level, s->x, s->z, box);
+}
+
+/* ---- pictures and their slots ---- */
+
+static void terrimpi_drop_seats(terrimp_view *v, const terrimpi_seat *seats, uint32_t count)
+{
+    uint32_t i;
+    for (i = 0; i < count; i++)
+        terrimp_live_atlas_free(&v->atlases[seats[i].atlas], seats[i].slot);
+}
+
+static void terrimpi_drop_record(terrimp_view *v, uint32_t index)
+{
+    terrimpi_record *record = &v->records[index];
+    if (record->seen == 0)
+        return;
+    if (v->open && v->opened.record == index) {
+        terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
+        v->open = 0;
+    }
+    terrimpi_drop_seats(v, record->parts, record->part_count);
+    v->record_of[record->node] = TERRIMPI_NO_RECORD;
+    memset(record, 0, sizeof *record);
+}
+
+/* The record that was useful longest ago, if that was before this frame. */
+static uint32_t terrimpi_oldest_record(const terrimp_view *v)
+{
+    uint32_t i, oldest = TERRIMPI_NO_RECORD;
+    for (i = 0; i < v->desc.max_impostors; i++) {
+        uint32_t seen = v->records[i].seen;
+        if (seen != 0 && seen != v->frame &&
+            (oldest == TERRIMPI_NO_RECORD || seen < v->records[oldest].seen))
+            oldest = i;
+    }
+    return oldest;
+}
+
+/* A record for a node that has none. */
+static uint32_t terrimpi_take_record(terrimp_view *v, uint32_t node)
+{
+    uint32_t i, index = TERRIMPI_NO_RECORD;
+    for (i = 0; i < v->desc.max_impostors && index == TERRIMPI_NO_RECORD; i++) {
+        if (v->records[v->next_record].seen == 0)
+            index = v->next_record;
+        v->next_record = (v->next_record + 1u) % v->desc.max_impostors;
+    }
+    if (index == TERRIMPI_NO_RECORD) {
+        index = terrimpi_oldest_record(v);
+        if (index == TERRIMPI_NO_RECORD)
+            return index;
+        terrimpi_drop_record(v, index);
+        v->stats.evictions++;
+    }
+    v->records[index].node = node;
+    v->records[index].seen = v->frame;
+    v->record_of[node] = (uint16_t)index;
+    return index;
+}
+
+/* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
+   but not less than a quarter of each side, is better than none. */
+static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_seat *seat)
+{
+    uint32_t room[2], oldest;
+    for (;;) {
+        for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++)
+            if (terrimp_live_atlas_alloc(&v->atlases[seat->atlas], size[0], size[1],
+                                         &seat->slot) == TERRIMP_OK)
+                return 1;
+        oldest = terrimpi_oldest_record(v);
+        if (oldest == TERRIMPI_NO_RECORD)
+            break;
+        terrimpi_drop_record(v, oldest);
+        v->stats.evictions++;
+    }
+    v->stats.atlas_failures++;
+    for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++) {
+        terrimp_live_atlas *atlas = &v->atlases[seat->atlas];
+        if (terrimp_live_atlas_room(atlas, size[0], size[1], room) == TERRIMP_OK &&
+            room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
+            room[0] > 2u * TERRIMPI_MARGIN && room[1] > 2u * TERRIMPI_MARGIN)
+            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &seat->slot) == TERRIMP_OK;
+    }
+    return 0;
+}
+
+/* Gives back what a job has taken and not used. */
+static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
+{
+    const terrimpi_record *record = &v->records[job->record];
+    if (record->part_count != job->part_count ||
+        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
+        terrimpi_drop_seats(v, job->parts, job->part_count);
+}
+
+/* The same for all jobs of a frame that is not rendered. */
+static void terrimpi_cancel_jobs(terrimp_view *v)
+{
+    uint32_t i;
+    for (i = 0; i < v->job_count; i++)
+        if (!(v->open && v->opened.record == v->jobs[i].record))
+            terrimpi_cancel_job(v, &v->jobs[i]);
+    v->job_count = 0;
+}
+
+TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
+{
+    uint32_t i;
+    if (!view)
+        return TERRIMP_E_NULL;
+    memset(view->record_of, 0xff, view->terrain->tree.node_count * sizeof *view->record_of);
+    memset(view->records, 0, view->desc.max_impostors * sizeof *view->records);
+    for (i = 0; i < view->desc.atlas_count; i++)
+        terrimp_live_atlas_reset(&view->atlases[i]);
+    view->job_count = 0;
+    view->open = 0;
+    view->outdated = 1;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
+                                              uint32_t cols, uint32_t rows)
+{
+    const terrimp_geomip *tree;
+    uint32_t i;
+    if (!view)
+        return TERRIMP_E_NULL;
+    tree = &view->terrain->tree;
+    if (x >= tree->field.width || z >= tree->field.depth || cols == 0 || rows == 0)
+        return TERRIMP_E_RANGE;
+    cols = terrimpi_min_u32(cols, tree->field.width - x);
+    rows = terrimpi_min_u32(rows, tree->field.depth - z);
+    terrimpi_cancel_jobs(view);
+    view->outdated = 1;
+    for (i = 0; i < view->desc.max_impostors; i++) {
+        terrimpi_site s;
+        uint32_t quads, reach;
+        if (view->records[i].seen == 0)
+            continue;
+        s = terrimpi_site_of(tree, view->records[i].node);
+        quads = view->terrain->desc.chunk_quads << s.level;
+        reach = quads; /* the border in the picture is at most the node's neighbours */
+        if (x <= (s.x + 1u) * quads + reach && x + cols + reach > s.x * quads &&
+            z <= (s.z + 1u) * quads + reach && z + rows + reach > s.z * quads)
+            terrimpi_drop_record(view, i);
+    }
+    return TERRIMP_OK;
+}
+
+/* ---- the ground cut ---- */
+
+/* Lists all chunks in sight at full resolution, front to back, when there is a list. Returns how
+   many there are. */
+static uint32_t terrimpi_list_chunks(terrimp_view *v, terrimp_geomip_draw *list)
+{
     struct {
-        uint32_t level, x, z;
+        terrimpi_site site;
         int mask;
     } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1;
-    v->item_count = 0;
-    stack[0].level = t->tree.level_count - 1u;
-    stack[0].x = stack[0].z = 0;
+    uint32_t depth = 1, count = 0;
+    stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
     stack[0].mask = TERRIMP_PLANES_ALL;
     while (depth > 0) {
+        terrimpi_site children[4];
         terrimp_box box;
-        uint32_t i, quads, closest_child;
+        uint32_t i;
         top = stack[--depth];
-        terrimpi_node_box(t, top.level, top.x, top.z, &box);
+        terrimpi_site_box(v, &top.site, &box);
         if (top.mask)
-            top.mask = terrimp_frustum_test(frustum, &box, top.mask);
+            top.mask = terrimp_frustum_test(&v->frustum, &box, top.mask);
         if (top.mask == TERRIMP_PLANES_OUTSIDE)
             continue;
-        if (top.level == 0) {
-            terrimpi_add_item(v, top.z * t->tree.level_x[0] + top.x, &box);
+        if (top.site.level == 0) {
+            if (list) {
+                memset(&list[count], 0, sizeof *list);
+                list[count].node = top.site.node;
+                list[count].x = top.site.x;
+                list[count].z = top.site.z;
+            }
+            count++;
             continue;
         }
-        top.level--;
-        top.x *= 2u;
-        top.z *= 2u;
-        quads = t->desc.chunk_quads << top.level;
-        closest_child = 0;
-        if (v->camera.eye[0] >= terrimpi_world_x(t, (top.x + 1u) * quads))
-            closest_child |= 1u;
-        if (v->camera.eye[2] >= terrimpi_world_z(t, (top.z + 1u) * quads))
-            closest_child |= 2u;
-        for (i = 4u; i-- > 0;) { /* the last one pushed is the first one visited */
-            uint32_t child = closest_child ^ i;
-            uint32_t x = top.x + (child & 1u), z = top.z + (child >> 1);
-            if (x >= t->tree.level_x[top.level] || z >= t->tree.level_z[top.level])
-                continue;
-            stack[depth].level = top.level;
-            stack[depth].x = x;
-            stack[depth].z = z;
+        for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
+            stack[depth].site = children[i];
             stack[depth].mask = top.mask;
             depth++;
         }
     }
+    return count;
 }
 
-/* A record for a chunk: its own, or the next one whose chunk is not visible; TERRIMPI_NO_RECORD
-   when every record has been looked at in this frame. */
-static uint16_t terrimpi_take_record(terrimp_view *v, uint32_t node)
+/* Makes the ground cut; where max_ground is too small, at a larger tolerance. */
+static terrimp_result terrimpi_cut_ground(terrimp_view *v)
 {
-    if (v->record_of[node] != TERRIMPI_NO_RECORD)
-        return v->record_of[node];
-    for (; v->records_tried < v->desc.max_impostors; v->records_tried++) {
-        uint32_t i = v->next_record;
-        terrimpi_record *record = &v->records[i];
-        v->next_record = (i + 1u) % v->desc.max_impostors;
-        if (record->seen == v->frame)
-            continue;
-        if (record->seen != 0)
-            v->record_of[record->node] = TERRIMPI_NO_RECORD;
-        memset(record, 0, sizeof *record);
-        memset(&v->slots[i], 0, sizeof v->slots[i]);
-        record->node = node;
-        record->seen = v->frame;
-        v->record_of[node] = (uint16_t)i;
-        return (uint16_t)i;
+    uint32_t i;
+    if (v->desc.mode == TERRIMP_MODE_FULL || v->desc.mode == TERRIMP_MODE_IMPOSTOR) {
+        if (terrimpi_list_chunks(v, NULL) > v->desc.max_ground) /* the frame before stays */
+            return TERRIMP_E_CAPACITY;
+        v->ground.draw_count = terrimpi_list_chunks(v, v->ground.draws);
+    } else {
+        terrimp_result result = TERRIMP_E_CAPACITY;
+        v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
+        while (result == TERRIMP_E_CAPACITY) {
+            float tolerance = v->desc.ground_tolerance_px * v->ground_scale;
+            v->ground.tolerance_px = terrimpi_min(tolerance, 1000.0f);
+            result = terrimp_geomip_select(&v->terrain->tree, &v->ground, &v->camera);
+            if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f)
+                return result;
+            if (result == TERRIMP_E_CAPACITY)
+                v->ground_scale *= 1.3f;
+        }
+        if (result != TERRIMP_OK)
+            return result;
     }
-    return TERRIMPI_NO_RECORD;
+    for (i = 0; i < v->ground.draw_count; i++)
+        v->leaf_at[v->ground.draws[i].node] = i;
+    return TERRIMP_OK;
 }
 
-/* How good a record's picture is from the present eye: its view angle and parallax error. */
-static void terrimpi_judge(const terrimp_view *v, const terrimpi_record *record, float *angle_rad,
-                           float *parallax_px)
+/* The ground draw of a node, or TERRIMPI_NO_LEAF when the ground cut is not there. */
+static uint32_t terrimpi_leaf(const terrimp_view *v, uint32_t node)
 {
-    const terrimp_terrain *t = v->terrain;
+    uint32_t i = v->leaf_at[node];
+    return i < v->ground.draw_count && v->ground.draws[i].node == node ? i : TERRIMPI_NO_LEAF;
+}
+
+/* ---- the impostor cut and the units ---- */
+
+/* Whether a node is where the impostor cut runs: far enough away, and small enough on the screen.
+   A node that has a picture keeps its place for a little longer. */
+static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float closest)
+{
+    const terrimp_heightfield *field = &v->terrain->desc.field;
+    float side, sides = terrimpi_max(2.0f, v->pixel_factor / v->desc.impostor_px);
+    if (closest < v->desc.fade_start)
+        return 0;
+    if (s->level == 0)
+        return 1;
+    if (v->desc.mode == TERRIMP_MODE_IMPOSTOR)
+        return 0;
+    side = (float)(v->terrain->desc.chunk_quads << s->level) *
+           terrimpi_max(field->spacing_x, field->spacing_z);
+    if (v->record_of[s->node] != TERRIMPI_NO_RECORD)
+        side /= 1.15f;
+    return closest >= sides * side;
+}
+
+/* Adds the ground draws below a node to the last unit. */
+static void terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
+{
+    terrimpi_site children[4];
     terrimp_box box;
-    terrimpi_node_box(t, 0, record->node % t->tree.level_x[0],
-                      record->node / t->tree.level_x[0], &box);
+    uint32_t i, count, leaf = terrimpi_leaf(v, s->node);
+    if (leaf != TERRIMPI_NO_LEAF) {
+        v->leaves[v->leaf_count++] = leaf;
+        v->units[v->unit_count].leaf_count++;
+        return;
+    }
+    if (s->level == 0)
+        return;
+    if (mask) {
+        terrimpi_site_box(v, s, &box);
+        mask = terrimp_frustum_test(&v->frustum, &box, mask);
+        if (mask == TERRIMP_PLANES_OUTSIDE)
+            return;
+    }
+    count = terrimpi_children(v, s, children);
+    for (i = 0; i < count; i++)
+        terrimpi_gather_leaves(v, &children[i], mask);
+}
+
+/* Adds the impostors wanted below a node to the last unit. Returns 0 when a part of it that is in
+   sight cannot be one. */
+static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int mask)
+{
+    terrimpi_site children[4];
+    terrimp_box box;
+    float closest;
+    uint32_t i, count;
+    terrimpi_site_box(v, s, &box);
+    if (mask)
+        mask = terrimp_frustum_test(&v->frustum, &box, mask);
+    if (mask == TERRIMP_PLANES_OUTSIDE)
+        return 1;
+    closest = terrimp_box_distance(&box, v->camera.eye);
+    if (terrimpi_wanted(v, s, closest)) {
+        terrimpi_want *want = &v->wants[v->want_count];
+        if (v->want_count == v->desc.max_impostors)
+            return 0;
+        memset(want, 0, sizeof *want);
+        want->site = *s;
+        want->closest = closest;
+        v->want_count++;
+        v->units[v->unit_count].want_count++;
+        return 1;
+    }
+    if (s->level == 0)
+        return 0;
+    count = terrimpi_children(v, s, children);
+    for (i = 0; i < count; i++)
+        if (!terrimpi_gather_wants(v, &children[i], mask))
+            return 0;
+    return 1;
+}
+
+/* Makes a unit of a node in one of the cuts. What is in sight has ground leaves. */
+static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask, float closest)
+{
+    terrimpi_unit *unit = &v->units[v->unit_count];
+    memset(unit, 0, sizeof *unit);
+    unit->site = *s;
+    unit->closest = closest;
+    unit->first_leaf = v->leaf_count;
+    unit->first_want = v->want_count;
+    terrimpi_gather_leaves(v, s, mask);
+    if (unit->leaf_count == 0)
+        return;
+    if (closest >= v->desc.fade_start && v->desc.mode >= TERRIMP_MODE_IMPOSTOR &&
+        !terrimpi_gather_wants(v, s, mask)) {
+        v->want_count = unit->first_want;
+        unit->want_count = 0;
+    }
+    v->unit_count++;
+}
+
+/* Walks the tree down to where one of the cuts runs. */
+static void terrimpi_list_units(terrimp_view *v)
+{
+    struct {
+        terrimpi_site site;
+        int mask;
+    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
+    uint32_t depth = 1;
+    int impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
+    v->unit_count = v->leaf_count = v->want_count = 0;
+    stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
+    stack[0].mask = TERRIMP_PLANES_ALL;
+    while (depth > 0 && v->leaf_count < v->ground.draw_count) {
+        terrimpi_site children[4];
+        terrimp_box box;
+        float closest;
+        uint32_t i;
+        top = stack[--depth];
+        terrimpi_site_box(v, &top.site, &box);
+        if (top.mask)
+            top.mask = terrimp_frustum_test(&v->frustum, &box, top.mask);
+        if (top.mask == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        closest = terrimp_box_distance(&box, v->camera.eye);
+        if (terrimpi_leaf(v, top.site.node) != TERRIMPI_NO_LEAF ||
+            (impostors && terrimpi_wanted(v, &top.site, closest)))
+            terrimpi_add_unit(v, &top.site, top.mask, closest);
+        else if (top.site.level > 0)
+            for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
+                stack[depth].site = children[i];
+                stack[depth].mask = top.mask;
+                depth++;
+            }
+    }
+}
+
+/* ---- what a picture would cost, and how long it would last ---- */
+
+/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
+   of the mean square, which 95 of 100 samples keep to. */
+static float terrimpi_mesh_error(const terrimp_view *v, uint32_t node)
+{
+    terrimp_mesh_info mesh;
+    terrimpi_mesh_place(v->terrain, node, &mesh);
+    return v->desc.ground_rule == TERRIMP_GEOMIP_PICTURE
+               ? terrimpi_min(mesh.error, 2.0f * mesh.error_rms)
+               : mesh.error;
+}
+
+/* The view angle up to which a picture may be used, by both limits. */
+static float terrimpi_sine_limit(const terrimp_view *v, float error, float closest)
+{
+    float sine = TERRIMP_SINF(v->desc.max_angle_rad);
+    return terrimpi_min(sine, v->desc.tolerance_px * terrimpi_max(closest - error, 0.0f) /
+                                  terrimpi_max(error * v->pixel_factor, 1e-20f));
+}
+
+/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
+static float terrimpi_source_error(const terrimp_geomip *tree, const terrimpi_site *s,
+                                   uint32_t level)
+{
+    uint32_t shift = s->level - level, x, z;
+    uint32_t x1 = terrimpi_min_u32((s->x + 1u) << shift, tree->level_x[level]);
+    uint32_t z1 = terrimpi_min_u32((s->z + 1u) << shift, tree->level_z[level]);
+    float worst = 0.0f;
+    for (z = s->z << shift; z < z1; z++)
+        for (x = s->x << shift; x < x1; x++)
+            worst = terrimpi_max(worst, tree->nodes[tree->level_first[level] +
+                                                    z * tree->level_x[level] + x].rms);
+    return worst;
+}
+
+/* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
+static uint32_t terrimpi_source_level(const terrimp_view *v, const terrimpi_site *s, float closest)
+{
+    float limit = TERRIMPI_SOURCE_TEXELS * closest / (v->pixel_factor * v->desc.texels_per_px);
+    uint32_t level = s->level;
+    if (v->desc.mode == TERRIMP_MODE_IMPOSTOR)
+        return 0;
+    while (level > 0 && s->level - level < TERRIMPI_SOURCE_LEVELS &&
+           terrimpi_source_error(&v->terrain->tree, s, level) > limit)
+        level--;
+    return level;
+}
+
+/* How fast the eye moves [wu a frame]. */
+static float terrimpi_speed(const terrimp_view *v)
+{
+    return terrimpi_length(v->motion);
+}
+
+/* How good a picture is from the present eye: its view angle and parallax error, and the larger of
+   the two over its limit. */
+static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
+                            const terrimpi_site *s, float *angle_rad, float *parallax_px)
+{
+    terrimp_box box;
+    terrimpi_site_box(v, s, &box);
     *angle_rad = *parallax_px = 0.0f;
-    terrimp_view_angle(&box, record->eye, v->camera.eye, angle_rad);
-    terrimp_parallax_error(&box, t->meshes[record->node].error, record->eye, v->camera.eye,
+    terrimp_view_angle(&box, captured_eye, v->camera.eye, angle_rad);
+    terrimp_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye, v->camera.eye,
                            v->pixel_factor, parallax_px);
+    return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
+                        *parallax_px / v->desc.tolerance_px);
 }
 
-/* How much a picture has to be renewed: 1 and more when one of the criteria of Hess 3.5 is met or
-   the picture has become too coarse or far too fine; the first picture comes before all. */
-static float terrimpi_urgency(const terrimp_view *v, uint32_t index)
+static float terrimpi_sharpness(const terrimp_view *v, float closest)
 {
-    const terrimpi_record *record = &v->records[index];
-    float angle, parallax, urgency;
-    if (terrimp_pair_picture(&v->pair, &v->slots[index]) < 0)
-        return 1e9f;
-    terrimpi_judge(v, record, &angle, &parallax);
-    urgency = terrimpi_max(angle / v->desc.max_angle_rad, parallax / v->desc.tolerance_px);
-    urgency = terrimpi_max(urgency, record->wanted / (record->sharpness * 1.25f));
-    urgency = terrimpi_max(urgency, record->sharpness / (record->wanted * 2.5f));
-    return urgency >= 1.0f ? terrimpi_min(urgency, 1e8f) : 0.0f;
+    return v->pixel_factor * v->desc.texels_per_px / terrimpi_max(closest, 1e-6f);
 }
 
-/* Size of the slot for a chunk as seen from the present eye. Returns 0 when no frustum fits: the
-   eye is too close. */
-static int terrimpi_slot_size(const terrimp_view *v, uint32_t node, terrimp_capture *capture,
-                              uint32_t size[2])
+/* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
+   become too coarse, or far too fine. */
+static float terrimpi_urgency(const terrimp_view *v, const terrimpi_record *record,
+                              const terrimpi_site *s, float closest)
+{
+    float angle, parallax, urgency, wanted = terrimpi_sharpness(v, closest);
+    urgency = terrimpi_judge(v, record->eye, s, &angle, &parallax);
+    urgency = terrimpi_max(urgency, wanted / (record->sharpness * 1.3f));
+    urgency = terrimpi_max(urgency, record->sharpness / (wanted * 3.0f));
+    return terrimpi_min(urgency, 1e6f);
+}
+
+/* Whether a record has a picture that may be drawn at an urgency. */
+static int terrimpi_usable(const terrimp_view *v, uint32_t record, float urgency)
+{
+    return record != TERRIMPI_NO_RECORD && v->records[record].part_count > 0 &&
+           urgency < TERRIMPI_STALE;
+}
+
+/* Fills in what a want costs. Returns 0 when no frustum fits: the eye is too close. */
+static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
+{
+    const terrimp_costs *costs = &v->desc.costs;
+    terrimp_capture capture;
+    terrimp_mesh_info mesh;
+    terrimp_box box;
+    float speed = terrimpi_speed(v), k = v->pixel_factor, texels, sine;
+    terrimpi_site_box(v, &want->site, &box);
+    if (terrimp_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
+        return 0;
+    terrimpi_mesh_place(v->terrain, want->site.node, &mesh);
+    want->record = v->record_of[want->site.node];
+    want->pixels = k * k * (capture.tan_right - capture.tan_left) *
+                   (capture.tan_up - capture.tan_down);
+    want->draw_cost = costs->draw + costs->triangle * (float)(mesh.index_count / 3u) +
+                      costs->impostor_px * want->pixels;
+    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+    want->life = v->desc.no_lookahead ? 1.0f : 1.0f + TERRIMPI_AHEAD;
+    want->life = terrimpi_min(TERRIMPI_LONGEST_LIFE,
+                              want->life * want->closest * sine / terrimpi_max(speed, 1e-20f));
+    want->life = terrimpi_max(1.0f, want->life);
+    if (want->record != TERRIMPI_NO_RECORD && v->records[want->record].part_count > 0) {
+        want->capture_cost = v->records[want->record].cost;
+        want->urgency = terrimpi_urgency(v, &v->records[want->record], &want->site, want->closest);
+        return 1;
+    }
+    want->urgency = 1e9f;
+    texels = want->pixels * v->desc.texels_per_px * v->desc.texels_per_px;
+    {
+        uint32_t source = terrimpi_source_level(v, &want->site, want->closest);
+        uint32_t quads = v->terrain->desc.chunk_quads << (want->site.level - source);
+        want->capture_cost = costs->capture + costs->ground_px * texels +
+                             costs->triangle * 2.6f * (float)(quads * quads);
+    }
+    return 1;
+}
+
+/* ---- ground or impostors? ---- */
+
+static float terrimpi_ground_cost(const terrimp_view *v, const terrimpi_unit *unit, float pixels)
+{
+    const terrimp_costs *costs = &v->desc.costs;
+    float quads = (float)v->terrain->desc.chunk_quads;
+    return (float)unit->leaf_count * (costs->draw + costs->triangle * 2.0f * quads * quads) +
+           costs->ground_px * pixels;
+}
+
+/* Decides for a unit whether impostors pay: their draws, and their captures spread over the frames
+   that they last, against the ground's draws. */
+static void terrimpi_decide(terrimp_view *v, terrimpi_unit *unit, float *spread, float *drawn)
+{
+    float impostors = 0.0f, captures = 0.0f, pixels = 0.0f, ground;
+    uint32_t i, node = unit->site.node;
+    int pays = 1, ready = 1;
+    for (i = 0; i < unit->want_count && pays; i++) {
+        terrimpi_want *want = &v->wants[unit->first_want + i];
+        pays = terrimpi_appraise(v, want);
+        impostors += want->draw_cost;
+        captures += want->capture_cost / want->life;
+        pixels += want->pixels;
+        ready &= terrimpi_usable(v, want->record, want->urgency);
+    }
+    ground = terrimpi_ground_cost(v, unit, pixels);
+    if (v->desc.mode == TERRIMP_MODE_AUTO && pays) {
+        float all = impostors + captures;
+        pays = v->prefers[node] ? all < ground * TERRIMPI_FLIP : all * TERRIMPI_FLIP < ground;
+    }
+    if (unit->want_count == 0 || !pays) {
+        unit->want_count = 0;
+        v->prefers[node] = 0;
+        *drawn += ground;
+        return;
+    }
+    v->prefers[node] = 1;
+    *spread += captures;
+    *drawn += ready ? impostors : ground;
+    for (i = 0; i < unit->want_count; i++) {
+        terrimpi_want *want = &v->wants[unit->first_want + i];
+        if (want->record != TERRIMPI_NO_RECORD)
+            v->records[want->record].seen = v->frame;
+    }
+}
+
+/* ---- the schedule of captures ---- */
+
+/* Steps along a row of cells from the farthest to the nearest: the k-th one of `count`, for an eye
+   beside or above cell `eye`. */
+static uint32_t terrimpi_farthest(uint32_t count, int eye, uint32_t k)
+{
+    int low = 0, high = (int)count - 1;
+    for (;; k--) {
+        int take_low = eye - low > high - eye;
+        if (k == 0)
+            return (uint32_t)(take_low ? low : high);
+        if (take_low)
+            low++;
+        else
+            high--;
+    }
+}
+
+/* The source nodes of a picture: a block of them, with one more on each side for the border. */
+typedef struct terrimpi_block {
+    uint32_t x, z, wide, deep; /* without the border */
+} terrimpi_block;
+
+static terrimpi_block terrimpi_source_block(const terrimp_geomip *tree, const terrimpi_site *s,
+                                            uint32_t source)
+{
+    uint32_t shift = s->level - source;
+    terrimpi_block b;
+    b.x = s->x << shift;
+    b.z = s->z << shift;
+    b.wide = terrimpi_min_u32(1u << shift, tree->level_x[source] - b.x);
+    b.deep = terrimpi_min_u32(1u << shift, tree->level_z[source] - b.z);
+    return b;
+}
+
+/* Cell k of a job, cells ordered from back to front. Returns 0 where there is no node; else its node
+   and the pattern to draw: the whole node, or in the border a strip of it. */
+static int terrimpi_cell(const terrimp_view *v, const terrimpi_job *job, uint32_t k, uint32_t *node,
+                         terrimpi_pattern *pattern)
 {
     const terrimp_terrain *t = v->terrain;
+    const terrimp_heightfield *field = &t->desc.field;
+    terrimpi_block b = terrimpi_source_block(&t->tree, &job->site, job->source);
+    uint32_t quads = t->desc.chunk_quads, column, row, x, z, direction, which = 0;
+    float step = (float)(quads << job->source);
+    int eye_x = (int)terrimpi_clamp((job->captures[0].eye[0] - field->origin_x) /
+                                        (step * field->spacing_x) - (float)b.x + 1.0f,
+                                    -1.0f, 99.0f);
+    int eye_z = (int)terrimpi_clamp((job->captures[0].eye[2] - field->origin_z) /
+                                        (step * field->spacing_z) - (float)b.z + 1.0f,
+                                    -1.0f, 99.0f);
+    row = terrimpi_farthest(b.deep + 2u, eye_z, k / (b.wide + 2u));
+    column = terrimpi_farthest(b.wide + 2u, eye_x, k % (b.wide + 2u));
+    x = b.x + column - 1u; /* wraps below 0, and is then too large */
+    z = b.z + row - 1u;
+    if (x >= t->tree.level_x[job->source] || z >= t->tree.level_z[job->source])
+        return 0;
+    if (column == 0 || row == 0 || column == b.wide + 1u || row == b.deep + 1u) {
+        uint32_t dx = column == 0 ? 0u : column == b.wide + 1u ? 2u : 1u;
+        uint32_t dz = row == 0 ? 0u : row == b.deep + 1u ? 2u : 1u;
+        direction = dz * 3u + dx;
+        which = terrimpi_strip_pattern(quads, job->strip, direction > 4u ? direction - 1u
+                                                                          : direction);
+    }
+    *pattern = terrimpi_find_pattern(quads, which);
+    *node = terrimpi_site_at(&t->tree, job->source, x, z).node;
+    return 1;
+}
+
+static uint32_t terrimpi_cell_count(const terrimp_view *v, const terrimpi_job *job)
+{
+    terrimpi_block block = terrimpi_source_block(&v->terrain->tree, &job->site, job->source);
+    return (block.wide + 2u) * (block.deep + 2u);
+}
+
+/* Whether a cell's node reaches into the clip distances of a part. */
+static int terrimpi_cell_in_part(const terrimp_view *v, const terrimpi_job *job, uint32_t node,
+                                 uint32_t part)
+{
+    const terrimp_capture *c = &job->captures[part];
+    const float *f = c->forward;
     terrimp_box box;
+    float first = 0.0f, last = 0.0f;
+    int i;
+    if (job->part_count == 1u)
+        return 1;
+    {
+        terrimpi_site s = terrimpi_site_of(&v->terrain->tree, node);
+        terrimpi_site_box(v, &s, &box);
+    }
+    for (i = 0; i < 3; i++) {
+        first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - c->eye[i]);
+        last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - c->eye[i]);
+    }
+    return first < c->z_far && last > c->z_near;
+}
+
+/* Triangles of the piece of a job that this frame makes. */
+static uint32_t terrimpi_piece_triangles(const terrimp_view *v, const terrimpi_job *job)
+{
+    uint32_t k, part, node, triangles = 0;
+    terrimpi_pattern pattern;
+    for (k = job->cell_from; k < job->cell_to; k++)
+        if (terrimpi_cell(v, job, k, &node, &pattern))
+            for (part = 0; part < job->part_count; part++)
+                if (terrimpi_cell_in_part(v, job, node, part))
+                    triangles += pattern.triangle_count;
+    return triangles;
+}
+
+/* The strip of neighbours that a capture needs, as a number of terrimpi_strip_quads: the texels
+   that bilinear reads and the parallax can reach, in world units. At a grazing angle a texel is as
+   many times longer on the ground as the sine of that angle is smaller. */
+static uint32_t terrimpi_strip_width(const terrimp_view *v, const terrimpi_job *job,
+                                     const terrimp_box *box)
+{
+    const terrimp_heightfield *field = &v->terrain->desc.field;
+    const terrimp_capture *capture = &job->captures[0];
+    uint32_t quads = v->terrain->desc.chunk_quads, width = 0, strips = terrimpi_strip_count(quads);
+    float texels = 1.5f + v->desc.tolerance_px * v->desc.texels_per_px;
+    float per_texel_x = (capture->tan_right - capture->tan_left) / (float)job->rects[0].width;
+    float per_texel_y = (capture->tan_up - capture->tan_down) / (float)job->rects[0].height;
+    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
+    float sine = terrimpi_max(drop / capture->z_far, 0.1f);
+    float reach = texels * capture->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
+    float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << job->source);
+    while (width < strips && (float)terrimpi_strip_quads(quads, width) * step < reach)
+        width++;
+    return width;
+}
+
+/* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
+static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *want,
+                                 const terrimp_box *box, float eye[3])
+{
+    float speed = terrimpi_speed(v), ahead;
+    uint32_t i;
+    memcpy(eye, v->camera.eye, sizeof v->camera.eye);
+    if (v->desc.no_lookahead || !(speed > 0.0f))
+        return;
+    ahead = TERRIMPI_AHEAD * want->closest *
+            terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+    ahead = terrimpi_min(ahead, speed * 0.5f * TERRIMPI_LONGEST_LIFE);
+    for (i = 0; i < 3u; i++)
+        eye[i] += v->motion[i] / speed * ahead;
+    if (terrimp_box_distance(box, eye) < 0.8f * want->closest)
+        memcpy(eye, v->camera.eye, sizeof v->camera.eye);
+}
+
+/* Size of the slot that a capture needs. Returns 0 when no frustum fits. */
+static int terrimpi_slot_size(const terrimp_view *v, const terrimp_box *box, const float eye[3],
+                              terrimp_capture *capture, uint32_t size[2])
+{
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
-    terrimpi_node_box(t, 0, node % t->tree.level_x[0], node / t->tree.level_x[0], &box);
-    if (terrimp_capture_fit(&box, v->camera.eye, capture) != TERRIMP_OK)
-        return 0;
-    if (terrimp_impostor_size(capture, v->pixel_factor, v->desc.texels_per_px,
+    if (terrimp_capture_fit(box, eye, capture) != TERRIMP_OK ||
+        terrimp_impostor_size(capture, v->pixel_factor, v->desc.texels_per_px,
                               TERRIMPI_SMALLEST_PICTURE, largest, size, NULL) != TERRIMP_OK)
         return 0;
     size[0] += 2u * TERRIMPI_MARGIN;
@@ -8722,272 +9878,391 @@ static int terrimpi_slot_size(const terrimp_view *v, uint32_t node, terrimp_capt
     return 1;
 }
 
-/* Queues a record if its picture has to be renewed. Where no frustum fits, the eye being so close,
-   the old picture goes too: the chunk is drawn as ground. */
-static void terrimpi_enqueue(terrimp_view *v, uint16_t index)
-{
-    terrimpi_record *record = &v->records[index];
-    terrimp_capture capture;
-    uint32_t size[2];
-    record->urgency = terrimpi_urgency(v, index);
-    if (!(record->urgency > 0.0f))
-        return;
-    if (terrimpi_slot_size(v, record->node, &capture, size))
-        v->queue[v->queue_count++] = index;
-    else
-        memset(&v->slots[index], 0, sizeof v->slots[index]);
-}
-
-/* Reduces a size as the newest packing reduced all of them. */
-static void terrimpi_scale_size(const terrimp_view *v, uint32_t size[2])
-{
-    int k;
-    for (k = 0; k < 2; k++)
-        size[k] = terrimpi_max_u32(1u, (uint32_t)((float)size[k] * v->stats.texel_scale));
-}
-
-/* Whether the slot in the newest atlas can take a picture of a size: not less than 90 % of it in
-   either side, not more than twice. */
-static int terrimpi_slot_suits(const terrimp_view *v, uint32_t index, const uint32_t size[2])
-{
-    const terrimp_pair_slot *slot = &v->slots[index];
-    const terrimp_rect *rect = &slot->rect[v->pair.newest];
-    return slot->assigned[v->pair.newest] && rect->width * 10u >= size[0] * 9u &&
-           rect->height * 10u >= size[1] * 9u && rect->width <= 2u * size[0] &&
-           rect->height <= 2u * size[1];
-}
-
-/* Packs the slots of all visible impostors into the outdated atlas. Pictures that only that atlas
-   held are lost and made again. */
-static void terrimpi_repack(terrimp_view *v)
+/* Whether the slots of a record can take a picture of a size: not less than 90 % of it in either
+   side, not more than half as much again. */
+static int terrimpi_seats_suit(const terrimp_view *v, const terrimpi_record *record,
+                               const uint32_t size[2], uint32_t part_count)
 {
     uint32_t i;
-    for (i = 0; i < v->desc.max_impostors; i++) {
-        terrimp_capture capture;
-        uint32_t size[2] = {0, 0};
-        if (v->records[i].seen == v->frame)
-            terrimpi_slot_size(v, v->records[i].node, &capture, size);
-        v->sizes[i].rect.width = size[0];
-        v->sizes[i].rect.height = size[1];
-    }
-    terrimp_pair_repack(&v->pair, v->slots, v->sizes, v->desc.max_impostors, v->order,
-                        &v->stats.texel_scale);
-    v->queue_count = 0;
-    for (i = 0; i < v->item_count; i++) {
-        uint16_t record = v->items[i].record;
-        if (record == TERRIMPI_NO_RECORD)
-            continue;
-        terrimpi_enqueue(v, record);
-    }
-}
-
-/* Whether record a is to be captured after record b. */
-static int terrimpi_less_urgent(const terrimp_view *v, uint16_t a, uint16_t b)
-{
-    const terrimpi_record *p = &v->records[a], *q = &v->records[b];
-    return p->urgency != q->urgency ? p->urgency < q->urgency : p->node > q->node;
-}
-
-/* Moves the most urgent records to the front of the queue and cuts it there. */
-static void terrimpi_trim_queue(terrimp_view *v)
-{
-    uint32_t i, k, most = v->desc.max_captures;
-    if (most == 0 || v->queue_count <= most)
-        return;
-    for (i = 0; i < most; i++) {
-        uint32_t best = i;
-        uint16_t swap;
-        for (k = i + 1u; k < v->queue_count; k++)
-            if (terrimpi_less_urgent(v, v->queue[best], v->queue[k]))
-                best = k;
-        swap = v->queue[i];
-        v->queue[i] = v->queue[best];
-        v->queue[best] = swap;
-    }
-    v->queue_count = most;
-}
-
-/* Gives every queued record a slot in the newest atlas that suits it; returns 0 as soon as the
-   atlas has no room. Records whose chunk no frustum fits leave the queue. */
-static int terrimpi_assign_slots(terrimp_view *v)
-{
-    uint32_t i, kept = 0;
-    for (i = 0; i < v->queue_count; i++) {
-        uint16_t record = v->queue[i];
-        terrimp_capture capture;
-        uint32_t size[2];
-        if (!terrimpi_slot_size(v, v->records[record].node, &capture, size))
-            continue;
-        terrimpi_scale_size(v, size);
-        if (!terrimpi_slot_suits(v, record, size) &&
-            terrimp_pair_assign(&v->pair, &v->slots[record], size[0], size[1]) != TERRIMP_OK)
+    for (i = 0; i < part_count; i++) {
+        terrimp_rect rect;
+        terrimp_live_atlas_rect(&v->atlases[record->parts[i].atlas], record->parts[i].slot, &rect);
+        if (rect.width * 10u < size[0] * 9u || rect.height * 10u < size[1] * 9u ||
+            rect.width * 2u > size[0] * 3u || rect.height * 2u > size[1] * 3u)
             return 0;
-        v->queue[kept++] = record;
     }
-    v->queue_count = kept;
+    return record->part_count == part_count;
+}
+
+/* Finds slots for a job: those of the old picture, unless it is made in pieces and the old one is
+   drawn meanwhile. */
+static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_job *job)
+{
+    const terrimpi_record *record = &v->records[job->record];
+    uint32_t i, wanted = job->part_count;
+    if (v->desc.max_capture_triangles == 0 && terrimpi_seats_suit(v, record, size, wanted))
+        memcpy(job->parts, record->parts, sizeof job->parts);
+    else
+        for (job->part_count = 0; job->part_count < wanted; job->part_count++)
+            if (!terrimpi_take_seat(v, size, &job->parts[job->part_count])) {
+                terrimpi_drop_seats(v, job->parts, job->part_count);
+                return 0;
+            }
+    for (i = 0; i < wanted; i++)
+        terrimp_live_atlas_rect(&v->atlases[job->parts[i].atlas], job->parts[i].slot,
+                                &job->rects[i]);
     return 1;
 }
 
-/* Fills the queue of captures: what is missing or has expired, most urgent first, each with a slot.
-   When every visible picture has moved to the newest atlas, the outdated one is packed anew before
-   the next capture (Hess 4.3); also when the newest one has no room left. */
-static void terrimpi_plan_captures(terrimp_view *v)
+/* Whether the picture of a node is better made in two parts, and where: when smears of what hides
+   behind its ridges would show before it is renewed, and a split spares most of them. */
+static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
+                             const terrimp_capture *capture, float *distance)
+{
+    const terrimpi_mesh *mesh = &v->terrain->meshes[want->site.node];
+    float sine;
+    terrimp_split split;
+    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || v->desc.max_capture_triangles)
+        return 0;
+    terrimpi_fill_mesh(v->terrain, want->site.node, v->mesh_xyz, v->mesh_indices);
+    terrimp_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
+                          3u * mesh->triangle_count, &split);
+    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+    *distance = split.distance;
+    return split.gap * sine * v->pixel_factor > v->desc.tolerance_px &&
+           split.gap_left < split.gap * TERRIMPI_SPLIT_GAIN;
+}
+
+/* Puts a capture together: camera, source, border; then finds it slots. Returns 0 when it cannot
+   be made. */
+static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terrimpi_job *job)
+{
+    const terrimp_costs *costs = &v->desc.costs;
+    terrimp_capture *front = &job->captures[0], *back = &job->captures[1];
+    terrimp_box box;
+    float eye[3], border, split = 0.0f;
+    uint32_t size[2], i;
+    memset(job, 0, sizeof *job);
+    job->site = want->site;
+    terrimpi_site_box(v, &want->site, &box);
+    terrimpi_capture_eye(v, want, &box, eye);
+    if (!terrimpi_slot_size(v, &box, eye, front, size))
+        return 0;
+    job->record = v->record_of[want->site.node];
+    if (job->record == TERRIMPI_NO_RECORD)
+        job->record = terrimpi_take_record(v, want->site.node);
+    if (job->record == TERRIMPI_NO_RECORD)
+        return 0;
+    job->part_count = terrimpi_split_at(v, want, front, &split) ? 2u : 1u;
+    if (!terrimpi_seat_job(v, size, job))
+        return 0;
+    size[0] = job->rects[0].width;
+    size[1] = job->rects[0].height;
+    terrimp_capture_pad(front, size, TERRIMPI_MARGIN);
+    job->source = terrimpi_source_level(v, &want->site, terrimp_box_distance(&box, eye));
+    job->strip = terrimpi_strip_width(v, job, &box);
+    /* The border lies in front of and behind the box that was fitted. */
+    border = 1.5f * (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
+                            << job->source) *
+             terrimpi_max(v->terrain->desc.field.spacing_x, v->terrain->desc.field.spacing_z);
+    front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
+    front->z_far += border;
+    *back = *front;
+    if (job->part_count == 2u) { /* the parts overlap by what the mesh may be off */
+        float overlap = 2.0f * terrimpi_mesh_error(v, want->site.node);
+        front->z_far = terrimpi_min(front->z_far, split + overlap);
+        back->z_near = terrimpi_max(back->z_near, split - overlap);
+    }
+    job->cell_count = job->cell_to = terrimpi_cell_count(v, job);
+    job->triangles = terrimpi_piece_triangles(v, job);
+    job->wanted = terrimpi_sharpness(v, terrimp_box_distance(&box, eye));
+    job->cost = costs->triangle * (float)job->triangles;
+    for (i = 0; i < job->part_count; i++)
+        job->cost += costs->capture + costs->ground_px * (float)job->rects[i].width *
+                                          (float)job->rects[i].height;
+    return 1;
+}
+
+/* Takes the cells of a picture that still fit into a number of triangles: one at least. */
+static void terrimpi_cut_piece(const terrimp_view *v, terrimpi_job *job, uint32_t triangles)
+{
+    uint32_t used = 0, node;
+    terrimpi_pattern pattern;
+    job->cell_to = job->cell_from;
+    while (job->cell_to < job->cell_count) {
+        if (terrimpi_cell(v, job, job->cell_to, &node, &pattern)) {
+            used += pattern.triangle_count;
+            if (used > triangles && job->cell_to > job->cell_from)
+                break;
+        }
+        job->cell_to++;
+    }
+}
+
+static uint32_t terrimpi_job_texels(const terrimpi_job *job)
+{
+    uint32_t i, texels = 0;
+    for (i = 0; i < job->part_count; i++)
+        texels += job->rects[i].width * job->rects[i].height;
+    return texels;
+}
+
+/* Sorts the queue, highest priority first; among equals the lower node. */
+static void terrimpi_sort_queue(terrimp_view *v, uint32_t count)
+{
+    uint32_t gap, i, k;
+    for (gap = count / 2u; gap > 0; gap /= 2u)
+        for (i = gap; i < count; i++) {
+            uint32_t moved = v->queue[i];
+            const terrimpi_want *m = &v->wants[moved];
+            for (k = i; k >= gap; k -= gap) {
+                const terrimpi_want *w = &v->wants[v->queue[k - gap]];
+                if (w->priority > m->priority ||
+                    (w->priority == m->priority && w->site.node < m->site.node))
+                    break;
+                v->queue[k] = v->queue[k - gap];
+            }
+            v->queue[k] = moved;
+        }
+}
+
+/* Lists what could be captured: what is missing first, then what is due, then what soon will be;
+   each by its error on the screen times the pixels that show it. Returns how many. */
+static uint32_t terrimpi_fill_queue(terrimp_view *v)
+{
+    uint32_t u, i, count = 0;
+    for (u = 0; u < v->unit_count; u++)
+        for (i = 0; i < v->units[u].want_count; i++) {
+            uint32_t index = v->units[u].first_want + i;
+            terrimpi_want *want = &v->wants[index];
+            float weight = want->pixels / (1.0f + want->pixels); /* never 0 */
+            if (v->open && v->opened.site.node == want->site.node)
+                continue;
+            if (want->urgency < 1.0f && (v->desc.no_spreading || want->urgency < TERRIMPI_EARLY))
+                continue;
+            weight = terrimpi_max(weight, 1e-3f) + want->pixels;
+            if (!terrimpi_usable(v, want->record, want->urgency))
+                want->priority = 1e20f + 1e12f * weight;
+            else
+                want->priority = (want->urgency >= 1.0f ? 1e9f : 1.0f) *
+                                 terrimpi_min(want->urgency, 2.0f) * weight;
+            v->queue[count++] = index;
+        }
+    terrimpi_sort_queue(v, count);
+    return count;
+}
+
+/* Continues the picture that is being made in pieces; then takes captures from the queue as the
+   limits allow. `spread` is what captures cost in the mean frame, `drawn` what the draws of this
+   frame cost: together with captures for as much as that, no frame is much worse than the last. */
+static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
+{
+    const terrimp_view_desc *d = &v->desc;
+    uint32_t i, count, put_off = 0, due = 0, texels = 0, triangles = 0;
+    float allowance = terrimpi_max(1.5f * spread, drawn), spent = 0.0f, angle, parallax;
+    if (v->open && terrimpi_judge(v, v->opened.captures[0].eye, &v->opened.site, &angle,
+                                  &parallax) >= TERRIMPI_STALE) {
+        terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
+        v->open = 0;
+    }
+    count = terrimpi_fill_queue(v);
+    if (v->open) {
+        terrimpi_job *job = &v->jobs[v->job_count++];
+        v->records[v->opened.record].seen = v->frame;
+        *job = v->opened;
+        terrimpi_cut_piece(v, job, d->max_capture_triangles);
+        texels += terrimpi_job_texels(job);
+        triangles += terrimpi_piece_triangles(v, job);
+        spent += v->opened.cost * (float)(job->cell_to - job->cell_from) /
+                 (float)job->cell_count;
+    }
+    for (i = 0; i < count; i++) {
+        const terrimpi_want *want = &v->wants[v->queue[i]];
+        terrimpi_job *job = &v->jobs[v->job_count];
+        int is_due = want->urgency >= 1.0f;
+        due += is_due ? 1u : 0u;
+        if (v->job_count == d->max_captures ||
+            (!d->no_spreading && spent > 0.0f && spent + want->capture_cost > allowance) ||
+            (!is_due && spent + want->capture_cost > spread) ||
+            (d->max_capture_texels && texels >= d->max_capture_texels) ||
+            (d->max_capture_triangles && triangles >= d->max_capture_triangles)) {
+            put_off += is_due ? 1u : 0u;
+            continue;
+        }
+        if (!terrimpi_prepare_job(v, want, job)) {
+            put_off += is_due ? 1u : 0u;
+            continue;
+        }
+        if ((d->max_capture_texels && texels > 0 &&
+             texels + terrimpi_job_texels(job) > d->max_capture_texels) ||
+            (d->max_capture_triangles && v->open &&
+             triangles + job->triangles > d->max_capture_triangles)) {
+            terrimpi_cancel_job(v, job);
+            put_off += is_due ? 1u : 0u;
+            continue;
+        }
+        if (d->max_capture_triangles && triangles + job->triangles > d->max_capture_triangles) {
+            terrimpi_cut_piece(v, job, d->max_capture_triangles - triangles);
+            if (triangles > 0 &&
+                triangles + terrimpi_piece_triangles(v, job) > d->max_capture_triangles) {
+                terrimpi_cancel_job(v, job);
+                put_off += is_due ? 1u : 0u;
+                continue;
+            }
+            v->opened = *job;
+            v->open = job->cell_to < job->cell_count;
+        }
+        texels += terrimpi_job_texels(job);
+        triangles += terrimpi_piece_triangles(v, job);
+        spent += job->cost;
+        v->job_count++;
+    }
+    for (i = 0; i < v->job_count; i++) {
+        v->stats.captures += v->jobs[i].part_count;
+        v->stats.splits += v->jobs[i].part_count - 1u;
+    }
+    v->stats.captured_texels = texels;
+    v->stats.captured_triangles = triangles;
+    v->stats.captures_due = due;
+    v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
+}
+
+/* ---- what is drawn ---- */
+
+/* The eye of the picture that a record will have when impostors are drawn; NULL: it has none. */
+static const float *terrimpi_picture_eye(const terrimp_view *v, uint32_t record)
 {
     uint32_t i;
-    int complete = 1;
-    v->queue_count = v->records_tried = 0;
-    for (i = 0; i < v->item_count; i++) { /* no visible chunk loses its record to another one */
-        uint16_t record = v->record_of[v->items[i].node];
-        if ((v->items[i].draw & TERRIMPI_DRAW_IMPOSTOR) && record != TERRIMPI_NO_RECORD)
-            v->records[record].seen = v->frame;
-    }
-    for (i = 0; i < v->item_count; i++) {
-        terrimpi_item *item = &v->items[i];
-        terrimpi_record *record;
-        if (!(item->draw & TERRIMPI_DRAW_IMPOSTOR))
-            continue;
-        item->record = terrimpi_take_record(v, item->node);
-        if (item->record == TERRIMPI_NO_RECORD)
-            continue;
-        record = &v->records[item->record];
-        record->wanted = v->pixel_factor * v->desc.texels_per_px /
-                         terrimpi_max(item->closest, 1e-6f);
-        terrimpi_enqueue(v, item->record);
-        if (terrimp_pair_picture(&v->pair, &v->slots[item->record]) == 1 - (int)v->pair.newest)
-            complete = 0;
-    }
-    if (v->queue_count == 0)
-        return;
-    if (complete)
-        terrimpi_repack(v);
-    terrimpi_trim_queue(v);
-    if (!terrimpi_assign_slots(v)) {
-        terrimpi_repack(v);
-        terrimpi_trim_queue(v);
-        if (!terrimpi_assign_slots(v))
-            v->queue_count = 0;
-    }
+    for (i = 0; i < v->job_count; i++)
+        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
+            return v->jobs[i].captures[0].eye;
+    return v->records[record].part_count > 0 ? v->records[record].eye : NULL;
 }
 
-/* Whether a record is in the queue; it is short, and asked only for records without a picture. */
-static int terrimpi_queued(const terrimp_view *v, uint16_t record)
+/* Puts a node's impostor on the list of this frame, if it has a picture that is good enough; once. */
+static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urgent)
 {
-    return v->records[record].urgency < 0.0f;
+    uint32_t index = v->record_of[node];
+    terrimpi_site s;
+    terrimpi_record *record;
+    const float *eye;
+    float angle, parallax;
+    if (index == TERRIMPI_NO_RECORD)
+        return 0;
+    record = &v->records[index];
+    if (record->listed == v->frame)
+        return 1;
+    s = terrimpi_site_of(&v->terrain->tree, node);
+    eye = terrimpi_picture_eye(v, index);
+    if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
+        return 0;
+    record->listed = record->seen = v->frame;
+    v->items[v->item_count].index = index;
+    v->items[v->item_count++].is_impostor = 1;
+    v->stats.impostors++;
+    v->stats.impostors_by_level[s.level]++;
+    return 1;
 }
 
-/* Settles what each visible chunk is drawn as, now that it is known which pictures will exist. */
+/* Draws a wanted impostor, or in its place what shows the same: its children, of which it was put
+   together, or its parent, of which it is a part. Returns 0 when there is no picture. */
+static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
+{
+    const terrimp_geomip *tree = &v->terrain->tree;
+    terrimpi_site children[4];
+    uint32_t i, count = 0, level = want->site.level, up;
+    if (terrimpi_list_impostor(v, want->site.node, TERRIMPI_STALE))
+        return 1;
+    v->stats.waiting++;
+    if (v->desc.mode != TERRIMP_MODE_AUTO)
+        return 0;
+    if (level > 0) {
+        count = terrimpi_children(v, &want->site, children);
+        for (i = 0; i < count; i++) {
+            uint32_t record = v->record_of[children[i].node];
+            if (record == TERRIMPI_NO_RECORD || v->records[record].part_count == 0)
+                break;
+        }
+        if (i == count) {
+            for (i = 0; i < count; i++)
+                if (!terrimpi_list_impostor(v, children[i].node, 2.0f * TERRIMPI_STALE))
+                    break;
+            if (i == count)
+                return 1;
+        }
+    }
+    for (up = 1; up <= 2u && level + up < tree->level_count; up++) {
+        terrimpi_site s = terrimpi_site_at(tree, level + up, want->site.x >> up,
+                                           want->site.z >> up);
+        terrimp_box box;
+        terrimpi_site_box(v, &s, &box);
+        if (terrimp_box_distance(&box, v->camera.eye) >= v->desc.fade_start &&
+            terrimpi_list_impostor(v, s.node, 2.0f * TERRIMPI_STALE))
+            return 1;
+    }
+    return 0;
+}
+
+/* Shows a unit's ground. */
+static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
+{
+    uint32_t i;
+    for (i = 0; i < unit->leaf_count; i++) {
+        uint32_t leaf = v->leaves[unit->first_leaf + i];
+        v->shown[leaf] = alpha;
+        if (alpha < 0.0f) {
+            v->items[v->item_count].index = leaf;
+            v->items[v->item_count++].is_impostor = 0;
+        }
+    }
+}
+
+/* Takes back the impostors from an item on: ground is drawn in their place. */
+static void terrimpi_unlist(terrimp_view *v, uint32_t first)
+{
+    while (v->item_count > first) {
+        terrimpi_record *record = &v->records[v->items[--v->item_count].index];
+        record->listed = 0;
+        v->stats.impostors--;
+        v->stats.impostors_by_level[terrimpi_site_of(&v->terrain->tree, record->node).level]--;
+    }
+}
+
+/* Settles what each unit is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_settle(terrimp_view *v)
 {
     float closest = v->desc.fade_end; /* of all impostors */
-    uint32_t i;
-    for (i = 0; i < v->queue_count; i++)
-        v->records[v->queue[i]].urgency = -1.0f;
-    for (i = 0; i < v->item_count; i++) {
-        terrimpi_item *item = &v->items[i];
-        if (!(item->draw & TERRIMPI_DRAW_IMPOSTOR))
-            continue;
-        if (item->record == TERRIMPI_NO_RECORD ||
-            (!terrimpi_queued(v, item->record) &&
-             terrimp_pair_picture(&v->pair, &v->slots[item->record]) < 0)) {
-            item->draw = TERRIMPI_DRAW_GROUND | TERRIMPI_WAITS;
-            continue;
-        }
-        closest = terrimpi_min(closest, item->closest);
+    uint32_t u, i;
+    v->item_count = 0;
+    for (u = 0; u < v->unit_count; u++) {
+        const terrimpi_unit *unit = &v->units[u];
+        uint32_t before = v->item_count;
+        int covered = unit->want_count > 0, impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
+        for (i = 0; i < unit->want_count; i++)
+            covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
+        if (!covered) {
+            terrimpi_unlist(v, before);
+            terrimpi_show_ground(v, unit,
+                                 impostors && unit->closest >= v->desc.fade_end ? -1.0f : 1.0f);
+        } else
+            terrimpi_show_ground(v, unit,
+                                 terrimpi_max(0.0f, (v->desc.fade_end - unit->closest) /
+                                                        (v->desc.fade_end - v->desc.fade_start)));
     }
+    for (i = 0; i < v->item_count; i++)
+        if (v->items[i].is_impostor) {
+            terrimpi_site s = terrimpi_site_of(&v->terrain->tree,
+                                               v->records[v->items[i].index].node);
+            float angle, parallax;
+            terrimp_box box;
+            terrimpi_judge(v, terrimpi_picture_eye(v, v->items[i].index), &s, &angle, &parallax);
+            v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
+            v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
+            terrimpi_site_box(v, &s, &box);
+            closest = terrimpi_min(closest, terrimp_box_distance(&box, v->camera.eye));
+        }
     /* All impostors go behind all ground: the closest one is moved to the end of the fade band. */
     v->depth_bias = v->desc.fade_end / terrimpi_max(closest, v->desc.fade_end / 8.0f) - 1.0f;
-}
-
-/* The strip of neighbours that a capture needs, as a number of terrimpi_strip_quads: the texels
-   that bilinear reads and the parallax can reach, in world units. At a grazing angle a texel is as
-   many times longer on the ground as the sine of that angle is smaller. */
-static uint32_t terrimpi_strip_width(const terrimp_view *v, const terrimp_capture *capture,
-                                     const terrimp_rect *slot, const terrimp_box *box)
-{
-    const terrimp_heightfield *field = &v->terrain->desc.field;
-    uint32_t quads = v->terrain->desc.chunk_quads, width = 0, strips = terrimpi_strip_count(quads);
-    float texels = 1.5f + v->desc.tolerance_px * v->desc.texels_per_px;
-    float per_texel_x = (capture->tan_right - capture->tan_left) / (float)slot->width;
-    float per_texel_y = (capture->tan_up - capture->tan_down) / (float)slot->height;
-    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    float sine = terrimpi_max(drop / capture->z_far, 0.1f);
-    float reach = texels * capture->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
-    float spacing = terrimpi_min(field->spacing_x, field->spacing_z);
-    while (width < strips && (float)terrimpi_strip_quads(quads, width) * spacing < reach)
-        width++;
-    return width;
-}
-
-/* Puts one capture's camera, slot and border together. */
-static void terrimpi_prepare_capture(const terrimp_view *v, uint16_t record,
-                                     terrimp_capture *capture, terrimp_capture_command *command,
-                                     uint32_t *strip)
-{
-    const terrimp_terrain *t = v->terrain;
-    const terrimp_heightfield *field = &t->desc.field;
-    uint32_t node = v->records[record].node;
-    uint32_t x = node % t->tree.level_x[0], z = node / t->tree.level_x[0];
-    uint32_t slot[2], size[2];
-    float border_x, border_z, border;
-    terrimp_box box;
-    memset(command, 0, sizeof *command);
-    command->node = node;
-    command->atlas = v->pair.newest;
-    command->slot = v->slots[record].rect[v->pair.newest];
-    terrimpi_slot_size(v, node, capture, size);
-    slot[0] = command->slot.width;
-    slot[1] = command->slot.height;
-    terrimp_capture_pad(capture, slot, TERRIMPI_MARGIN);
-    terrimpi_node_box(t, 0, x, z, &box);
-    *strip = terrimpi_strip_width(v, capture, &command->slot, &box);
-    border = (float)terrimpi_strip_quads(t->desc.chunk_quads, *strip);
-    border_x = border * field->spacing_x;
-    border_z = border * field->spacing_z;
-    /* The border lies in front of and behind the box that was fitted. */
-    capture->z_near = terrimpi_max(capture->z_near * 0.5f,
-                                   capture->z_near - 1.5f * terrimpi_max(border_x, border_z));
-    capture->z_far += 1.5f * terrimpi_max(border_x, border_z);
-    terrimp_capture_matrices(capture, v->camera.depth_zero_to_one, command->view,
-                             command->projection);
-    memcpy(command->eye, capture->eye, sizeof command->eye);
-    command->clip_min[0] = box.min[0] - border_x;
-    command->clip_min[1] = box.min[2] - border_z;
-    command->clip_max[0] = box.max[0] + border_x;
-    command->clip_max[1] = box.max[2] + border_z;
-}
-
-/* Calls `draw` for a chunk and the strips of its neighbours; with a NULL one only counts triangles.
-   Strips are opaque ground in the capture's own camera. */
-static uint32_t terrimpi_draw_captured(const terrimp_view *v, uint32_t node, uint32_t strip,
-                                       const terrimp_callbacks *callbacks)
-{
-    const terrimp_terrain *t = v->terrain;
-    terrimp_ground_command command;
-    uint32_t direction, triangles, quads = t->desc.chunk_quads;
-    terrimpi_pattern pattern = terrimpi_find_pattern(quads, 0);
-    memset(&command, 0, sizeof command);
-    command.node = node;
-    command.index_count = pattern.index_count;
-    triangles = pattern.triangle_count;
-    if (callbacks)
-        callbacks->draw_ground(callbacks->user, &command);
-    for (direction = 0; direction < TERRIMPI_DIRECTIONS; direction++) {
-        int dx, dz;
-        uint32_t x, z;
-        terrimpi_direction(direction, &dx, &dz);
-        x = node % t->tree.level_x[0] + (uint32_t)dx; /* wraps below 0, and is then too large */
-        z = node / t->tree.level_x[0] + (uint32_t)dz;
-        if (x >= t->tree.level_x[0] || z >= t->tree.level_z[0])
-            continue;
-        pattern = terrimpi_find_pattern(quads, terrimpi_strip_pattern(quads, strip, direction));
-        command.node = z * t->tree.level_x[0] + x;
-        command.first_index = pattern.first_index;
-        command.index_count = pattern.index_count;
-        triangles += pattern.triangle_count;
-        if (callbacks)
-            callbacks->draw_ground(callbacks->user, &command);
-    }
-    return triangles;
 }
 
 /* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
@@ -9003,126 +10278,237 @@ static int terrimpi_floor_wanted(const terrimp_view *v)
            v->camera.eye[2] <= box.max[2] && v->camera.eye[1] >= box.min[1];
 }
 
-/* The statistics of what has been decided. */
+/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
+static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t pattern,
+                                    terrimp_pattern *found)
+{
+    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST, pattern, found);
+}
+
+/* In how many parts a record will be drawn. */
+static uint32_t terrimpi_parts_of(const terrimp_view *v, uint32_t record)
+{
+    uint32_t i;
+    for (i = 0; i < v->job_count; i++)
+        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
+            return v->jobs[i].part_count;
+    return v->records[record].part_count;
+}
+
+/* The rest of the statistics. */
 static void terrimpi_count_frame(terrimp_view *v)
 {
     const terrimp_terrain *t = v->terrain;
     terrimp_stats *s = &v->stats;
-    uint32_t i, quads = t->desc.chunk_quads;
-    float texel_scale = s->texel_scale, tan_x, tan_y;
-    memset(s, 0, sizeof *s);
-    s->texel_scale = texel_scale;
-    s->visible = v->item_count;
-    s->repacks = v->pair.repacks;
-    s->captures = v->queue_count;
-    for (i = 0; i < v->queue_count; i++) {
-        terrimp_capture capture;
-        terrimp_capture_command command;
-        uint32_t strip;
-        terrimpi_prepare_capture(v, v->queue[i], &capture, &command, &strip);
-        s->captured_texels += command.slot.width * command.slot.height;
-        s->captured_triangles += terrimpi_draw_captured(v, command.node, strip, NULL);
-    }
-    for (i = 0; i < v->item_count; i++) {
-        const terrimpi_item *item = &v->items[i];
-        terrimp_mesh_info mesh;
-        terrimp_box box;
-        float farthest;
-        terrimpi_node_box(t, 0, item->node % t->tree.level_x[0],
-                      item->node / t->tree.level_x[0], &box);
-        farthest = terrimp_box_farthest(&box, v->camera.eye);
-        if (i == 0 || item->closest < s->z_near)
-            s->z_near = item->closest;
-        s->z_far = terrimpi_max(s->z_far, farthest * (1.0f + v->depth_bias));
-        if (item->draw & TERRIMPI_DRAW_GROUND) {
+    terrimp_live_atlas_stats atlas;
+    float tan_x, tan_y;
+    uint32_t i, u;
+    s->visible = v->unit_count;
+    s->ground_tolerance_px = v->ground.tolerance_px;
+    for (i = 0; i < v->ground.draw_count; i++)
+        if (v->shown[i] != 0.0f) {
+            terrimp_pattern pattern;
+            terrimpi_ground_pattern(v, v->ground.draws[i].pattern, &pattern);
             s->ground++;
-            s->triangles += 2u * quads * quads;
+            s->triangles += pattern.triangle_count;
         }
-        if (item->draw & TERRIMPI_WAITS)
-            s->waiting++;
-        if (item->draw & TERRIMPI_DRAW_IMPOSTOR) {
-            s->impostors++;
-            terrimpi_mesh_place(t, item->node, &mesh);
-            s->triangles += mesh.index_count / 3u;
-            if (!terrimpi_queued(v, item->record)) {
-                float angle, parallax;
-                terrimpi_judge(v, &v->records[item->record], &angle, &parallax);
-                s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, angle);
-                s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, parallax);
-            }
+    for (i = 0; i < v->item_count; i++)
+        if (v->items[i].is_impostor) {
+            terrimp_mesh_info mesh;
+            terrimpi_mesh_place(t, v->records[v->items[i].index].node, &mesh);
+            s->triangles += mesh.index_count / 3u * terrimpi_parts_of(v, v->items[i].index);
+            s->draws += terrimpi_parts_of(v, v->items[i].index);
         }
-    }
-    s->draws = s->ground + s->impostors;
+    s->draws += s->ground;
     if (terrimpi_floor_wanted(v)) {
         s->draws++;
         s->triangles += terrimpi_floor_indices(t) / 3u;
     }
+    for (u = 0; u < v->unit_count; u++) {
+        terrimp_box box;
+        terrimpi_site_box(v, &v->units[u].site, &box);
+        if (u == 0 || v->units[u].closest < s->z_near)
+            s->z_near = v->units[u].closest;
+        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye) *
+                                              (1.0f + v->depth_bias));
+    }
     /* A point at that distance in the corner of the screen has the smallest depth. */
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
     s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
-    for (i = 0; i < v->desc.max_impostors; i++)
-        if (v->slots[i].assigned[v->pair.newest])
-            s->atlas_used += (float)v->slots[i].rect[v->pair.newest].width *
-                             (float)v->slots[i].rect[v->pair.newest].height;
-    s->atlas_used /= (float)v->desc.atlas_size * (float)v->desc.atlas_size;
+    for (i = 0; i < v->desc.atlas_count; i++)
+        if (terrimp_live_atlas_query(&v->atlases[i], &atlas) == TERRIMP_OK) {
+            s->texels_used += atlas.texels_used;
+            s->texels_free += atlas.texels_free;
+        }
+}
+
+/* Follows the eye's motion; a jump is none. */
+static void terrimpi_follow(terrimp_view *v, const float before[3])
+{
+    float step[3];
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        step[i] = v->camera.eye[i] - before[i];
+    if (v->frame <= 1u || terrimpi_length(step) > 0.5f * v->desc.fade_start)
+        memset(v->motion, 0, sizeof v->motion);
+    else
+        for (i = 0; i < 3u; i++)
+            v->motion[i] = 0.75f * v->motion[i] + 0.25f * step[i];
+    if (terrimpi_length(v->motion) < 1e-6f * v->desc.fade_start)
+        memset(v->motion, 0, sizeof v->motion);
 }
 
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera)
 {
+    terrimp_camera resolved, before;
     terrimp_frustum frustum;
-    terrimp_camera resolved;
+    terrimp_stats stats;
     terrimp_result result;
+    float spread = 0.0f, drawn = 0.0f;
+    uint32_t i;
     if (!view)
         return TERRIMP_E_NULL;
     result = terrimp_camera_resolve(camera, &resolved);
     if (result != TERRIMP_OK)
         return result;
+    before = view->camera;
+    frustum = view->frustum;
     view->camera = resolved;
-    terrimp_camera_frustum(&resolved, &frustum);
+    terrimp_camera_frustum(&resolved, &view->frustum);
     terrimp_camera_pixel_factor(&resolved, &view->pixel_factor);
+    result = terrimpi_cut_ground(view);
+    if (result != TERRIMP_OK) {
+        view->camera = before;
+        view->frustum = frustum;
+        return result;
+    }
     view->frame++;
-    terrimpi_cull(view, &frustum);
-    terrimpi_plan_captures(view);
+    view->outdated = 0;
+    terrimpi_cancel_jobs(view);
+    stats = view->stats;
+    memset(&view->stats, 0, sizeof view->stats);
+    view->stats.reuse = stats.reuse;
+    view->stats.evictions = stats.evictions;
+    view->stats.atlas_failures = stats.atlas_failures;
+    terrimpi_follow(view, before.eye);
+    terrimpi_list_units(view);
+    for (i = 0; i < view->unit_count; i++)
+        terrimpi_decide(view, &view->units[i], &spread, &drawn);
+    terrimpi_schedule(view, spread, drawn);
+    memset(view->shown, 0, view->ground.draw_count * sizeof *view->shown);
     terrimpi_settle(view);
     terrimpi_count_frame(view);
     return TERRIMP_OK;
 }
 
-/* Makes one picture. */
-static void terrimpi_render_capture(terrimp_view *v, uint16_t index,
-                                    const terrimp_callbacks *callbacks)
+/* ---- the commands ---- */
+
+/* Notes that a record has a new picture. */
+static void terrimpi_finish_job(terrimp_view *v, const terrimpi_job *job)
 {
-    terrimpi_record *record = &v->records[index];
-    terrimp_capture capture;
-    terrimp_capture_command command;
-    uint32_t strip;
-    terrimpi_prepare_capture(v, index, &capture, &command, &strip);
-    callbacks->begin_capture(callbacks->user, &command);
-    terrimpi_draw_captured(v, command.node, strip, callbacks);
-    callbacks->end_capture(callbacks->user, &command);
-    terrimp_texture_matrix(&capture, &command.slot, v->desc.atlas_size, v->desc.atlas_size,
-                           record->texture_matrix);
-    memcpy(record->eye, capture.eye, sizeof record->eye);
-    record->sharpness = record->wanted;
-    terrimp_pair_fill(&v->pair, &v->slots[index]);
+    terrimpi_record *record = &v->records[job->record];
+    uint32_t i;
+    if (record->part_count > 0) {
+        float frames = (float)record->drawn_count;
+        v->stats.reuse += (frames - v->stats.reuse) * (v->stats.reuse > 0.0f ? 0.02f : 1.0f);
+    }
+    if (record->part_count != job->part_count ||
+        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
+        terrimpi_drop_seats(v, record->parts, record->part_count);
+    record->part_count = job->part_count;
+    memcpy(record->parts, job->parts, sizeof record->parts);
+    record->drawn_count = 0;
+    record->sharpness = job->wanted;
+    record->cost = job->cost;
+    memcpy(record->eye, job->captures[0].eye, sizeof record->eye);
+    for (i = 0; i < job->part_count; i++)
+        terrimp_texture_matrix(&job->captures[i], &job->rects[i], v->desc.atlas_size,
+                               v->desc.atlas_size, record->texture_matrix[i]);
 }
 
-static void terrimpi_render_impostor(const terrimp_view *v, const terrimpi_item *item,
+/* Makes a part of a picture, or a piece of one. */
+static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job, uint32_t part,
+                                 const terrimp_callbacks *callbacks)
+{
+    const terrimp_heightfield *field = &v->terrain->desc.field;
+    terrimp_capture_command command;
+    terrimp_ground_command ground;
+    terrimpi_pattern pattern;
+    terrimp_box box;
+    float border;
+    uint32_t k;
+    memset(&command, 0, sizeof command);
+    command.node = job->site.node;
+    command.level = job->site.level;
+    command.part = part;
+    command.atlas = job->parts[part].atlas;
+    command.slot = job->rects[part];
+    command.clear = job->cell_from == 0;
+    command.complete = job->cell_to == job->cell_count;
+    terrimp_capture_matrices(&job->captures[part], v->camera.depth_zero_to_one, command.view,
+                             command.projection);
+    memcpy(command.eye, job->captures[part].eye, sizeof command.eye);
+    terrimpi_site_box(v, &job->site, &box);
+    border = (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
+                     << job->source);
+    command.clip_min[0] = box.min[0] - border * field->spacing_x;
+    command.clip_min[1] = box.min[2] - border * field->spacing_z;
+    command.clip_max[0] = box.max[0] + border * field->spacing_x;
+    command.clip_max[1] = box.max[2] + border * field->spacing_z;
+    callbacks->begin_capture(callbacks->user, &command);
+    memset(&ground, 0, sizeof ground);
+    ground.level = job->source;
+    ground.alpha = 1.0f;
+    for (k = job->cell_from; k < job->cell_to; k++) {
+        if (!terrimpi_cell(v, job, k, &ground.node, &pattern) ||
+            !terrimpi_cell_in_part(v, job, ground.node, part))
+            continue;
+        ground.first_index = pattern.first_index;
+        ground.index_count = pattern.index_count;
+        callbacks->draw_ground(callbacks->user, &ground);
+    }
+    callbacks->end_capture(callbacks->user, &command);
+}
+
+/* Makes a picture, or a piece of one. */
+static void terrimpi_render_capture(terrimp_view *v, const terrimpi_job *job,
+                                    const terrimp_callbacks *callbacks)
+{
+    uint32_t part;
+    for (part = 0; part < job->part_count; part++)
+        terrimpi_render_part(v, job, part, callbacks);
+    if (job->cell_to < job->cell_count) {
+        v->opened.cell_from = job->cell_to;
+        return;
+    }
+    terrimpi_finish_job(v, job);
+    if (v->open && v->opened.record == job->record)
+        v->open = 0;
+}
+
+static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
                                      const terrimp_callbacks *callbacks)
 {
-    terrimp_mesh_info mesh;
     terrimp_impostor_command command;
-    terrimpi_mesh_place(v->terrain, item->node, &mesh);
+    terrimp_mesh_info mesh;
+    uint32_t part;
+    terrimpi_mesh_place(v->terrain, record->node, &mesh);
     memset(&command, 0, sizeof command);
-    command.node = item->node;
-    command.atlas = (uint32_t)terrimp_pair_picture(&v->pair, &v->slots[item->record]);
+    command.node = record->node;
+    command.level = terrimpi_site_of(&v->terrain->tree, record->node).level;
+    command.part_count = record->part_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    memcpy(command.texture_matrix, v->records[item->record].texture_matrix,
-           sizeof command.texture_matrix);
     command.depth_bias = v->depth_bias;
-    callbacks->draw_impostor(callbacks->user, &command);
+    record->drawn_count++;
+    for (part = 0; part < record->part_count; part++) {
+        command.part = part;
+        command.atlas = record->parts[part].atlas;
+        memcpy(command.texture_matrix, record->texture_matrix[part],
+               sizeof command.texture_matrix);
+        callbacks->draw_impostor(callbacks->user, &command);
+    }
 }
 
 static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks *callbacks)
@@ -9136,21 +10522,23 @@ static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks
     callbacks->draw_floor(callbacks->user, &command);
 }
 
-static void terrimpi_render_ground(const terrimp_view *v, const terrimpi_item *item,
+static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
                                    const terrimp_callbacks *callbacks)
 {
-    terrimpi_pattern pattern = terrimpi_find_pattern(v->terrain->desc.chunk_quads, 0);
+    const terrimp_geomip_draw *draw = &v->ground.draws[index];
     terrimp_ground_command command;
+    terrimp_pattern pattern;
+    terrimpi_ground_pattern(v, draw->pattern, &pattern);
     memset(&command, 0, sizeof command);
-    command.node = item->node;
+    command.node = draw->node;
+    command.level = draw->level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
-    if (item->draw & TERRIMPI_DRAW_IMPOSTOR) {
-        command.fade_start = v->desc.fade_start;
-        command.fade_end = v->desc.fade_end;
-    }
-    if ((item->draw & TERRIMPI_WAITS) && item->closest >= v->desc.fade_end)
-        command.depth_bias = v->depth_bias;
+    command.alpha = v->shown[index] < 0.0f ? 1.0f : v->shown[index];
+    command.depth_bias = v->shown[index] < 0.0f ? v->depth_bias : 0.0f;
+    command.morph = draw->morph;
+    memcpy(command.side, draw->side, sizeof command.side);
+    memcpy(command.side_coarse, draw->side_coarse, sizeof command.side_coarse);
     callbacks->draw_ground(callbacks->user, &command);
 }
 
@@ -9160,30 +10548,25 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     uint32_t i;
     if (!view || !callbacks)
         return TERRIMP_E_NULL;
-    if (view->frame == 0)
+    if (view->frame == 0 || view->outdated)
         return TERRIMP_E_STATE;
-    if ((view->stats.ground + view->queue_count > 0 && !callbacks->draw_ground) ||
+    if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
-        (view->queue_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
+        (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
-    for (i = 0; i < view->queue_count; i++)
-        terrimpi_render_capture(view, view->queue[i], callbacks);
-    view->queue_count = 0;
-    for (i = 0; i < view->item_count; i++) {
-        const terrimpi_item *item = &view->items[i];
-        if (item->draw & TERRIMPI_DRAW_IMPOSTOR)
-            terrimpi_render_impostor(view, item, callbacks);
-        else if ((item->draw & TERRIMPI_WAITS) && item->closest >= view->desc.fade_end)
-            terrimpi_render_ground(view, item, callbacks);
-    }
+    for (i = 0; i < view->job_count; i++)
+        terrimpi_render_capture(view, &view->jobs[i], callbacks);
+    view->job_count = 0;
+    for (i = 0; i < view->item_count; i++)
+        if (view->items[i].is_impostor)
+            terrimpi_render_impostor(view, &view->records[view->items[i].index], callbacks);
+        else
+            terrimpi_render_ground(view, view->items[i].index, callbacks);
     if (callbacks->draw_floor && terrimpi_floor_wanted(view))
         terrimpi_render_floor(view, callbacks);
-    for (i = 0; i < view->item_count; i++) {
-        const terrimpi_item *item = &view->items[i];
-        int distant = (item->draw & TERRIMPI_WAITS) && item->closest >= view->desc.fade_end;
-        if ((item->draw & TERRIMPI_DRAW_GROUND) && !distant)
-            terrimpi_render_ground(view, item, callbacks);
-    }
+    for (i = 0; i < view->leaf_count; i++)
+        if (view->shown[view->leaves[i]] > 0.0f)
+            terrimpi_render_ground(view, view->leaves[i], callbacks);
     return TERRIMP_OK;
 }
 

@@ -23,7 +23,7 @@ extern "C" {
 namespace {
 
 constexpr int width = 640, height = 480;
-constexpr uint32_t atlas_size = 1024, atlas_count = 2;
+constexpr uint32_t atlas_size = 1024;
 
 void check(terrimp_result result)
 {
@@ -111,7 +111,8 @@ Frame record(terrimp_view *view, const terrimp_camera &camera)
 /* ---- OpenGL ------------------------------------------------------------- */
 
 /* One program draws everything: ground wears the lightmap, impostors the atlas, both through a
-   texture matrix. Pictures hold colours times alpha, hence the division. */
+   texture matrix. Pictures hold colours times alpha, hence the division; of a picture in two parts
+   each shows only what lies within its own depth. */
 const char vertex_source[] =
     "#version 330 core\n"
     "in vec3 position;\n"
@@ -127,9 +128,11 @@ const char fragment_source[] =
     "#version 330 core\n"
     "uniform sampler2D picture;\n"
     "uniform float alpha;\n"
+    "uniform bool part;\n"
     "in vec4 strq;\n"
     "out vec4 colour;\n"
     "void main() {\n"
+    "    if (part && (strq.z < 0.0 || strq.z > strq.w)) discard;\n"
     "    vec4 c = textureProj(picture, strq);\n"
     "    if (c.a < 0.5) discard;\n"
     "    colour = vec4(c.rgb / c.a, alpha);\n"
@@ -171,7 +174,7 @@ private:
     terrimp_terrain_info info_{};
     context context_{};
     GLuint program_ = 0, ground_indices_ = 0, meshes_ = 0, lightmap_ = 0;
-    GLuint atlas_[atlas_count]{}, atlas_frame_[atlas_count]{};
+    GLuint atlas_ = 0, atlas_frame_ = 0;
     const float *lightmap_matrix_;
     std::unordered_map<uint32_t, GLuint> nodes_; // vertex arrays of what was drawn so far
     bool capturing_ = false, on_screen_ = false;
@@ -220,17 +223,15 @@ Renderer::Renderer(const terrimp_terrain *terrain, const scene &shown)
     lightmap_ = make_texture(SCENE_SIDE, GL_RGB, shown.lightmap, GL_LINEAR_MIPMAP_LINEAR);
     glGenerateMipmap(GL_TEXTURE_2D);
 
-    GLuint depth; // serves all atlases
+    GLuint depth;
     glGenRenderbuffers(1, &depth);
     glBindRenderbuffer(GL_RENDERBUFFER, depth);
     glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, atlas_size, atlas_size);
-    glGenFramebuffers(GLsizei(atlas_count), atlas_frame_);
-    for (uint32_t i = 0; i < atlas_count; i++) {
-        atlas_[i] = make_texture(atlas_size, GL_RGBA, nullptr, GL_LINEAR);
-        glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_[i]);
-        glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, atlas_[i], 0);
-        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
-    }
+    atlas_ = make_texture(atlas_size, GL_RGBA, nullptr, GL_LINEAR);
+    glGenFramebuffers(1, &atlas_frame_);
+    glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, atlas_, 0);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
     glEnable(GL_DEPTH_TEST);
     glEnable(GL_CULL_FACE);
     glEnable(GL_SCISSOR_TEST);
@@ -258,11 +259,11 @@ void Renderer::set_camera(const float view[16], const float projection[16], cons
 void Renderer::begin_capture(const terrimp_capture_command &c)
 {
     const GLint x = GLint(c.slot.x), y = GLint(c.slot.y);
-    glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_[c.atlas]);
+    glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_);
     glViewport(x, y, GLsizei(c.slot.width), GLsizei(c.slot.height));
     glScissor(x, y, GLsizei(c.slot.width), GLsizei(c.slot.height));
     glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    glClear((c.clear ? GL_COLOR_BUFFER_BIT : 0u) | GL_DEPTH_BUFFER_BIT);
     set_camera(c.view, c.projection, c.eye);
     on_screen_ = false;
     capturing_ = true;
@@ -317,15 +318,16 @@ std::vector<uint8_t> Renderer::draw(const Frame &frame)
             continue;
         }
         turn_to_screen(frame.camera, frame.stats.z_far);
+        glUniform1i(uniform("part"), c.kind == Command::impostor && c.mesh.part_count > 1);
         if (c.kind == Command::impostor)
             draw_range(meshes_, c.mesh.base_vertex, c.mesh.first_index, c.mesh.index_count,
-                       atlas_[c.mesh.atlas], c.mesh.texture_matrix, c.mesh.depth_bias, 1.0f);
+                       atlas_, c.mesh.texture_matrix, c.mesh.depth_bias, 1.0f);
         else if (c.kind == Command::floor)
             draw_range(meshes_, c.below.base_vertex, c.below.first_index, c.below.index_count,
                        lightmap_, lightmap_matrix_, c.below.depth_bias, 1.0f);
         else
             draw_range(vertices_of(c.node.node), 0, c.node.first_index, c.node.index_count,
-                       lightmap_, lightmap_matrix_, c.node.depth_bias, 1.0f);
+                       lightmap_, lightmap_matrix_, c.node.depth_bias, c.node.alpha);
     }
     turn_to_screen(frame.camera, frame.stats.z_far); // also when there is nothing to draw
     context_read(&context_, rgb.data());

@@ -6,6 +6,7 @@
    - (s, t, q): the positions are the texture coordinates too, and the texture matrix makes the
      rest of them. A machine without texture matrices takes terrimp_texture_coordinates: drawn too;
    - the depth bias is a scale about the eye, of vertices that are relative to the eye;
+   - a picture in two parts is cut to r / q within 0..1 by two clip planes, rows of its matrix;
    - "nothing where alpha is below 0.5" is the alpha test. The division by alpha is not to be had:
      captures are cleared to the colour of ground instead of black, for the filter to mix in.
    Build:  make fixed_function
@@ -21,14 +22,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WIDTH = 640, HEIGHT = 480, PIXELS = WIDTH * HEIGHT, ATLAS = 1024, ATLASES = 2 };
+enum { WIDTH = 640, HEIGHT = 480, PIXELS = WIDTH * HEIGHT, ATLAS = 1024 };
 enum { GRID = (SCENE_QUADS + 1) * (SCENE_QUADS + 1) };
 
 typedef struct host {
     const terrimp_terrain *terrain;
     terrimp_camera camera;
     terrimp_stats stats;
-    GLuint lightmap, atlas[ATLASES];
+    GLuint lightmap, atlas;
     uint16_t *indices, *mesh_indices;
     float *mesh_xyz, ground_xyz[GRID * 3], stq[GRID * 3], strq[GRID * 4];
     const float *lightmap_matrix;
@@ -54,6 +55,28 @@ static void set_camera(host *h, const float view[16], const float projection[16]
     memcpy(h->eye, eye, sizeof h->eye);
 }
 
+/* The pieces of the picture that are there already, texel for pixel, alpha too. */
+static void draw_slot(host *h, const terrimp_rect *slot)
+{
+    const float x = (float)slot->x / ATLAS, width = (float)slot->width / ATLAS;
+    const float y = (float)slot->y / ATLAS, height = (float)slot->height / ATLAS;
+    int i;
+    for (i = 0; i < 3; i++) {
+        static const GLenum modes[3] = { GL_PROJECTION, GL_MODELVIEW, GL_TEXTURE };
+        glMatrixMode(modes[i]);
+        glLoadIdentity();
+    }
+    glBindTexture(GL_TEXTURE_2D, h->atlas);
+    glDepthMask(GL_FALSE);
+    glBegin(GL_TRIANGLE_STRIP);
+    for (i = 0; i < 4; i++) {
+        glTexCoord2f(x + (float)(i & 1) * width, y + (float)(i >> 1) * height);
+        glVertex2f((float)(i & 1) * 2.0f - 1.0f, (float)(i >> 1) * 2.0f - 1.0f);
+    }
+    glEnd();
+    glDepthMask(GL_TRUE);
+}
+
 static void begin_capture(void *user, const terrimp_capture_command *c)
 {
     host *h = (host *)user;
@@ -65,6 +88,8 @@ static void begin_capture(void *user, const terrimp_capture_command *c)
     glScissor(0, 0, width, height);
     glClearColor(0.3f, 0.35f, 0.2f, 0.0f);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    if (!c->clear)
+        draw_slot(h, &c->slot);
     set_camera(h, c->view, c->projection, c->eye);
 }
 
@@ -72,7 +97,7 @@ static void end_capture(void *user, const terrimp_capture_command *c)
 {
     host *h = (host *)user;
     h->capturing = 0;
-    glBindTexture(GL_TEXTURE_2D, h->atlas[c->atlas]);
+    glBindTexture(GL_TEXTURE_2D, h->atlas);
     glCopyTexSubImage2D(GL_TEXTURE_2D, 0, (GLint)c->slot.x, (GLint)c->slot.y, 0, 0,
                         (GLsizei)c->slot.width, (GLsizei)c->slot.height);
 }
@@ -90,6 +115,15 @@ static void turn_to_screen(host *h)
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     terrimp_camera_matrices(&h->camera, view, projection);
     set_camera(h, view, projection, h->camera.eye);
+}
+
+/* The world moves to the eye, and grows about it: the same picture, deeper. */
+static void push_world(const host *h, float depth_bias)
+{
+    glMatrixMode(GL_MODELVIEW);
+    glPushMatrix();
+    glScalef(1.0f + depth_bias, 1.0f + depth_bias, 1.0f + depth_bias);
+    glTranslatef(-h->eye[0], -h->eye[1], -h->eye[2]);
 }
 
 /* For machines without a texture matrix. */
@@ -121,22 +155,42 @@ static void draw(host *h, GLuint texture, const float matrix[16], float depth_bi
         glLoadIdentity();
         make_texture_coordinates(h, matrix, xyz, indices, index_count);
     }
-    glMatrixMode(GL_MODELVIEW);
-    glPushMatrix();
-    glScalef(1.0f + depth_bias, 1.0f + depth_bias, 1.0f + depth_bias);
-    glTranslatef(-h->eye[0], -h->eye[1], -h->eye[2]);
+    push_world(h, depth_bias);
     glDrawElements(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT, indices);
+    glPopMatrix();
+}
+
+/* Keeps to r / q within 0..1: r >= 0 and q - r >= 0 are planes in the world. OpenGL takes them
+   through the modelview matrix of that moment. */
+static void clip_to_picture(const host *h, const float m[16], float depth_bias)
+{
+    GLdouble planes[2][4];
+    int i;
+    for (i = 0; i < 4; i++) {
+        planes[0][i] = (GLdouble)m[i * 4 + 2];
+        planes[1][i] = (GLdouble)m[i * 4 + 3] - (GLdouble)m[i * 4 + 2];
+    }
+    push_world(h, depth_bias);
+    for (i = 0; i < 2; i++) {
+        glClipPlane(GL_CLIP_PLANE0 + (GLenum)i, planes[i]);
+        glEnable(GL_CLIP_PLANE0 + (GLenum)i);
+    }
     glPopMatrix();
 }
 
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     host *h = (host *)user;
+    turn_to_screen(h);
+    if (c->part_count > 1)
+        clip_to_picture(h, c->texture_matrix, c->depth_bias);
     glEnable(GL_ALPHA_TEST);
-    draw(h, h->atlas[c->atlas], c->texture_matrix, c->depth_bias,
+    draw(h, h->atlas, c->texture_matrix, c->depth_bias,
          h->mesh_xyz + (size_t)c->base_vertex * 3, h->mesh_indices + c->first_index,
          c->index_count);
     glDisable(GL_ALPHA_TEST);
+    glDisable(GL_CLIP_PLANE0);
+    glDisable(GL_CLIP_PLANE1);
 }
 
 static void draw_floor(void *user, const terrimp_floor_command *c)
@@ -147,26 +201,14 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
          c->index_count);
 }
 
-static float alpha_of(const host *h, const terrimp_ground_command *c)
-{
-    terrimp_box box;
-    float d, a;
-    if (c->fade_end <= 0.0f || h->capturing) return 1.0f;
-    terrimp_terrain_get_box(h->terrain, c->node, &box);
-    d = terrimp_box_distance(&box, h->camera.eye);
-    a = (c->fade_end - d) / (c->fade_end - c->fade_start);
-    return a < 0 ? 0 : a > 1 ? 1 : a;
-}
-
 /* A host with more memory would keep the vertices of the nodes that it drew lately. */
 static void draw_ground(void *user, const terrimp_ground_command *c)
 {
     host *h = (host *)user;
-    float alpha = alpha_of(h, c);
     terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3);
-    if (alpha < 1.0f)
+    if (c->alpha < 1.0f)
         glEnable(GL_BLEND);
-    glColor4f(1.0f, 1.0f, 1.0f, alpha);
+    glColor4f(1.0f, 1.0f, 1.0f, c->alpha);
     draw(h, h->lightmap, h->lightmap_matrix, c->depth_bias, h->ground_xyz,
          h->indices + c->first_index, c->index_count);
     glColor4f(1.0f, 1.0f, 1.0f, 1.0f);
@@ -204,7 +246,7 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
 {
     terrimp_terrain_info info;
     uint8_t *rgb = s->lightmap;
-    int side, level, i;
+    int side, level;
     terrimp_terrain_get_info(terrain, &info);
     h->terrain = terrain;
     h->indices = malloc(info.ground_index_count * sizeof *h->indices);
@@ -221,10 +263,8 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
         halve(rgb, side / 2);
     }
     h->lightmap_matrix = s->lightmap_matrix;
-    for (i = 0; i < ATLASES; i++) {
-        h->atlas[i] = make_texture(GL_LINEAR);
-        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, ATLAS, ATLAS, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);
-    }
+    h->atlas = make_texture(GL_LINEAR);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, ATLAS, ATLAS, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);
     glEnable(GL_TEXTURE_2D), glEnable(GL_DEPTH_TEST), glEnable(GL_CULL_FACE);
     glEnable(GL_SCISSOR_TEST);
     glEnableClientState(GL_VERTEX_ARRAY), glEnableClientState(GL_TEXTURE_COORD_ARRAY);
@@ -272,7 +312,8 @@ int main(void)
     if (trouble)
         return fprintf(stderr, "%s\n", trouble), 2;
     settings.texels_per_px = 1.5f;
-    settings.atlas_size = yardstick.atlas_size = ATLAS;
+    settings.atlas_size = ATLAS;
+    settings.max_capture_triangles = 4000; /* larger pictures are made in pieces */
     yardstick.mode = TERRIMP_MODE_FULL;
     if (scene_open(&s) || terrimp_terrain_create(&s.desc, NULL, &terrain) != TERRIMP_OK
         || terrimp_view_create(terrain, &settings, NULL, &view) != TERRIMP_OK

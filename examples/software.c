@@ -14,17 +14,17 @@
 #include <stdlib.h>
 #include <time.h>
 
-enum { WIDTH = 320, HEIGHT = 240, ATLAS = 512, LOG2_ATLAS = 9, ATLASES = 2 };
+enum { WIDTH = 320, HEIGHT = 240, ATLAS = 512, LOG2_ATLAS = 9 };
 enum { LOG2_SIDE = 9, GRID = (SCENE_QUADS + 1) * (SCENE_QUADS + 1), SKY = 0xae9d };
 
 typedef struct host {
     const terrimp_terrain *terrain;
-    uint16_t screen[WIDTH * HEIGHT], atlas[ATLASES][ATLAS * ATLAS];
+    uint16_t screen[WIDTH * HEIGHT], atlas[ATLAS * ATLAS];
     uint16_t depth[ATLAS * ATLAS]; /* first of each capture, then of the screen */
     uint16_t *indices, *mesh_indices;
     float *mesh_xyz, ground_xyz[GRID * 3];
     uint16_t lightmap_texels[SCENE_SIDE * SCENE_SIDE * 4 / 3];
-    raster_texture lightmap, atlas_texture[ATLASES];
+    raster_texture lightmap, atlas_texture;
     const float *lightmap_matrix;
     raster r;
     int on_screen, capturing;
@@ -38,9 +38,10 @@ static void begin_capture(void *user, const terrimp_capture_command *c)
 {
     host *h = (host *)user;
     const terrimp_rect *slot = &c->slot;
-    raster_begin(&h->r, h->atlas[c->atlas] + slot->y * ATLAS + slot->x, h->depth, ATLAS,
+    raster_begin(&h->r, h->atlas + slot->y * ATLAS + slot->x, h->depth, ATLAS,
                  (int)slot->width, (int)slot->height, 0, c->view, c->projection, c->eye);
-    raster_clear(&h->r, RASTER_KEY);
+    if (c->clear)
+        raster_clear(&h->r, RASTER_KEY);
     raster_clear_depth(&h->r);
     h->on_screen = 0;
     h->capturing = 1;
@@ -69,10 +70,11 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     host *h = (host *)user;
     raster_style style = { 0 };
     turn_to_screen(h);
-    style.texture = &h->atlas_texture[c->atlas];
+    style.texture = &h->atlas_texture;
     style.texture_matrix = c->texture_matrix;
     style.depth_bias = c->depth_bias;
     style.alpha = RASTER_OPAQUE;
+    style.within_depth = c->part_count > 1;
     raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
                 h->mesh_indices + c->first_index, c->index_count);
 }
@@ -90,17 +92,6 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
                 h->mesh_indices + c->first_index, c->index_count);
 }
 
-static int alpha_of(const host *h, const terrimp_ground_command *c)
-{
-    terrimp_box box;
-    float d, a;
-    if (c->fade_end <= 0.0f) return RASTER_OPAQUE;
-    terrimp_terrain_get_box(h->terrain, c->node, &box);
-    d = terrimp_box_distance(&box, h->camera.eye);
-    a = (c->fade_end - d) / (c->fade_end - c->fade_start);
-    return (int)((a < 0 ? 0 : a > 1 ? 1 : a) * RASTER_OPAQUE + 0.5f);
-}
-
 /* Vertices are read from the samples for each draw: no memory for vertex buffers. */
 static void draw_ground(void *user, const terrimp_ground_command *c)
 {
@@ -111,7 +102,7 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
     style.depth_bias = c->depth_bias;
-    style.alpha = h->capturing ? RASTER_OPAQUE : alpha_of(h, c);
+    style.alpha = (int)(c->alpha * RASTER_OPAQUE + 0.5f);
     if (terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3) == TERRIMP_OK)
         raster_draw(&h->r, &style, h->ground_xyz, h->indices + c->first_index, c->index_count);
 }
@@ -123,7 +114,6 @@ static uint8_t ours[WIDTH * HEIGHT * 3], full[WIDTH * HEIGHT * 3];
 static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
 {
     terrimp_terrain_info info;
-    int i;
     terrimp_terrain_get_info(terrain, &info);
     h->terrain = terrain;
     h->indices = malloc(info.ground_index_count * sizeof *h->indices);
@@ -136,11 +126,9 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
         return 0;
     raster_make_texture(&h->lightmap, h->lightmap_texels, s->lightmap, LOG2_SIDE);
     h->lightmap_matrix = s->lightmap_matrix;
-    for (i = 0; i < ATLASES; i++) {
-        h->atlas_texture[i].levels[0] = h->atlas[i];
-        h->atlas_texture[i].level_count = 1;
-        h->atlas_texture[i].log2_side = LOG2_ATLAS;
-    }
+    h->atlas_texture.levels[0] = h->atlas;
+    h->atlas_texture.level_count = 1;
+    h->atlas_texture.log2_side = LOG2_ATLAS;
     return 1;
 }
 
@@ -174,7 +162,7 @@ int main(void)
     int i, ok = 1;
 
     settings.texels_per_px = 1.0f; /* the nearest texel is taken: more would only flicker */
-    settings.atlas_size = yardstick.atlas_size = ATLAS;
+    settings.atlas_size = ATLAS;
     yardstick.mode = TERRIMP_MODE_FULL;
     if (scene_open(&s) || terrimp_terrain_create(&s.desc, NULL, &terrain) != TERRIMP_OK
         || terrimp_view_create(terrain, &settings, NULL, &view) != TERRIMP_OK

@@ -1,8 +1,10 @@
 # What the shell tests share: counters, and the closing line. To be read in with "." by each.
+# With check_every=1 what passes gets a line too: "PASS name", "FAIL name" or "SKIP name".
 
 check_passed=0
 check_failed=0
 check_skipped=0
+check_every=${check_every:-}
 
 # check "behaviour" command...: the command is to succeed.
 check()
@@ -11,9 +13,10 @@ check()
     shift
     if "$@"; then
         check_passed=$((check_passed + 1))
+        [ -z "$check_every" ] || echo "PASS $check_name"
     else
         check_failed=$((check_failed + 1))
-        echo "FAILED $check_name"
+        [ -n "$check_every" ] && echo "FAIL $check_name" || echo "FAILED $check_name"
     fi
 }
 
@@ -27,7 +30,7 @@ prints_nothing()
 skip()
 {
     check_skipped=$((check_skipped + 1))
-    echo "skipped $*"
+    [ -n "$check_every" ] && echo "SKIP $*" || echo "skipped $*"
 }
 
 # Prints the closing line; its code is that of the test.

@@ -427,6 +427,13 @@ static void pair_reports_when_nothing_fits(void)
 
 /* ---- the live atlas ---- */
 
+/* Costs that protect a slot: negative, infinite, NaN. */
+static float not_a_cost(int i)
+{
+    volatile float zero = 0.0f;
+    return i % 3 == 0 ? -1.0f : i % 3 == 1 ? 1.0f / zero : zero / zero;
+}
+
 enum { LIVE_SLOTS = 64 };
 
 /* An atlas in a block that is exactly as large as it asks for, and what it should hold. */
@@ -626,6 +633,153 @@ static void live_room_is_the_largest_of_its_shape(void)
     CHECK(reduced > 100 && nothing > 0);
 }
 
+/* What eviction costs at a place; negative where a slot stays. */
+static double live_cost(const live_model *m, const terrimp_rect *place, const float *costs)
+{
+    double cost = 0.0;
+    uint32_t k;
+    for (k = 0; k < m->atlas.desc.max_slots; k++)
+        if (m->taken[k].width > 0 && rects_overlap(place, &m->taken[k], m->atlas.desc.padding)) {
+            if (!(costs[k] >= 0.0f && costs[k] < 1e30f))
+                return -1.0;
+            cost += (double)costs[k];
+        }
+    return cost;
+}
+
+/* The least that room for a size costs at the corners of slots; negative when it cannot be had. */
+static double live_cheapest(const live_model *m, uint32_t width, uint32_t height,
+                            const float *costs)
+{
+    const terrimp_live_atlas_desc *d = &m->atlas.desc;
+    double best = -1.0, cost;
+    uint32_t k, corner;
+    for (k = 0; k < d->max_slots; k++)
+        for (corner = 0; corner < 4 && m->taken[k].width > 0; corner++) {
+            terrimp_rect place = m->taken[k];
+            if (corner & 1u)
+                place.x = place.x + place.width < width ? 0 : place.x + place.width - width;
+            if (corner & 2u)
+                place.y = place.y + place.height < height ? 0 : place.y + place.height - height;
+            place.x = place.x > d->width - width ? d->width - width : place.x;
+            place.y = place.y > d->height - height ? d->height - height : place.y;
+            place.width = width;
+            place.height = height;
+            cost = live_cost(m, &place, costs);
+            if (cost >= 0.0 && (best < 0.0 || cost < best))
+                best = cost;
+        }
+    return best;
+}
+
+/* Eviction makes room, frees nothing that stays and nothing when there is room, and is at least as
+   cheap as room at any slot's corner. */
+static void live_eviction_frees_what_costs_least(void)
+{
+    int run, step, evicted = 0, refused = 0, out_of_handles = 0;
+    for (run = 0; run < 30; run++) {
+        live_model m;
+        live_open(&m, random_range(20, 200), random_range(20, 200), random_range(0, 3),
+                  run % 3 ? LIVE_SLOTS : random_range(1, 12));
+        for (step = 0; step < 120; step++) {
+            uint32_t width = random_range(1, m.atlas.desc.width);
+            uint32_t height = random_range(1, m.atlas.desc.height);
+            uint32_t victims[LIVE_SLOTS], count = 4321, k, slots, most = m.atlas.desc.max_slots;
+            float costs[LIVE_SLOTS];
+            double least, paid = 0.0;
+            int fits;
+            terrimp_result result;
+            live_churn(&m, 4, 50);
+            for (k = 0; k < LIVE_SLOTS; k++)
+                costs[k] = random_range(0, 19) == 0 ? not_a_cost((int)k) : random_float(0.0f, 9.0f);
+            slots = m.count;
+            fits = live_fits(&m, width, height);
+            least = live_cheapest(&m, width, height, costs);
+            result = terrimp_live_atlas_evict(&m.atlas, width, height, costs, victims, &count);
+            if (result != TERRIMP_OK) {
+                CHECK(result == TERRIMP_E_CAPACITY && !fits && count == 4321);
+                CHECK(least < 0.0 || slots == most);
+                CHECK(m.atlas.slot_count == slots);
+                refused++;
+                continue;
+            }
+            CHECK(fits == (count == 0));
+            for (k = 0; k < count; k++) {
+                CHECK(victims[k] < LIVE_SLOTS && m.taken[victims[k]].width > 0);
+                CHECK(costs[victims[k]] >= 0.0f && costs[victims[k]] < 1e30f);
+                m.taken[victims[k]].width = 0;
+                m.count--;
+                paid += (double)costs[victims[k]];
+            }
+            CHECK(m.atlas.slot_count == m.count);
+            CHECK(fits || slots == most || least < 0.0 || paid <= least + 1e-4);
+            out_of_handles += slots == most && count > 0;
+            CHECK(live_alloc(&m, width, height) == TERRIMP_OK);
+            evicted += count > 0;
+        }
+        live_close(&m);
+    }
+    CHECK(evicted > 500 && refused > 100 && out_of_handles > 30);
+}
+
+/* Where the memory for free rectangles is too small some room is overlooked, but slots still keep
+   apart and the whole atlas comes back. */
+static void live_atlas_survives_a_full_list_of_holes(void)
+{
+    int run, step;
+    for (run = 0; run < 60; run++) {
+        live_model m;
+        live_open(&m, 150, 100, 1, LIVE_SLOTS);
+        m.atlas.max_holes = random_range(1, 12);
+        for (step = 0; step < 300; step++) {
+            live_churn(&m, 2, 40);
+            CHECK(m.atlas.hole_count <= m.atlas.max_holes);
+        }
+        live_free_all(&m);
+        CHECK(live_alloc(&m, 150, 100) == TERRIMP_OK);
+        live_close(&m);
+    }
+}
+
+/* How full the atlas stays when slots of random sizes come and, at random costs a texel, go. */
+static void live_atlas_stays_full(void)
+{
+    static const uint32_t smallest[] = {20, 20, 60, 100}, largest[] = {80, 300, 200, 500};
+    int run, step;
+    for (run = 0; run < 4; run++) {
+        enum { SLOTS = 1024, SIDE = 1024, STEPS = 1200 };
+        static float costs[SLOTS];
+        static uint32_t victims[SLOTS];
+        terrimp_live_atlas_desc desc;
+        terrimp_live_atlas atlas;
+        terrimp_rect rect;
+        double full = 0.0;
+        void *memory;
+        memset(&desc, 0, sizeof desc);
+        desc.width = desc.height = SIDE;
+        desc.max_slots = SLOTS;
+        memory = malloc(terrimp_live_atlas_bytes(&desc));
+        CHECK(terrimp_live_atlas_init(&atlas, &desc, memory, terrimp_live_atlas_bytes(&desc)) ==
+              TERRIMP_OK);
+        for (step = 0; step < STEPS; step++) {
+            float ratio = (float)largest[run] / (float)smallest[run];
+            uint32_t width = (uint32_t)((float)smallest[run] * powf(ratio, random_float(0, 1)));
+            uint32_t height = (uint32_t)((float)width * random_float(0.4f, 1.0f)), slot, count;
+            if (terrimp_live_atlas_alloc(&atlas, width, height, &slot) != TERRIMP_OK) {
+                CHECK(terrimp_live_atlas_evict(&atlas, width, height, costs, victims, &count) ==
+                      TERRIMP_OK);
+                CHECK(terrimp_live_atlas_alloc(&atlas, width, height, &slot) == TERRIMP_OK);
+            }
+            CHECK(terrimp_live_atlas_rect(&atlas, slot, &rect) == TERRIMP_OK);
+            costs[slot] = (float)(rect.width * rect.height) * random_float(0.5f, 1.0f);
+            full += step >= STEPS / 2 ? (double)atlas.texels_used / (SIDE * SIDE) : 0.0;
+        }
+        full /= STEPS / 2;
+        CHECK(full > 0.8);
+        free(memory);
+    }
+}
+
 static void live_atlas_is_deterministic(void)
 {
     int run, step;
@@ -654,7 +808,8 @@ static void live_atlas_refuses_without_a_change(void)
     terrimp_live_atlas_stats stats;
     terrimp_rect rect;
     unsigned char *memory, *copy;
-    uint32_t slot = 77u, size[2], first, k;
+    float costs[5] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
+    uint32_t slot = 77u, size[2], victims[5], first, k;
     size_t bytes;
     memset(&unused, 0, sizeof unused);
     memset(&desc, 0, sizeof desc);
@@ -716,6 +871,17 @@ static void live_atlas_refuses_without_a_change(void)
     CHECK(terrimp_live_atlas_room(&atlas, 65537, 1, size) == TERRIMP_E_RANGE);
     CHECK(terrimp_live_atlas_room(&atlas, 1, 0xffffffffu, size) == TERRIMP_E_RANGE);
     CHECK(is_untouched(size, sizeof size));
+    memset(victims, UNTOUCHED, sizeof victims);
+    CHECK(terrimp_live_atlas_evict(NULL, 1, 1, costs, victims, &k) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_evict(&atlas, 1, 1, NULL, victims, &k) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_evict(&atlas, 1, 1, costs, NULL, &k) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_evict(&atlas, 1, 1, costs, victims, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_evict(&atlas, 0, 1, costs, victims, &k) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_evict(&atlas, 1, 0, costs, victims, &k) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_evict(&atlas, 65, 1, costs, victims, &k) == TERRIMP_E_CAPACITY);
+    CHECK(terrimp_live_atlas_evict(&atlas, 1, 33, costs, victims, &k) == TERRIMP_E_CAPACITY);
+    CHECK(terrimp_live_atlas_evict(&unused, 1, 1, costs, victims, &k) == TERRIMP_E_STATE);
+    CHECK(is_untouched(victims, sizeof victims));
     memset(&stats, UNTOUCHED, sizeof stats);
     CHECK(terrimp_live_atlas_query(NULL, &stats) == TERRIMP_E_NULL);
     CHECK(terrimp_live_atlas_query(&atlas, NULL) == TERRIMP_E_NULL);
@@ -751,6 +917,9 @@ static void atlas_tests(void)
     RUN(live_slots_keep_apart_inside_and_find_all_room);
     RUN(live_statistics_count_what_is_there);
     RUN(live_room_is_the_largest_of_its_shape);
+    RUN(live_eviction_frees_what_costs_least);
+    RUN(live_atlas_survives_a_full_list_of_holes);
+    RUN(live_atlas_stays_full);
     RUN(live_atlas_is_deterministic);
     RUN(live_atlas_refuses_without_a_change);
 }

@@ -66,7 +66,7 @@ static void hf_random(hf_field *f, uint32_t width, uint32_t depth)
 
 static float hf_height(const hf_field *f, uint32_t x, uint32_t z)
 {
-    return f->view.height_offset + f->view.height_scale * hf_get(f, x, z);
+    return terrimpi_float(f->view.height_offset + f->view.height_scale * hf_get(f, x, z));
 }
 
 static float hf_nan(void)
@@ -548,9 +548,9 @@ static void hf_triangle(const hf_field *f, uint32_t x, uint32_t z, int which, do
 
     for (i = 0; i < 3; ++i) {
         uint32_t cx = x + at[which][i][0], cz = z + at[which][i][1];
-        corner[i][0] = (double)(f->view.origin_x + (float)cx * f->view.spacing_x);
+        corner[i][0] = (double)terrimpi_float(f->view.origin_x + (float)cx * f->view.spacing_x);
         corner[i][1] = (double)hf_height(f, cx, cz);
-        corner[i][2] = (double)(f->view.origin_z + (float)cz * f->view.spacing_z);
+        corner[i][2] = (double)terrimpi_float(f->view.origin_z + (float)cz * f->view.spacing_z);
     }
 }
 
@@ -650,9 +650,11 @@ static void hf_height_is_right_at_distant_origins(void)
         }
         x = f.view.origin_x + random_float(0.0f, (float)(f.view.width - 1)) * f.view.spacing_x;
         z = f.view.origin_z + random_float(0.0f, (float)(f.view.depth - 1)) * f.view.spacing_z;
-        while (i + 2 < f.view.width && f.view.origin_x + (float)(i + 1) * f.view.spacing_x < x)
+        while (i + 2 < f.view.width
+               && terrimpi_float(f.view.origin_x + (float)(i + 1) * f.view.spacing_x) < x)
             ++i;
-        while (j + 2 < f.view.depth && f.view.origin_z + (float)(j + 1) * f.view.spacing_z < z)
+        while (j + 2 < f.view.depth
+               && terrimpi_float(f.view.origin_z + (float)(j + 1) * f.view.spacing_z) < z)
             ++j;
         hf_triangle(&f, i, j, 0, c);
         u = ((double)x - c[0][0]) / (c[2][0] - c[0][0]);

@@ -656,8 +656,8 @@ static void rasterised_triangles_stay_in_their_target(void)
     }
 }
 
-/* Two planes, one above the other: the upper one is seen, whichever comes first; but not when a bias
-   takes it deeper, and not when it has the colour of nothing. */
+/* Two planes, one above the other: the upper one is seen, whichever comes first; but not when a
+   bias takes it deeper, and not when it has the colour of nothing. */
 static void the_nearer_of_two_pixels_wins(void)
 {
     static raster_scene s;

@@ -408,7 +408,7 @@ static void skirts_are_closed_walls_that_face_the_right_way(void)
     for (i = 0; i < n; i++) {
         const terrimp_mesh_vertex *low = m->vertices + m->surface_vertex_count + i;
         CHECK(low->x == m->vertices[i].x && low->z == m->vertices[i].z && low->height == -500.0f);
-        CHECK(low[n].height == m->vertices[i].height + 7.0f);
+        CHECK(low[n].height == terrimpi_float(m->vertices[i].height + 7.0f));
     }
     m->vertex_capacity = m->vertex_count + n - 1;
     CHECK(terrimp_mesh_add_upper_skirt(m, 7.0f) == TERRIMP_E_CAPACITY);

@@ -1609,7 +1609,7 @@ static void view_defaults_are_those_of_the_table(void)
         CHECK(terrimp_view_desc_resolve(l.terrain, &desc, &out) == TERRIMP_OK);
         CHECK(out.mode == TERRIMP_MODE_IMPOSTOR);
         CHECK(out.fade_start == 2.0f * 64.0f * 5.0f && out.fade_end == 1.5f * out.fade_start);
-        CHECK(out.max_angle_rad == 0.0873f && out.tolerance_px == 1.0f);
+        CHECK(out.max_angle_rad == (float)0.0873f && out.tolerance_px == 1.0f);
         CHECK(out.texels_per_px == 2.0f && out.atlas_size == 4096);
         CHECK(out.max_impostors == 2048 && out.max_captures == 0);
         desc.fade_start = 10.0f;

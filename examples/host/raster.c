@@ -236,38 +236,62 @@ static raster_corner project(const raster *r, const raster_point *p, float depth
     return c;
 }
 
-/* Where an edge meets the plane in front of the eye; always counted from its inner end, so that
-   both triangles of the edge get the same point. */
-static raster_point cut(const raster *r, const raster_point *in, const raster_point *out)
+/* How far a point is inside of the plane before the eye, and of those that bound a picture's depth;
+   all are linear. */
+enum { PLANE_NEAR, PLANE_FRONT, PLANE_BACK, PLANES };
+
+static float inside_by(const raster *r, const raster_point *p, int plane)
 {
-    float part = (in->w - r->z_near) / (in->w - out->w);
+    return plane == PLANE_NEAR ? p->w - r->z_near : plane == PLANE_FRONT ? p->r : p->q - p->r;
+}
+
+/* Where an edge meets a plane; always counted from its inner end, so that both triangles of the
+   edge get the same point. */
+static raster_point cut(const raster_point *in, const raster_point *out, float part)
+{
     raster_point p;
     p.x = in->x + (out->x - in->x) * part;
     p.y = in->y + (out->y - in->y) * part;
-    p.w = r->z_near;
+    p.w = in->w + (out->w - in->w) * part;
     p.s = in->s + (out->s - in->s) * part;
     p.t = in->t + (out->t - in->t) * part;
+    p.r = in->r + (out->r - in->r) * part;
     p.q = in->q + (out->q - in->q) * part;
     return p;
 }
 
-/* A triangle of which one or two vertices are behind the plane in front of the eye. */
-static void fill_cut_triangle(const raster *r, const raster_style *style,
-                              const uint16_t triangle[3])
+/* Cuts a convex polygon at a plane; returns how many corners are left. */
+static int clip(const raster *r, int plane, const raster_point *polygon, int count,
+                raster_point *out)
 {
-    raster_corner fan[4];
-    int i, count = 0;
-    for (i = 0; i < 3; i++) {
-        const raster_point *p = &r->points[triangle[i]], *next = &r->points[triangle[(i + 1) % 3]];
-        int inside = p->w >= r->z_near, next_inside = next->w >= r->z_near;
-        raster_point at;
-        if (inside)
-            fan[count++] = project(r, p, style->depth_bias);
-        if (inside != next_inside) {
-            at = inside ? cut(r, p, next) : cut(r, next, p);
-            fan[count++] = project(r, &at, style->depth_bias);
-        }
+    int i, kept = 0;
+    for (i = 0; i < count; i++) {
+        const raster_point *p = &polygon[i], *next = &polygon[(i + 1) % count];
+        float here = inside_by(r, p, plane), there = inside_by(r, next, plane);
+        if (here >= 0.0f)
+            out[kept++] = *p;
+        if (here >= 0.0f && there < 0.0f)
+            out[kept++] = cut(p, next, here / (here - there));
+        else if (here < 0.0f && there >= 0.0f)
+            out[kept++] = cut(next, p, there / (there - here));
     }
+    return kept;
+}
+
+static void fill_clipped_triangle(const raster *r, const raster_style *style,
+                                  const uint16_t triangle[3])
+{
+    raster_point polygon[3 + PLANES], clipped[3 + PLANES];
+    raster_corner fan[3 + PLANES];
+    int i, plane, count = 3;
+    for (i = 0; i < 3; i++)
+        polygon[i] = r->points[triangle[i]];
+    for (plane = 0; plane < (style->within_depth ? PLANES : 1); plane++) {
+        count = clip(r, plane, polygon, count, clipped);
+        memcpy(polygon, clipped, sizeof polygon);
+    }
+    for (i = 0; i < count; i++)
+        fan[i] = project(r, &polygon[i], style->depth_bias);
     for (i = 2; i < count; i++)
         fill_triangle(r, style, &fan[0], &fan[i - 1], &fan[i]);
 }
@@ -282,8 +306,18 @@ static raster_point transform(const raster *r, const float m[16], const float p[
     out.w = c[3] * x + c[7] * y + c[11] * z + c[15];
     out.s = m[0] * p[0] + m[4] * p[1] + m[8] * p[2] + m[12];
     out.t = m[1] * p[0] + m[5] * p[1] + m[9] * p[2] + m[13];
+    out.r = m[2] * p[0] + m[6] * p[1] + m[10] * p[2] + m[14];
     out.q = m[3] * p[0] + m[7] * p[1] + m[11] * p[2] + m[15];
     return out;
+}
+
+/* Bit i: outside of plane i. */
+static int find_sides(const raster *r, const raster_style *style, const raster_point *p)
+{
+    int plane, sides = 0;
+    for (plane = 0; plane < (style->within_depth ? PLANES : 1); plane++)
+        sides |= (inside_by(r, p, plane) < 0.0f) << plane;
+    return sides;
 }
 
 void raster_draw(raster *r, const raster_style *style, const float *xyz, const uint16_t *indices,
@@ -295,17 +329,16 @@ void raster_draw(raster *r, const raster_style *style, const float *xyz, const u
             vertex_count = indices[i] + 1u;
     for (i = 0; i < vertex_count; i++) {
         r->points[i] = transform(r, style->texture_matrix, xyz + i * 3);
-        if (r->points[i].w >= r->z_near)
+        r->sides[i] = (uint8_t)find_sides(r, style, &r->points[i]);
+        if (!r->sides[i])
             r->corners[i] = project(r, &r->points[i], style->depth_bias);
     }
     for (i = 0; i + 2 < index_count; i += 3) {
         const uint16_t *k = indices + i;
-        int inside = (r->points[k[0]].w >= r->z_near) + (r->points[k[1]].w >= r->z_near)
-                     + (r->points[k[2]].w >= r->z_near);
-        if (inside == 3)
+        if (!(r->sides[k[0]] | r->sides[k[1]] | r->sides[k[2]]))
             fill_triangle(r, style, &r->corners[k[0]], &r->corners[k[1]], &r->corners[k[2]]);
-        else if (inside > 0)
-            fill_cut_triangle(r, style, k);
+        else if (!(r->sides[k[0]] & r->sides[k[1]] & r->sides[k[2]]))
+            fill_clipped_triangle(r, style, k);
     }
 }
 

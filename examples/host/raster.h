@@ -25,7 +25,7 @@ typedef struct raster_texture {
 
 /* A vertex in clip space and its texture coordinates. */
 typedef struct raster_point {
-    float x, y, w, s, t, q;
+    float x, y, w, s, t, r, q;
 } raster_point;
 
 /* The same on the screen; all but x and y divided by w, so that they are linear in x and y. */
@@ -43,6 +43,7 @@ typedef struct raster {
     float matrix[16], eye[3], z_near, depth_scale;
     raster_point points[RASTER_VERTICES];
     raster_corner corners[RASTER_VERTICES];
+    uint8_t sides[RASTER_VERTICES]; /* the planes that a vertex is outside of */
 } raster;
 
 /* What a draw looks like. */
@@ -52,6 +53,7 @@ typedef struct raster_style {
                                     (s / q, t / q) in 0..1 */
     float depth_bias;            /* deeper: as if drawn at eye + (p - eye) * (1 + depth_bias) */
     int alpha;                   /* 0..RASTER_OPAQUE */
+    int within_depth;            /* nonzero: only what lies where r / q is within 0..1 */
 } raster_style;
 
 /* Takes a target and a camera; the buffers are not cleared. view and projection are those of

@@ -1,8 +1,10 @@
 #!/bin/sh
 # Compiles the header as every host may, with warnings as errors, and runs what comes out:
 # each compiler that is here, each standard, each way to include and configure the library.
+# With the argument "all": every standard with and without optimisation, and a line a check.
 
 cd "$(dirname "$0")/../.." || exit 1
+[ "$1" = all ] && check_every=1
 . tests/check.sh
 here=tests/compile
 work=build/test/compile
@@ -32,10 +34,23 @@ ways()
     check "$1: inside extern C"             builds_and_runs "$2" extern_c.c
     check "$1: after macros like windows.h" builds_and_runs "$2" windows.c
     check "$1: without malloc"              builds_and_runs "$2" no_malloc.c
+    check "$1: as without a system"         builds_and_runs "$2 -ffreestanding" bare.c
     check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c
     check "$1: private to each of two files" \
         builds_and_runs "$2 -Wno-unused-function" static_a.c static_b.c
     check "$1: every macro replaced" builds_and_runs "$2 -Wno-unused-function" custom.c
+}
+
+# standards "compiler and flags" "optimisation" standards...
+standards()
+{
+    compiler=$1
+    level=$2
+    shift 2
+    for standard in "$@"; do
+        check "${compiler%% *} $standard $level" \
+            builds_and_runs "$compiler $level -std=$standard" plain.c
+    done
 }
 
 compilers() # C compiler, C++ compiler
@@ -44,21 +59,19 @@ compilers() # C compiler, C++ compiler
         skip "$1: it is not installed"
         return
     fi
-    for standard in c99 c11 c17; do
-        check "$1 $standard" builds_and_runs "$1 -O0 -std=$standard $c_strict" plain.c
-    done
-    check "$1 c99 -O2" builds_and_runs "$1 -O2 -std=c99 $c_strict" plain.c
+    standards "$1 $c_strict" -O0 c99 c11 c17
+    standards "$1 $c_strict" -O2 c99 ${check_every:+c11 c17}
+    standards "$1 $c_strict" -Os c99
     ways "$1 c99" "$1 -O0 -std=c99 $c_strict"
 
     if ! command -v "$2" > /dev/null; then
         skip "$2: it is not installed"
         return
     fi
-    for standard in c++98 c++11 c++17 c++20; do
-        check "$2 $standard" builds_and_runs "$2 -x c++ -O0 -std=$standard $cpp_strict" plain.c
-    done
-    check "$2 c++98 -O2" builds_and_runs "$2 -x c++ -O2 -std=c++98 $cpp_strict" plain.c
+    standards "$2 -x c++ $cpp_strict" -O0 c++98 c++11 c++17 c++20
+    standards "$2 -x c++ $cpp_strict" -O2 c++98 ${check_every:+c++11 c++17 c++20}
     ways "$2 c++98" "$2 -x c++ -O0 -std=c++98 $cpp_strict"
+    [ -z "$check_every" ] || ways "$2 c++17" "$2 -x c++ -O2 -std=c++17 $cpp_strict"
 }
 
 compilers gcc g++
