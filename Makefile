@@ -6,7 +6,9 @@
 ##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
 ## make test      runs every test
-## make bench     measures
+## make bench     measures; tables and plots also go to build/bench/
+##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
+##                  BENCH_ALL=1      the whole protocol, for hours
 ## make clean     removes build/
 ##
 ## With any of them: CC=clang, CFLAGS='...', CONFIG=release|debug|sanitize|coverage, and
@@ -65,9 +67,13 @@ demo: flyover
 test: | $(DEPS)
 	@sh tests/run.sh
 
-bench: $(BENCHES) flyover
+bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
 	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
-	@BUILD=$(BUILD) sh tests/bench_frames.sh
+
+# The rough terrain on which other engines have been measured.
+build/bench/rough.hgt: ../shared/tools/rough.c
+	@mkdir -p $(@D)
+	@$(CC) -O2 $< -o build/bench/rough -lm && build/bench/rough 2049 $@
 
 clean:
 	rm -rf build

@@ -1,0 +1,623 @@
+/* Measures frames: flies over each scene, draws every frame in several ways in turn, and prints
+   what each costs, how near it comes to the full mesh, and how it changes from frame to frame.
+
+   Build:  make bench_frames
+   Use:    build/bench_frames         (in the project's directory)
+   Leaves: build/bench/frames.md (what it prints), frames.tsv (all figures, a line a scene and way),
+           frame_times.tsv (every frame), *.svg (plots), *.png (the worst frame of each way: full
+           mesh, the way, their difference)
+
+   BENCH_FRAMES=n   frames of a flight [each scene's own, 60 to 120]; the thesis has 10000
+   BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
+   BENCH_ONLY=text  only scenes with this in their key (the names of the files)
+   TERRIMP_DATA     where real tiles and flight paths are [../shared/data]
+
+   All ways take turns in one process, frame by frame, so that a busy machine harms all alike: trust
+   the ratios. Ways that do not depend on the frames before are drawn in every few frames only. */
+#define _POSIX_C_SOURCE 200112L /* mkdir */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+
+#include "bench_gl.h"
+#include "bench_peers.h"
+#include "bench_plot.h"
+#include "bench_way.h"
+
+#include "examples/host/image.h"
+
+#include <stdarg.h>
+#include <sys/stat.h>
+
+/* ---- What is measured --------------------------------------------------- */
+
+static const way path_ways[] = {
+    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
+    { .name = "impostor as Hess", .family = "impostor (Hess)", .mode = TERRIMP_MODE_IMPOSTOR,
+      .tolerance_px = 100.0f },
+    { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
+    { .name = "impostor 2 px, 1 texel", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR,
+      .tolerance_px = 2.0f, .texels_per_px = 1.0f },
+    { .name = "geomip picture 0.5 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 0.5f },
+    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 1.0f },
+    { .name = "geomip picture 2 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 2.0f },
+    { .name = "geomip picture 4 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 4.0f },
+    { .name = "geomip picture 8 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 8.0f },
+    { .name = "geomip bound 1 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 1.0f },
+    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f },
+    { .name = "geomip bound 4 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 4.0f },
+    { .name = "geomip bound 8 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 8.0f },
+    { .name = "geomip 1 px, morphing", .family = "geomip morphing", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 1.0f, .morph_ratio = 1.5f }
+};
+
+static const way tile_ways[] = {
+    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
+    { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
+    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 1.0f },
+    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f }
+};
+
+/* Foreground and chunk width as in the thesis' tables: "200, 64". */
+#define HESS(foreground_, chunk_)                                                      \
+    { .name = "impostor " #foreground_ ", " #chunk_, .family = "impostor " #chunk_,   \
+      .mode = TERRIMP_MODE_IMPOSTOR, .chunk_quads = chunk_, .foreground = foreground_, \
+      .tolerance_px = 100.0f }
+
+static const way thesis_ways[] = {
+    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
+    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 1.0f },
+    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f },
+    HESS(400, 64), HESS(400, 128),
+    /* only with BENCH_ALL, or in the terrain of 2049: */
+    HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128)
+};
+
+/* One flight of one list of ways. */
+typedef struct run {
+    scene_desc scene;
+    const way *ways;
+    size_t way_count, all_way_count; /* by default, and with BENCH_ALL */
+    size_t frames;
+    size_t stride;      /* one frame of so many is compared */
+    int curve;          /* quality against speed: print the summary and write the plots */
+    int only_all;       /* with BENCH_ALL only */
+} run;
+
+#define WAYS(list) list, sizeof list / sizeof *list, sizeof list / sizeof *list
+
+static const run runs[] = {
+    { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", .file = "N42E001.hgt",
+        .crop = 1025, .spacing = 79.6f, .path = "paths/pyrenees.path" },
+      WAYS(path_ways), 120, 8, 1, 0 },
+    { { .name = "rough 2049 x 2049, straight flight", .key = "rough",
+        .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
+        .path = "paths/rough.path" },
+      WAYS(path_ways), 120, 8, 1, 0 },
+    { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
+      WAYS(tile_ways), 60, 10, 0, 0 },
+    { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
+      WAYS(tile_ways), 60, 10, 0, 0 },
+    { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
+      thesis_ways, 5, 9, 60, 10, 0, 0 },
+    { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
+      thesis_ways, 9, 9, 60, 10, 0, 0 },
+    { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
+      thesis_ways, 5, 9, 60, 10, 0, 1 },
+    { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
+      thesis_ways, 5, 9, 60, 10, 0, 0 }
+};
+
+/* ---- Output ------------------------------------------------------------- */
+
+static const char work[] = "build/bench";
+static FILE *report, *figures, *times;
+
+static FILE *open_output(const char *name)
+{
+    char path[256];
+    FILE *file;
+    snprintf(path, sizeof path, "%s/%s", work, name);
+    file = fopen(path, "w");
+    if (!file)
+        scene_stop(path, "cannot be written");
+    return file;
+}
+
+/* To the terminal and to the report. */
+static void say(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vprintf(format, arguments);
+    va_end(arguments);
+    va_start(arguments, format);
+    vfprintf(report, format, arguments);
+    va_end(arguments);
+    fflush(stdout);
+}
+
+static void say_machine(void)
+{
+    char line[256] = "", load[64] = "";
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    while (file && fgets(line, sizeof line, file) && strncmp(line, "model name", 10) != 0)
+        ;
+    if (file)
+        fclose(file);
+    file = fopen("/proc/loadavg", "r");
+    if (file && fscanf(file, "%63s", load) != 1)
+        load[0] = 0;
+    if (file)
+        fclose(file);
+    line[strcspn(line, "\n")] = 0;
+    say("Machine: %s; load at the start %s\nRenderer: %s\n",
+        strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
+    say("Pictures of %d x %d, 60 degrees. Every column of times but the first is in multiples of "
+        "the full mesh's median;\nthe first frame, which makes all pictures at once, stands "
+        "apart. PSNR [dB] is over terrain unless it says picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
+}
+
+/* ---- Quality ------------------------------------------------------------ */
+
+static double psnr_of(const uint8_t *a, const uint8_t *b, const uint8_t *sky)
+{
+    return image_psnr(image_mean_square(a, b, SCENE_PIXELS, sky));
+}
+
+static void keep_worst(contender *c, const contender *full, size_t frame)
+{
+    double now = c->psnr_terrain.values[c->psnr_terrain.count - 1];
+    size_t i;
+    for (i = 0; i + 1 < c->psnr_terrain.count; i++)
+        if (c->psnr_terrain.values[i] <= now)
+            return;
+    if (!c->worst) {
+        c->worst = need_memory((size_t)SCENE_PIXELS * 3);
+        c->worst_truth = need_memory((size_t)SCENE_PIXELS * 3);
+    }
+    memcpy(c->worst, c->picture, (size_t)SCENE_PIXELS * 3);
+    memcpy(c->worst_truth, full->picture, (size_t)SCENE_PIXELS * 3);
+    c->worst_frame = frame;
+}
+
+static void compare(contender *c, const contender *full, size_t frame, int with_ssim)
+{
+    size_t low = 0, holes;
+    stats_add(&c->psnr, psnr_of(c->picture, full->picture, NULL));
+    stats_add(&c->psnr_terrain, psnr_of(c->picture, full->picture, scene_sky));
+    holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky, &low);
+    if (holes == SIZE_MAX)
+        scene_stop("holes", "out of memory");
+    if ((double)holes > c->holes)
+        c->holes = (double)holes;
+    c->low_pixels += (double)low;
+    if (with_ssim)
+        stats_add(&c->ssim, quality_ssim(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT,
+                                         scene_sky));
+    keep_worst(c, full, frame);
+}
+
+static void compare_fine(contender *c, const fine *f)
+{
+    stats_add(&c->fine_psnr, psnr_of(c->picture, f->picture, scene_sky));
+    stats_add(&c->fine_ssim, quality_ssim(c->picture, f->picture, SCENE_WIDTH, SCENE_HEIGHT,
+                                          scene_sky));
+}
+
+static void compare_change(contender *c, const contender *full, size_t frame)
+{
+    quality_change change = quality_compare_change(c->before, c->picture, full->before,
+                                                   full->picture, SCENE_WIDTH, SCENE_HEIGHT);
+    stats_add(&c->shimmer, change.mean);
+    stats_add(&c->pop_pixel, change.largest);
+    stats_add(&c->pop_block, change.block);
+    if (change.block > c->pop.block) {
+        c->pop = change;
+        c->pop_frame = frame;
+    }
+}
+
+/* ---- A flight ----------------------------------------------------------- */
+
+/* What is done with a frame beside drawing it. */
+typedef struct frame_plan {
+    int look;   /* compare with the full mesh */
+    int change; /* and with the frame before */
+    int ssim, fine;
+} frame_plan;
+
+/* SSIM is dear: every other look has it. The supersampled reference is dearer: three looks do. */
+static frame_plan plan_frame(const run *r, size_t frame, size_t frames, size_t stride)
+{
+    size_t looks = (frames + stride - 1) / stride, look = frame / stride;
+    frame_plan plan;
+    plan.look = frame % stride == 0;
+    plan.change = stride == 1 ? frame > 0 : frame % stride == 1;
+    plan.ssim = plan.look && look % 2 == 0;
+    plan.fine = r->curve && plan.look && look % ((looks + 2) / 3) == 0;
+    return plan;
+}
+
+static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
+                       frame_plan plan)
+{
+    terrimp_camera camera = scene_camera(s, frame);
+    size_t i;
+    for (i = 0; i < count; i++) {
+        contender *c = &ways[i];
+        if (!plan.look && !plan.change && !way_has_memory(c->way))
+            continue;
+        contender_draw(c, camera, frame);
+        if (plan.look || plan.change)
+            contender_read(c, s->context, frame);
+        fprintf(times, "%s\t%s\t%zu\t%.3f\t%.3f\t%u\t%u\t%u\t%u\n", s->desc->key, c->way->name,
+                frame, frame ? c->ms.values[c->ms.count - 1] : c->first_ms,
+                frame ? c->cpu_ms.values[c->cpu_ms.count - 1] : 0.0, c->now.triangles,
+                c->now.draws, c->now.captures, c->now.captured_texels);
+    }
+}
+
+static void fly(const run *r, contender *ways, size_t count, const scene *s, quad *q, fine *f,
+                size_t stride)
+{
+    size_t frame, i;
+    for (frame = 0; frame < s->flight.count; frame++) {
+        frame_plan plan = plan_frame(r, frame, s->flight.count, stride);
+        draw_frame(ways, count, s, frame, plan);
+        if (plan.look)
+            quad_draw(q, s->context, ways[0].gl->lightmap);
+        if (plan.fine)
+            fine_draw(f, ways[0].gl, ways[0].view, scene_camera(s, frame));
+        for (i = 0; i < count; i++) {
+            if (plan.look)
+                compare(&ways[i], &ways[0], frame, plan.ssim);
+            if (plan.fine)
+                compare_fine(&ways[i], f);
+            if (plan.change)
+                compare_change(&ways[i], &ways[0], frame);
+        }
+    }
+}
+
+/* ---- Tables ------------------------------------------------------------- */
+
+/* The smallest of a list; 0 when it is empty. */
+static double smallest(const stats *s)
+{
+    double least = s->count ? s->values[0] : 0.0;
+    size_t i;
+    for (i = 1; i < s->count; i++)
+        least = s->values[i] < least ? s->values[i] : least;
+    return least;
+}
+
+static double mean(const stats *s)
+{
+    return stats_summarise(s).mean;
+}
+
+/* Frames that a picture is drawn, on average; 0 for ways without pictures. */
+static double reuse(const contender *c)
+{
+    return c->captures > 0.0 ? c->impostors / c->captures : 0.0;
+}
+
+static void print_times(const contender *ways, size_t count, double quad_ms)
+{
+    double unit = stats_summarise(&ways[0].ms).median, cpu = stats_summarise(&ways[0].cpu_ms).median;
+    size_t i;
+    say("\n| way | ms | ratio | mean | sd | 95 %% | 99 %% | worst | first | CPU ratio | quads | "
+        "triangles | draws | captures | ktexels | reuse |\n"
+        "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+    for (i = 0; i < count; i++) {
+        const contender *c = &ways[i];
+        stats_summary ms = stats_summarise(&c->ms);
+        double n = c->frames;
+        say("| %s | %.1f | %.3f | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f | %.3f | %.1f | %.0f | "
+            "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, ms.median / unit,
+            ms.mean / unit, ms.deviation / unit, ms.p95 / unit, ms.p99 / unit, ms.worst / unit,
+            c->first_ms / unit, stats_summarise(&c->cpu_ms).median / cpu, ms.median / quad_ms,
+            c->triangles / n, c->draws / n, c->captures / n, c->captured_texels / n / 1e3,
+            reuse(c));
+    }
+    say("\nA textured quad over the whole picture: %.1f ms.\n", quad_ms);
+}
+
+static void print_quality(const contender *ways, size_t count)
+{
+    size_t i;
+    say("\n| way | PSNR mean | worst | picture | SSIM | PSNR, 4 x 4 | SSIM, 4 x 4 | shimmer | "
+        "pop | pixel | holes | low |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+    for (i = 0; i < count; i++) {
+        const contender *c = &ways[i];
+        say("| %s | %.2f | %.2f | %.2f | %.4f | ", c->way->name, mean(&c->psnr_terrain),
+            smallest(&c->psnr_terrain), mean(&c->psnr), mean(&c->ssim));
+        if (c->fine_psnr.count)
+            say("%.2f | %.4f | ", mean(&c->fine_psnr), mean(&c->fine_ssim));
+        else
+            say("| | ");
+        say("%.2f | %.1f | %.0f | %.0f | %.1f |\n", mean(&c->shimmer),
+            stats_summarise(&c->pop_block).worst, stats_summarise(&c->pop_pixel).worst, c->holes,
+            c->low_pixels / (double)c->psnr.count);
+    }
+}
+
+static void write_figures(const run *r, const contender *ways, size_t count, double quad_ms)
+{
+    double unit = stats_summarise(&ways[0].ms).median, cpu = stats_summarise(&ways[0].cpu_ms).median;
+    size_t i;
+    for (i = 0; i < count; i++) {
+        const contender *c = &ways[i];
+        stats_summary ms = stats_summarise(&c->ms);
+        double n = c->frames;
+        fprintf(figures, "%s\t%s\t%s\t%zu\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t"
+                "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
+                ms.median / unit, ms.mean / unit, ms.deviation / unit, ms.p95 / unit,
+                ms.p99 / unit, ms.worst / unit, c->first_ms / unit,
+                stats_summarise(&c->cpu_ms).median / cpu, quad_ms);
+        fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t", c->triangles / n, c->draws / n,
+                c->captures / n, c->captured_texels / n, reuse(c));
+        fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
+                mean(&c->psnr_terrain), smallest(&c->psnr_terrain), mean(&c->psnr),
+                mean(&c->ssim), mean(&c->fine_psnr), mean(&c->fine_ssim), mean(&c->shimmer),
+                stats_summarise(&c->pop_block).worst, stats_summarise(&c->pop_pixel).worst,
+                c->holes, c->low_pixels / (double)c->psnr.count);
+    }
+}
+
+static void write_headings(void)
+{
+    fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio\tmean\tdeviation\tp95\tp99\t"
+            "worst\tfirst\tcpu_ratio\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+            "reuse\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\tssim_4x4\t"
+            "shimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
+    fprintf(times, "scene\tway\tframe\tms\tcpu_ms\ttriangles\tdraws\tcaptures\t"
+            "captured_texels\n");
+}
+
+/* ---- Quality against speed ---------------------------------------------- */
+
+static int begins_with(const char *text, const char *start)
+{
+    return strncmp(text, start, strlen(start)) == 0;
+}
+
+/* The points of our ground-only ways, or, without ways, of the peers. */
+static size_t rival_points(const char *key, const contender *ways, size_t count,
+                           stats_point *points)
+{
+    double unit = ways ? stats_summarise(&ways[0].ms).median : 1.0;
+    size_t found = 0, i;
+    for (i = 0; i < count; i++)
+        if (begins_with(ways[i].way->family, "geomip")) {
+            points[found].cost = stats_summarise(&ways[i].ms).median / unit;
+            points[found++].quality = mean(&ways[i].psnr_terrain);
+        }
+    for (i = 0; !ways && i < PEER_COUNT; i++)
+        if (strcmp(peers[i].scene, key) == 0) {
+            points[found].cost = peers[i].ratio;
+            points[found++].quality = peers[i].psnr;
+        }
+    return found;
+}
+
+static void say_against(const char *rival, const stats_point *points, size_t count, double ratio,
+                        double psnr)
+{
+    double cost;
+    if (stats_cost_at(points, count, psnr, &cost))
+        say(" %s %.3f: %.2f times as fast;", rival, cost, cost / ratio);
+    else
+        say(" %s is nowhere as good;", rival);
+}
+
+/* Every way with pictures against the best that does without, at the quality it has. */
+static void print_speed_up(const run *r, const contender *ways, size_t count)
+{
+    stats_point ours[64], theirs[PEER_COUNT];
+    size_t our_count = rival_points(r->scene.key, ways, count, ours);
+    size_t their_count = rival_points(r->scene.key, NULL, 0, theirs), i;
+    double unit = stats_summarise(&ways[0].ms).median;
+    say("\nAt equal PSNR, interpolated (time as a ratio to full):\n\n");
+    for (i = 1; i < count; i++) {
+        double ratio = stats_summarise(&ways[i].ms).median / unit;
+        double psnr = mean(&ways[i].psnr_terrain);
+        if (!way_has_memory(ways[i].way))
+            continue;
+        say("- %s: %.3f at %.2f dB;", ways[i].way->name, ratio, psnr);
+        say_against("our geomip", ours, our_count, ratio, psnr);
+        if (their_count)
+            say_against("peers, quoted,", theirs, their_count, ratio, psnr);
+        say("\n");
+    }
+}
+
+static void print_peers(const char *key)
+{
+    size_t i, found = 0;
+    for (i = 0; i < PEER_COUNT; i++) {
+        if (strcmp(peers[i].scene, key) != 0)
+            continue;
+        if (!found++)
+            say("\nQuoted, measured elsewhere with the same rasteriser:\n\n"
+                "| engine | ratio | PSNR | triangles | draws |\n|---|--:|--:|--:|--:|\n");
+        say("| %s | %.3f | %.1f | %.0f | %.0f |\n", peers[i].name, peers[i].ratio, peers[i].psnr,
+            peers[i].triangles, peers[i].draws);
+    }
+}
+
+static void plot_peers(plot *p, const char *key)
+{
+    size_t i;
+    for (i = 0; i < PEER_COUNT; i++)
+        if (strcmp(peers[i].scene, key) == 0) {
+            const char *name = begins_with(peers[i].name, "OGRE") ? "OGRE (quoted)"
+                               : begins_with(peers[i].name, "Irrlicht") ? "Irrlicht (quoted)"
+                                                                        : "OSG impostors (quoted)";
+            plot_series *s = plot_find_series(p, name);
+            if (s)
+                s->hollow = 1;
+            plot_add(p, name, peers[i].ratio, peers[i].psnr);
+        }
+}
+
+static void write_plot(const plot *p, const char *key, const char *kind)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s_%s.svg", work, key, kind);
+    if (!plot_write(p, path))
+        scene_stop(path, "cannot be written");
+    say("\nPlot: %s\n", path);
+}
+
+static void plot_curves(const run *r, const contender *ways, size_t count)
+{
+    static plot psnr, ssim;
+    double unit = stats_summarise(&ways[0].ms).median;
+    size_t i;
+    psnr.title = ssim.title = r->scene.name;
+    psnr.x_label = ssim.x_label = "median frame time / full mesh";
+    psnr.y_label = "PSNR over terrain [dB]";
+    ssim.y_label = "SSIM over terrain";
+    psnr.log_x = ssim.log_x = 1;
+    psnr.count = ssim.count = 0;
+    for (i = 1; i < count; i++) {
+        double ratio = stats_summarise(&ways[i].ms).median / unit;
+        plot_add(&psnr, ways[i].way->family, ratio, mean(&ways[i].psnr_terrain));
+        plot_add(&ssim, ways[i].way->family, ratio, mean(&ways[i].ssim));
+    }
+    plot_peers(&psnr, r->scene.key);
+    write_plot(&psnr, r->scene.key, "psnr");
+    write_plot(&ssim, r->scene.key, "ssim");
+}
+
+/* ---- Pictures of the worst frames --------------------------------------- */
+
+/* Three pictures side by side: the full mesh, the way, and their difference. */
+static void write_worst(const run *r, const contender *c)
+{
+    const uint8_t *parts[3];
+    size_t row = (size_t)SCENE_WIDTH * 3;
+    uint8_t *difference = need_memory(row * SCENE_HEIGHT);
+    uint8_t *wide = need_memory(row * SCENE_HEIGHT * 3);
+    char path[256], *space;
+    const char *trouble;
+    int part, y;
+    image_difference(c->worst, c->worst_truth, SCENE_PIXELS, 1, difference);
+    parts[0] = c->worst_truth;
+    parts[1] = c->worst;
+    parts[2] = difference;
+    for (y = 0; y < SCENE_HEIGHT; y++)
+        for (part = 0; part < 3; part++)
+            memcpy(wide + ((size_t)y * 3 + (size_t)part) * row, parts[part] + (size_t)y * row, row);
+    snprintf(path, sizeof path, "%s/%s_%s.png", work, r->scene.key, c->way->name);
+    for (space = path; *space; space++)
+        if (*space == ' ' || *space == ',')
+            *space = '_';
+    trouble = image_write_png(path, wide, SCENE_WIDTH * 3, SCENE_HEIGHT);
+    if (trouble)
+        scene_stop(path, trouble);
+    free(wide);
+    free(difference);
+}
+
+/* ---- All of it ---------------------------------------------------------- */
+
+static int whole_protocol(void)
+{
+    const char *all = getenv("BENCH_ALL");
+    return all && *all && *all != '0';
+}
+
+static size_t frames_of(const run *r)
+{
+    const char *frames = getenv("BENCH_FRAMES");
+    long count = frames ? strtol(frames, NULL, 10) : 0;
+    return count > 0 ? (size_t)count : r->frames;
+}
+
+static void measure(const run *r, const context *frame)
+{
+    size_t count = whole_protocol() ? r->all_way_count : r->way_count, i;
+    contender *ways = need_memory(count * sizeof *ways);
+    double quad_ms;
+    scene s;
+    quad q;
+    fine f;
+    scene_open(&s, &r->scene, frame, frames_of(r));
+    for (i = 0; i < count; i++)
+        contender_open(&ways[i], &r->ways[i], &s);
+    quad_open(&q);
+    fine_open(&f, frame);
+    say("\n## %s, %zu frames\n", r->scene.name, s.flight.count);
+    fly(r, ways, count, &s, &q, &f, whole_protocol() ? 1 : r->stride);
+    quad_ms = stats_summarise(&q.ms).median;
+    print_times(ways, count, quad_ms);
+    print_quality(ways, count);
+    write_figures(r, ways, count, quad_ms);
+    if (r->curve) {
+        print_peers(r->scene.key);
+        print_speed_up(r, ways, count);
+        plot_curves(r, ways, count);
+    }
+    for (i = 1; i < count; i++)
+        write_worst(r, &ways[i]);
+    fine_close(&f);
+    quad_close(&q);
+    for (i = 0; i < count; i++)
+        contender_close(&ways[i]);
+    free(ways);
+    scene_close(&s);
+}
+
+static int is_wanted(const run *r)
+{
+    const char *only = getenv("BENCH_ONLY");
+    if (only && *only)
+        return strstr(r->scene.key, only) != NULL;
+    return whole_protocol() || !r->only_all;
+}
+
+int main(void)
+{
+    context frame;
+    const char *trouble = context_open(&frame, SCENE_WIDTH, SCENE_HEIGHT);
+    double start = clock_ms();
+    size_t i;
+    if (trouble)
+        scene_stop("OpenGL", trouble);
+    mkdir("build", 0777);
+    mkdir(work, 0777);
+    report = open_output("frames.md");
+    figures = open_output("frames.tsv");
+    times = open_output("frame_times.tsv");
+    say_machine();
+    write_headings();
+    for (i = 0; i < sizeof runs / sizeof *runs; i++) {
+        if (!is_wanted(&runs[i]))
+            continue;
+        if (scene_file_is_there(runs[i].scene.file) && scene_file_is_there(runs[i].scene.path))
+            measure(&runs[i], &frame);
+        else
+            say("\n## %s: its files are not here\n", runs[i].scene.name);
+    }
+    say("\nAll of it took %.0f s.\n", (clock_ms() - start) * 1e-3);
+    fclose(times);
+    fclose(figures);
+    fclose(report);
+    context_close(&frame);
+    return 0;
+}

@@ -1,0 +1,172 @@
+/* A way of drawing the terrain, what it needs for that, and what it was measured to cost. */
+#ifndef BENCH_WAY_H
+#define BENCH_WAY_H
+
+#include "bench_scene.h"
+
+#include "examples/host/gl_geomip.h"
+#include "examples/host/quality.h"
+
+enum { WAY_SEPARATE_GEOMIP = -1 }; /* instead of a terrimp_mode: through gl_geomip */
+
+/* How to draw. Numbers that are 0 are left to the library. */
+typedef struct way {
+    const char *name;           /* in the tables */
+    const char *family;         /* its series in the plots */
+    int mode;                   /* terrimp_mode, or WAY_SEPARATE_GEOMIP */
+    int rule;                   /* terrimp_geomip_rule */
+    float tolerance_px, morph_ratio;
+    uint32_t chunk_quads;       /* 64 or 128; 0: 64 */
+    float foreground;           /* [wu] where ground has ended; it fades over the last quarter */
+    float max_angle_degrees, texels_per_px;
+    uint32_t max_captures;
+} way;
+
+/* Pictures of one moment are only kept while they are compared. */
+typedef struct contender {
+    const way *way;
+    terrimp_view *view;         /* null: separate geomip */
+    gl_terrain *gl, own_gl;     /* own: when the way keeps pictures */
+    gl_geomip geomip;
+    terrimp_stats now;          /* of the newest frame */
+    stats ms, cpu_ms;           /* of all frames but the first */
+    double first_ms;
+    double frames, triangles, draws, captures, captured_texels, impostors; /* sums, the same */
+    stats psnr, psnr_terrain, ssim;       /* against the full mesh [dB, dB, 1] */
+    stats fine_psnr, fine_ssim;           /* over terrain, against the full mesh supersampled */
+    stats shimmer, pop_pixel, pop_block;  /* quality_change */
+    double holes, low_pixels;             /* worst and mean of quality_holes */
+    uint8_t *before, *picture, *worst, *worst_truth;
+    size_t picture_frame, worst_frame, pop_frame;
+    quality_change pop;                   /* the worst one */
+} contender;
+
+/* Whether a frame depends on those before: then every frame of the flight must be drawn. */
+static int way_has_memory(const way *w)
+{
+    return w->mode != WAY_SEPARATE_GEOMIP && w->mode != TERRIMP_MODE_FULL;
+}
+
+static void contender_open_view(contender *c, scene *s, int terrain)
+{
+    const way *w = c->way;
+    terrimp_view_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.mode = w->mode;
+    desc.fade_start = w->foreground * 0.75f;
+    desc.fade_end = w->foreground;
+    desc.max_angle_rad = w->max_angle_degrees * 0.017453293f;
+    desc.tolerance_px = w->tolerance_px;
+    desc.texels_per_px = w->texels_per_px;
+    desc.max_captures = w->max_captures;
+    need(terrimp_view_desc_resolve(s->terrain[terrain], &desc, &desc));
+    need(terrimp_view_create(s->terrain[terrain], &desc, NULL, &c->view));
+    c->gl = &c->own_gl;
+    if (way_has_memory(w))
+        scene_open_gl(s, terrain, desc.atlas_size, &c->own_gl);
+    else
+        c->gl = scene_shared_gl(s, terrain);
+}
+
+static void contender_open_geomip(contender *c, scene *s, int terrain)
+{
+    terrimp_geomip_view settings;
+    const char *trouble;
+    memset(&settings, 0, sizeof settings);
+    settings.rule = c->way->rule;
+    settings.tolerance_px = c->way->tolerance_px;
+    settings.morph_ratio = c->way->morph_ratio;
+    c->gl = scene_shared_gl(s, terrain);
+    trouble = gl_geomip_open(&c->geomip, c->gl, &s->field, c->way->chunk_quads, &settings);
+    if (trouble)
+        scene_stop(c->way->name, trouble);
+}
+
+static void contender_open(contender *c, const way *w, scene *s)
+{
+    int terrain = scene_terrain(s, w->chunk_quads ? w->chunk_quads : 64);
+    memset(c, 0, sizeof *c);
+    c->way = w;
+    c->picture = need_memory((size_t)SCENE_PIXELS * 3);
+    c->before = need_memory((size_t)SCENE_PIXELS * 3);
+    c->picture_frame = c->worst_frame = c->pop_frame = SIZE_MAX;
+    c->pop.block = -255.0;
+    if (w->mode == WAY_SEPARATE_GEOMIP)
+        contender_open_geomip(c, s, terrain);
+    else
+        contender_open_view(c, s, terrain);
+}
+
+static void contender_note(contender *c, size_t frame, double ms, double cpu_ms)
+{
+    if (frame == 0) {
+        c->first_ms = ms;
+        return;
+    }
+    stats_add(&c->ms, ms);
+    stats_add(&c->cpu_ms, cpu_ms);
+    c->frames += 1.0;
+    c->triangles += c->now.triangles;
+    c->draws += c->now.draws;
+    c->impostors += c->now.impostors;
+    c->captures += c->now.captures;
+    c->captured_texels += c->now.captured_texels;
+}
+
+/* Draws a frame; what is timed is all that a host would do for it. */
+static void contender_draw(contender *c, terrimp_camera camera, size_t frame)
+{
+    terrimp_callbacks callbacks = gl_terrain_callbacks(c->gl);
+    double start = clock_ms(), cpu_start = clock_cpu_ms();
+    if (c->view) {
+        need(terrimp_view_update(c->view, &camera));
+        need(terrimp_view_get_stats(c->view, &c->now));
+    } else {
+        need(gl_geomip_update(&c->geomip, &camera, &c->now));
+    }
+    scene_tighten(&camera, &c->now);
+    need(gl_terrain_begin(c->gl, &camera, scene_sky));
+    need(c->view ? terrimp_view_render(c->view, &callbacks) : gl_geomip_draw(&c->geomip));
+    gl_terrain_end(c->gl);
+    contender_note(c, frame, clock_ms() - start, clock_cpu_ms() - cpu_start);
+}
+
+/* Reads the frame just drawn; the one before stays. */
+static void contender_read(contender *c, const context *frame_buffer, size_t frame)
+{
+    uint8_t *swap = c->before;
+    c->before = c->picture;
+    c->picture = swap;
+    c->picture_frame = frame;
+    context_read(frame_buffer, c->picture);
+}
+
+static void contender_close(contender *c)
+{
+    stats *lists[10];
+    int i;
+    lists[0] = &c->ms;
+    lists[1] = &c->cpu_ms;
+    lists[2] = &c->psnr;
+    lists[3] = &c->psnr_terrain;
+    lists[4] = &c->ssim;
+    lists[5] = &c->fine_psnr;
+    lists[6] = &c->fine_ssim;
+    lists[7] = &c->shimmer;
+    lists[8] = &c->pop_pixel;
+    lists[9] = &c->pop_block;
+    for (i = 0; i < 10; i++)
+        stats_free(lists[i]);
+    if (c->view)
+        terrimp_view_destroy(c->view);
+    else
+        gl_geomip_close(&c->geomip);
+    if (c->gl == &c->own_gl)
+        gl_terrain_close(&c->own_gl);
+    free(c->before);
+    free(c->picture);
+    free(c->worst);
+    free(c->worst_truth);
+}
+
+#endif
