@@ -59,6 +59,21 @@ static const way path_ways[] = {
       .tolerance_px = 1.0f, .morph_ratio = 1.5f }
 };
 
+static const way look_ways[] = {
+    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
+    { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
+    { .name = "geomip picture 0.5 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 0.5f },
+    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 1.0f },
+    { .name = "geomip picture 4 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
+      .tolerance_px = 4.0f },
+    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f },
+    { .name = "geomip bound 4 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
+      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 4.0f }
+};
+
 static const way tile_ways[] = {
     { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
     { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
@@ -85,9 +100,12 @@ static const way thesis_ways[] = {
     HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128)
 };
 
+enum { WAYS_MAX = 32 }; /* in a run */
+
 /* One flight of one list of ways. */
 typedef struct run {
     scene_desc scene;
+    int look;
     const way *ways;
     size_t way_count, all_way_count; /* by default, and with BENCH_ALL */
     size_t frames;
@@ -100,23 +118,31 @@ typedef struct run {
 
 static const run runs[] = {
     { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", .file = "N42E001.hgt",
-        .crop = 1025, .spacing = 79.6f, .path = "paths/pyrenees.path" },
+        .crop = 1025, .spacing = 79.6f, .path = "paths/pyrenees.path" }, LOOK_LIGHTMAP,
       WAYS(path_ways), 120, 8, 1, 0 },
     { { .name = "rough 2049 x 2049, straight flight", .key = "rough",
         .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
-        .path = "paths/rough.path" },
+        .path = "paths/rough.path" }, LOOK_LIGHTMAP,
       WAYS(path_ways), 120, 8, 1, 0 },
-    { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
+    { { .name = "rough, three materials and moving clouds", .key = "materials",
+        .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
+        .path = "paths/rough.path" }, LOOK_MATERIALS,
+      WAYS(look_ways), 60, 10, 1, 0 },
+    { { .name = "rough, with trees", .key = "trees",
+        .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
+        .path = "paths/rough.path" }, LOOK_TREES,
+      WAYS(look_ways), 60, 10, 1, 0 },
+    { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" }, LOOK_LIGHTMAP,
       WAYS(tile_ways), 60, 10, 0, 0 },
-    { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
+    { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" }, LOOK_LIGHTMAP,
       WAYS(tile_ways), 60, 10, 0, 0 },
-    { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
+    { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 }, LOOK_LIGHTMAP,
       thesis_ways, 5, 9, 60, 10, 0, 0 },
-    { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
+    { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 }, LOOK_LIGHTMAP,
       thesis_ways, 9, 9, 60, 10, 0, 0 },
-    { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
+    { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 }, LOOK_LIGHTMAP,
       thesis_ways, 5, 9, 60, 10, 0, 1 },
-    { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
+    { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 }, LOOK_LIGHTMAP,
       thesis_ways, 5, 9, 60, 10, 0, 0 }
 };
 
@@ -171,6 +197,21 @@ static void say_machine(void)
 }
 
 /* ---- Quality ------------------------------------------------------------ */
+
+/* The smallest of a list; 0 when it is empty. */
+static double smallest(const stats *s)
+{
+    double least = s->count ? s->values[0] : 0.0;
+    size_t i;
+    for (i = 1; i < s->count; i++)
+        least = s->values[i] < least ? s->values[i] : least;
+    return least;
+}
+
+static double mean(const stats *s)
+{
+    return stats_summarise(s).mean;
+}
 
 static double psnr_of(const uint8_t *a, const uint8_t *b, const uint8_t *sky)
 {
@@ -242,12 +283,12 @@ typedef struct frame_plan {
 /* SSIM is dear: every other look has it. The supersampled reference is dearer: three looks do. */
 static frame_plan plan_frame(const run *r, size_t frame, size_t frames, size_t stride)
 {
-    size_t looks = (frames + stride - 1) / stride, look = frame / stride;
+    size_t looks = (frames + stride - 1) / stride, index = frame / stride;
     frame_plan plan;
     plan.look = frame % stride == 0;
     plan.change = stride == 1 ? frame > 0 : frame % stride == 1;
-    plan.ssim = plan.look && look % 2 == 0;
-    plan.fine = r->curve && plan.look && look % ((looks + 2) / 3) == 0;
+    plan.ssim = plan.look && index % 2 == 0;
+    plan.fine = r->curve && plan.look && index % ((looks + 2) / 3) == 0;
     return plan;
 }
 
@@ -273,14 +314,16 @@ static void draw_frame(contender *ways, size_t count, const scene *s, size_t fra
 static void fly(const run *r, contender *ways, size_t count, const scene *s, quad *q, fine *f,
                 size_t stride)
 {
+    look *l = ways[0].look;
     size_t frame, i;
     for (frame = 0; frame < s->flight.count; frame++) {
         frame_plan plan = plan_frame(r, frame, s->flight.count, stride);
+        l->seconds = (float)frame / SCENE_FPS;
         draw_frame(ways, count, s, frame, plan);
         if (plan.look)
             quad_draw(q, s->context, ways[0].gl->lightmap);
         if (plan.fine)
-            fine_draw(f, ways[0].gl, ways[0].view, scene_camera(s, frame));
+            fine_draw(f, l, ways[0].gl, ways[0].view, scene_camera(s, frame));
         for (i = 0; i < count; i++) {
             if (plan.look)
                 compare(&ways[i], &ways[0], frame, plan.ssim);
@@ -294,21 +337,6 @@ static void fly(const run *r, contender *ways, size_t count, const scene *s, qua
 
 /* ---- Tables ------------------------------------------------------------- */
 
-/* The smallest of a list; 0 when it is empty. */
-static double smallest(const stats *s)
-{
-    double least = s->count ? s->values[0] : 0.0;
-    size_t i;
-    for (i = 1; i < s->count; i++)
-        least = s->values[i] < least ? s->values[i] : least;
-    return least;
-}
-
-static double mean(const stats *s)
-{
-    return stats_summarise(s).mean;
-}
-
 /* Frames that a picture is drawn, on average; 0 for ways without pictures. */
 static double reuse(const contender *c)
 {
@@ -317,7 +345,8 @@ static double reuse(const contender *c)
 
 static void print_times(const contender *ways, size_t count, double quad_ms)
 {
-    double unit = stats_summarise(&ways[0].ms).median, cpu = stats_summarise(&ways[0].cpu_ms).median;
+    double unit = stats_summarise(&ways[0].ms).median;
+    double cpu = mean(&ways[0].cpu_ms);
     size_t i;
     say("\n| way | ms | ratio | mean | sd | 95 %% | 99 %% | worst | first | CPU ratio | quads | "
         "triangles | draws | captures | ktexels | reuse |\n"
@@ -329,7 +358,7 @@ static void print_times(const contender *ways, size_t count, double quad_ms)
         say("| %s | %.1f | %.3f | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f | %.3f | %.1f | %.0f | "
             "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, ms.median / unit,
             ms.mean / unit, ms.deviation / unit, ms.p95 / unit, ms.p99 / unit, ms.worst / unit,
-            c->first_ms / unit, stats_summarise(&c->cpu_ms).median / cpu, ms.median / quad_ms,
+            c->first_ms / unit, mean(&c->cpu_ms) / cpu, ms.median / quad_ms,
             c->triangles / n, c->draws / n, c->captures / n, c->captured_texels / n / 1e3,
             reuse(c));
     }
@@ -357,7 +386,8 @@ static void print_quality(const contender *ways, size_t count)
 
 static void write_figures(const run *r, const contender *ways, size_t count, double quad_ms)
 {
-    double unit = stats_summarise(&ways[0].ms).median, cpu = stats_summarise(&ways[0].cpu_ms).median;
+    double unit = stats_summarise(&ways[0].ms).median;
+    double cpu = mean(&ways[0].cpu_ms);
     size_t i;
     for (i = 0; i < count; i++) {
         const contender *c = &ways[i];
@@ -367,7 +397,7 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
                 "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
                 ms.median / unit, ms.mean / unit, ms.deviation / unit, ms.p95 / unit,
                 ms.p99 / unit, ms.worst / unit, c->first_ms / unit,
-                stats_summarise(&c->cpu_ms).median / cpu, quad_ms);
+                mean(&c->cpu_ms) / cpu, quad_ms);
         fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t", c->triangles / n, c->draws / n,
                 c->captures / n, c->captured_texels / n, reuse(c));
         fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
@@ -395,18 +425,34 @@ static int begins_with(const char *text, const char *start)
     return strncmp(text, start, strlen(start)) == 0;
 }
 
-/* The points of our ground-only ways, or, without ways, of the peers. */
-static size_t rival_points(const char *key, const contender *ways, size_t count,
-                           stats_point *points)
+/* What a way costs beside the full mesh: by means, so that the pictures that it makes now and then
+   are paid for. Of the clock, or of the processor. */
+static double cost_of(const contender *c, const contender *full, int processor)
 {
-    double unit = ways ? stats_summarise(&ways[0].ms).median : 1.0;
+    return processor ? mean(&c->cpu_ms) / mean(&full->cpu_ms) : mean(&c->ms) / mean(&full->ms);
+}
+
+static double quality_of(const contender *c, int similarity)
+{
+    return mean(similarity ? &c->ssim : &c->psnr_terrain);
+}
+
+static size_t geomip_points(const contender *ways, size_t count, int processor, int similarity,
+                            stats_point *points)
+{
     size_t found = 0, i;
     for (i = 0; i < count; i++)
         if (begins_with(ways[i].way->family, "geomip")) {
-            points[found].cost = stats_summarise(&ways[i].ms).median / unit;
-            points[found++].quality = mean(&ways[i].psnr_terrain);
+            points[found].cost = cost_of(&ways[i], &ways[0], processor);
+            points[found++].quality = quality_of(&ways[i], similarity);
         }
-    for (i = 0; !ways && i < PEER_COUNT; i++)
+    return found;
+}
+
+static size_t peer_points(const char *key, stats_point *points)
+{
+    size_t found = 0, i;
+    for (i = 0; i < PEER_COUNT; i++)
         if (strcmp(peers[i].scene, key) == 0) {
             points[found].cost = peers[i].ratio;
             points[found++].quality = peers[i].psnr;
@@ -414,33 +460,38 @@ static size_t rival_points(const char *key, const contender *ways, size_t count,
     return found;
 }
 
-static void say_against(const char *rival, const stats_point *points, size_t count, double ratio,
-                        double psnr)
+static void say_against(const stats_point *points, size_t count, double cost, double quality)
 {
-    double cost;
-    if (stats_cost_at(points, count, psnr, &cost))
-        say(" %s %.3f: %.2f times as fast;", rival, cost, cost / ratio);
+    double theirs;
+    if (!count)
+        say(" |");
+    else if (stats_cost_at(points, count, quality, &theirs))
+        say(" %.2f |", theirs / cost);
     else
-        say(" %s is nowhere as good;", rival);
+        say(" never as good |");
 }
 
 /* Every way with pictures against the best that does without, at the quality it has. */
 static void print_speed_up(const run *r, const contender *ways, size_t count)
 {
-    stats_point ours[64], theirs[PEER_COUNT];
-    size_t our_count = rival_points(r->scene.key, ways, count, ours);
-    size_t their_count = rival_points(r->scene.key, NULL, 0, theirs), i;
-    double unit = stats_summarise(&ways[0].ms).median;
-    say("\nAt equal PSNR, interpolated (time as a ratio to full):\n\n");
+    stats_point points[WAYS_MAX > PEER_COUNT ? WAYS_MAX : PEER_COUNT];
+    size_t i, found;
+    int kind;
+    say("\nHow many times as fast at equal quality, interpolated; costs are mean times:\n\n"
+        "| way | ratio | PSNR | than our geomip | the same, CPU | at equal SSIM | "
+        "than peers, quoted |\n|---|--:|--:|--:|--:|--:|--:|\n");
     for (i = 1; i < count; i++) {
-        double ratio = stats_summarise(&ways[i].ms).median / unit;
-        double psnr = mean(&ways[i].psnr_terrain);
-        if (!way_has_memory(ways[i].way))
+        if (!way_has_memory(ways[i].way) || begins_with(ways[i].way->family, "geomip"))
             continue;
-        say("- %s: %.3f at %.2f dB;", ways[i].way->name, ratio, psnr);
-        say_against("our geomip", ours, our_count, ratio, psnr);
-        if (their_count)
-            say_against("peers, quoted,", theirs, their_count, ratio, psnr);
+        say("| %s | %.3f | %.2f |", ways[i].way->name, cost_of(&ways[i], &ways[0], 0),
+            mean(&ways[i].psnr_terrain));
+        for (kind = 0; kind < 3; kind++) { /* clock and PSNR, processor and PSNR, clock and SSIM */
+            found = geomip_points(ways, count, kind == 1, kind == 2, points);
+            say_against(points, found, cost_of(&ways[i], &ways[0], kind == 1),
+                        quality_of(&ways[i], kind == 2));
+        }
+        found = peer_points(r->scene.key, points);
+        say_against(points, found, cost_of(&ways[i], &ways[0], 0), mean(&ways[i].psnr_terrain));
         say("\n");
     }
 }
@@ -486,16 +537,15 @@ static void write_plot(const plot *p, const char *key, const char *kind)
 static void plot_curves(const run *r, const contender *ways, size_t count)
 {
     static plot psnr, ssim;
-    double unit = stats_summarise(&ways[0].ms).median;
     size_t i;
     psnr.title = ssim.title = r->scene.name;
-    psnr.x_label = ssim.x_label = "median frame time / full mesh";
+    psnr.x_label = ssim.x_label = "mean frame time / full mesh";
     psnr.y_label = "PSNR over terrain [dB]";
     ssim.y_label = "SSIM over terrain";
     psnr.log_x = ssim.log_x = 1;
     psnr.count = ssim.count = 0;
     for (i = 1; i < count; i++) {
-        double ratio = stats_summarise(&ways[i].ms).median / unit;
+        double ratio = cost_of(&ways[i], &ways[0], 0);
         plot_add(&psnr, ways[i].way->family, ratio, mean(&ways[i].psnr_terrain));
         plot_add(&ssim, ways[i].way->family, ratio, mean(&ways[i].ssim));
     }
@@ -557,9 +607,11 @@ static void measure(const run *r, const context *frame)
     scene s;
     quad q;
     fine f;
+    look l;
     scene_open(&s, &r->scene, frame, frames_of(r));
+    look_open(&l, r->look, &s);
     for (i = 0; i < count; i++)
-        contender_open(&ways[i], &r->ways[i], &s);
+        contender_open(&ways[i], &r->ways[i], &s, &l);
     quad_open(&q);
     fine_open(&f, frame);
     say("\n## %s, %zu frames\n", r->scene.name, s.flight.count);
@@ -580,6 +632,7 @@ static void measure(const run *r, const context *frame)
     for (i = 0; i < count; i++)
         contender_close(&ways[i]);
     free(ways);
+    look_close(&l);
     scene_close(&s);
 }
 

@@ -3,7 +3,7 @@
 #ifndef BENCH_GL_H
 #define BENCH_GL_H
 
-#include "bench_scene.h"
+#include "bench_look.h"
 
 #include "examples/host/quality.h"
 
@@ -89,9 +89,9 @@ static void fine_open(fine *f, const context *frame)
 }
 
 /* Leaves the supersampled picture of what a view of the full mesh has decided last. */
-static void fine_draw(fine *f, gl_terrain *gl, terrimp_view *full, terrimp_camera camera)
+static void fine_draw(fine *f, look *l, gl_terrain *gl, terrimp_view *full,
+                      terrimp_camera camera)
 {
-    terrimp_callbacks callbacks = gl_terrain_callbacks(gl);
     const context *frame = gl->frame;
     terrimp_stats now;
     need(terrimp_view_get_stats(full, &now));
@@ -100,7 +100,7 @@ static void fine_draw(fine *f, gl_terrain *gl, terrimp_view *full, terrimp_camer
     camera.height_px *= FINE;
     gl->frame = &f->frame;
     need(gl_terrain_begin(gl, &camera, scene_sky));
-    need(terrimp_view_render(full, &callbacks));
+    need(look_render(l, gl, full));
     gl_terrain_end(gl);
     gl->frame = frame;
     context_read(&f->frame, f->large);

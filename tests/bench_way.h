@@ -2,6 +2,7 @@
 #ifndef BENCH_WAY_H
 #define BENCH_WAY_H
 
+#include "bench_look.h"
 #include "bench_scene.h"
 
 #include "examples/host/gl_geomip.h"
@@ -25,6 +26,7 @@ typedef struct way {
 /* Pictures of one moment are only kept while they are compared. */
 typedef struct contender {
     const way *way;
+    look *look;                 /* not its own */
     terrimp_view *view;         /* null: separate geomip */
     gl_terrain *gl, own_gl;     /* own: when the way keeps pictures */
     gl_geomip geomip;
@@ -47,6 +49,16 @@ static int way_has_memory(const way *w)
     return w->mode != WAY_SEPARATE_GEOMIP && w->mode != TERRIMP_MODE_FULL;
 }
 
+/* The OpenGL side of ways that keep no pictures; the first of them dresses it. */
+static gl_terrain *open_shared_gl(const contender *c, scene *s, int terrain)
+{
+    int is_new = !s->is_open[terrain];
+    gl_terrain *gl = scene_shared_gl(s, terrain);
+    if (is_new)
+        look_dress(c->look, gl);
+    return gl;
+}
+
 static void contender_open_view(contender *c, scene *s, int terrain)
 {
     const way *w = c->way;
@@ -61,11 +73,13 @@ static void contender_open_view(contender *c, scene *s, int terrain)
     desc.max_captures = w->max_captures;
     need(terrimp_view_desc_resolve(s->terrain[terrain], &desc, &desc));
     need(terrimp_view_create(s->terrain[terrain], &desc, NULL, &c->view));
-    c->gl = &c->own_gl;
-    if (way_has_memory(w))
-        scene_open_gl(s, terrain, desc.atlas_size, &c->own_gl);
-    else
-        c->gl = scene_shared_gl(s, terrain);
+    if (way_has_memory(w)) {
+        c->gl = &c->own_gl;
+        scene_open_gl(s, terrain, desc.atlas_size, c->gl);
+        look_dress(c->look, c->gl);
+    } else {
+        c->gl = open_shared_gl(c, s, terrain);
+    }
 }
 
 static void contender_open_geomip(contender *c, scene *s, int terrain)
@@ -76,17 +90,19 @@ static void contender_open_geomip(contender *c, scene *s, int terrain)
     settings.rule = c->way->rule;
     settings.tolerance_px = c->way->tolerance_px;
     settings.morph_ratio = c->way->morph_ratio;
-    c->gl = scene_shared_gl(s, terrain);
+    c->gl = open_shared_gl(c, s, terrain);
     trouble = gl_geomip_open(&c->geomip, c->gl, &s->field, c->way->chunk_quads, &settings);
     if (trouble)
         scene_stop(c->way->name, trouble);
+    look_dress_geomip(c->look, &c->geomip);
 }
 
-static void contender_open(contender *c, const way *w, scene *s)
+static void contender_open(contender *c, const way *w, scene *s, look *l)
 {
     int terrain = scene_terrain(s, w->chunk_quads ? w->chunk_quads : 64);
     memset(c, 0, sizeof *c);
     c->way = w;
+    c->look = l;
     c->picture = need_memory((size_t)SCENE_PIXELS * 3);
     c->before = need_memory((size_t)SCENE_PIXELS * 3);
     c->picture_frame = c->worst_frame = c->pop_frame = SIZE_MAX;
@@ -116,7 +132,6 @@ static void contender_note(contender *c, size_t frame, double ms, double cpu_ms)
 /* Draws a frame; what is timed is all that a host would do for it. */
 static void contender_draw(contender *c, terrimp_camera camera, size_t frame)
 {
-    terrimp_callbacks callbacks = gl_terrain_callbacks(c->gl);
     double start = clock_ms(), cpu_start = clock_cpu_ms();
     if (c->view) {
         need(terrimp_view_update(c->view, &camera));
@@ -126,7 +141,8 @@ static void contender_draw(contender *c, terrimp_camera camera, size_t frame)
     }
     scene_tighten(&camera, &c->now);
     need(gl_terrain_begin(c->gl, &camera, scene_sky));
-    need(c->view ? terrimp_view_render(c->view, &callbacks) : gl_geomip_draw(&c->geomip));
+    need(c->view ? look_render(c->look, c->gl, c->view)
+                 : look_draw_geomip(c->look, &c->geomip, &camera));
     gl_terrain_end(c->gl);
     contender_note(c, frame, clock_ms() - start, clock_cpu_ms() - cpu_start);
 }
