@@ -96,7 +96,7 @@ $(BUILD)/%.o: %.c | $(DEPS)
 	    $(CFLAGS) -c $< -o $@
 
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
-$(BUILD)/bench_%: LIBS = $(BENCH_LIBS)
+$(BUILD)/bench_%: LIBS = $(BENCH_LIBS) -pthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 

@@ -116,34 +116,32 @@ typedef struct run {
 
 #define WAYS(list) list, sizeof list / sizeof *list, sizeof list / sizeof *list
 
+#define PYRENEES .file = "N42E001.hgt", .crop = 1025, .spacing = 79.6f,        \
+                 .path = "paths/pyrenees.path"
+#define ROUGH .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f, \
+              .path = "paths/rough.path"
+
 static const run runs[] = {
-    { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", .file = "N42E001.hgt",
-        .crop = 1025, .spacing = 79.6f, .path = "paths/pyrenees.path" }, LOOK_LIGHTMAP,
-      WAYS(path_ways), 120, 8, 1, 0 },
-    { { .name = "rough 2049 x 2049, straight flight", .key = "rough",
-        .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
-        .path = "paths/rough.path" }, LOOK_LIGHTMAP,
-      WAYS(path_ways), 120, 8, 1, 0 },
-    { { .name = "rough, three materials and moving clouds", .key = "materials",
-        .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
-        .path = "paths/rough.path" }, LOOK_MATERIALS,
-      WAYS(look_ways), 60, 10, 1, 0 },
-    { { .name = "rough, with trees", .key = "trees",
-        .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f,
-        .path = "paths/rough.path" }, LOOK_TREES,
-      WAYS(look_ways), 60, 10, 1, 0 },
-    { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" }, LOOK_LIGHTMAP,
-      WAYS(tile_ways), 60, 10, 0, 0 },
-    { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" }, LOOK_LIGHTMAP,
-      WAYS(tile_ways), 60, 10, 0, 0 },
-    { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 }, LOOK_LIGHTMAP,
-      thesis_ways, 5, 9, 60, 10, 0, 0 },
-    { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 }, LOOK_LIGHTMAP,
-      thesis_ways, 9, 9, 60, 10, 0, 0 },
-    { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 }, LOOK_LIGHTMAP,
-      thesis_ways, 5, 9, 60, 10, 0, 1 },
-    { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 }, LOOK_LIGHTMAP,
-      thesis_ways, 5, 9, 60, 10, 0, 0 }
+    { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", PYRENEES },
+      LOOK_LIGHTMAP, WAYS(path_ways), 120, 8, 1, 0 },
+    { { .name = "rough 2049 x 2049, straight flight", .key = "rough", ROUGH },
+      LOOK_LIGHTMAP, WAYS(path_ways), 120, 8, 1, 0 },
+    { { .name = "rough, three materials and moving clouds", .key = "materials", ROUGH },
+      LOOK_MATERIALS, WAYS(look_ways), 60, 10, 1, 0 },
+    { { .name = "rough, with trees", .key = "trees", ROUGH },
+      LOOK_TREES, WAYS(look_ways), 60, 10, 1, 0 },
+    { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
+    { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
+    { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 0 },
+    { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
+      LOOK_LIGHTMAP, thesis_ways, 9, 9, 60, 10, 0, 0 },
+    { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 1 },
+    { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 0 }
 };
 
 /* ---- Output ------------------------------------------------------------- */
@@ -474,7 +472,7 @@ static void say_against(const stats_point *points, size_t count, double cost, do
 /* Every way with pictures against the best that does without, at the quality it has. */
 static void print_speed_up(const run *r, const contender *ways, size_t count)
 {
-    stats_point points[WAYS_MAX > PEER_COUNT ? WAYS_MAX : PEER_COUNT];
+    stats_point points[WAYS_MAX + PEER_COUNT];
     size_t i, found;
     int kind;
     say("\nHow many times as fast at equal quality, interpolated; costs are mean times:\n\n"
@@ -554,6 +552,18 @@ static void plot_curves(const run *r, const contender *ways, size_t count)
     write_plot(&ssim, r->scene.key, "ssim");
 }
 
+/* Frame time against terrain size, over all the flights of the thesis. */
+static plot sizes = { .title = "Frame time against terrain size, circle as Hess",
+                      .x_label = "samples along a side", .y_label = "mean frame time [ms]",
+                      .log_x = 1, .log_y = 1 };
+
+static void note_size(const run *r, const contender *ways, size_t count)
+{
+    size_t i;
+    for (i = 0; i < count; i++)
+        plot_add(&sizes, ways[i].way->name, (double)r->scene.size, mean(&ways[i].ms));
+}
+
 /* ---- Pictures of the worst frames --------------------------------------- */
 
 /* Three pictures side by side: the full mesh, the way, and their difference. */
@@ -625,6 +635,8 @@ static void measure(const run *r, const context *frame)
         print_speed_up(r, ways, count);
         plot_curves(r, ways, count);
     }
+    if (r->scene.size)
+        note_size(r, ways, count);
     for (i = 1; i < count; i++)
         write_worst(r, &ways[i]);
     fine_close(&f);
@@ -667,6 +679,8 @@ int main(void)
         else
             say("\n## %s: its files are not here\n", runs[i].scene.name);
     }
+    if (sizes.count && sizes.series[0].count > 1)
+        write_plot(&sizes, "frames", "sizes");
     say("\nAll of it took %.0f s.\n", (clock_ms() - start) * 1e-3);
     fclose(times);
     fclose(figures);

@@ -1,5 +1,5 @@
-/* How a scene of the frame benchmark looks: under one lightmap, under dearer shading, or with trees;
-   the same in every way of drawing the terrain. */
+/* How a scene of the frame benchmark looks: under one lightmap, under dearer shading, or with
+   trees; the same in every way of drawing the terrain. */
 #ifndef BENCH_LOOK_H
 #define BENCH_LOOK_H
 

@@ -26,6 +26,6 @@ static const peer peers[] = {
     { "rough", "Irrlicht, patch 65", 0.035, 20.6, 12000, 1 },
     { "rough", "osgSim::Impostor per chunk", 0.37, 21.1, 61000, 500 }
 };
-enum { PEER_COUNT = sizeof peers / sizeof *peers };
+#define PEER_COUNT (sizeof peers / sizeof *peers)
 
 #endif

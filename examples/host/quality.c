@@ -9,6 +9,11 @@ static int is_colour(const uint8_t *pixel, const uint8_t *colour)
     return pixel[0] == colour[0] && pixel[1] == colour[1] && pixel[2] == colour[2];
 }
 
+static int smaller(int a, int b)
+{
+    return a < b ? a : b;
+}
+
 static int larger(int a, int b)
 {
     return a > b ? a : b;
@@ -69,7 +74,8 @@ static void filter_row(const uint8_t *a, const uint8_t *b, int width, const floa
 static double similarity(float mean_a, float mean_b, float aa, float bb, float ab)
 {
     const double c1 = 0.01 * 255.0 * (0.01 * 255.0), c2 = 0.03 * 255.0 * (0.03 * 255.0);
-    double variance_a = (double)(aa - mean_a * mean_a), variance_b = (double)(bb - mean_b * mean_b);
+    double variance_a = (double)(aa - mean_a * mean_a);
+    double variance_b = (double)(bb - mean_b * mean_b);
     double covariance = (double)(ab - mean_a * mean_b);
     double p = (double)mean_a + 128.0, q = (double)mean_b + 128.0;
     return (2.0 * p * q + c1) * (2.0 * covariance + c2)
@@ -129,44 +135,71 @@ static int change_of(const uint8_t *a, const uint8_t *b)
     return larger(abs(a[0] - b[0]), larger(abs(a[1] - b[1]), abs(a[2] - b[2])));
 }
 
+/* Two frames of a picture and of its reference. */
+typedef struct two_frames {
+    const uint8_t *before, *now, *reference_before, *reference_now;
+    int width, height;
+} two_frames;
+
+/* Sum of how much more a block changes than the reference does; raises *largest. */
+static int block_change(const two_frames *t, int left, int top, int right, int bottom,
+                        double *largest)
+{
+    int sum = 0, x, y;
+    for (y = top; y < bottom; y++)
+        for (x = left; x < right; x++) {
+            size_t i = ((size_t)y * (size_t)t->width + (size_t)x) * 3;
+            int more = change_of(t->before + i, t->now + i)
+                       - change_of(t->reference_before + i, t->reference_now + i);
+            sum += more;
+            if (more > *largest)
+                *largest = more;
+        }
+    return sum;
+}
+
+static quality_change change_of_blocks(const two_frames *t)
+{
+    quality_change change = { 0.0, -255.0, -255.0, 0, 0 };
+    const double area = QUALITY_BLOCK * QUALITY_BLOCK;
+    int left, top;
+    for (top = 0; top < t->height; top += QUALITY_BLOCK)
+        for (left = 0; left < t->width; left += QUALITY_BLOCK) {
+            int is_whole = left + QUALITY_BLOCK <= t->width && top + QUALITY_BLOCK <= t->height;
+            int right = smaller(left + QUALITY_BLOCK, t->width);
+            int bottom = smaller(top + QUALITY_BLOCK, t->height);
+            int sum = block_change(t, left, top, right, bottom, &change.largest);
+            change.mean += sum;
+            if (is_whole && sum > change.block * area) {
+                change.block = sum / area;
+                change.block_x = left;
+                change.block_y = top;
+            }
+        }
+    change.mean /= (double)t->width * (double)t->height;
+    return change;
+}
+
 quality_change quality_compare_change(const uint8_t *before, const uint8_t *now,
                                       const uint8_t *reference_before,
                                       const uint8_t *reference_now, int width, int height)
 {
-    quality_change change = { 0.0, -255.0, -255.0, 0, 0 };
-    int columns = (width + QUALITY_BLOCK - 1) / QUALITY_BLOCK, column, row, x, y;
-    int64_t all = 0;
-    for (row = 0; row < height; row += QUALITY_BLOCK)
-        for (column = 0; column < columns; column++) {
-            int left = column * QUALITY_BLOCK, sum = 0;
-            int right = left + QUALITY_BLOCK < width ? left + QUALITY_BLOCK : width;
-            int bottom = row + QUALITY_BLOCK < height ? row + QUALITY_BLOCK : height;
-            for (y = row; y < bottom; y++)
-                for (x = left; x < right; x++) {
-                    size_t i = ((size_t)y * (size_t)width + (size_t)x) * 3;
-                    int more = change_of(before + i, now + i)
-                               - change_of(reference_before + i, reference_now + i);
-                    sum += more;
-                    if (more > change.largest)
-                        change.largest = more;
-                }
-            all += sum;
-            if (right - left == QUALITY_BLOCK && bottom - row == QUALITY_BLOCK
-                && sum > change.block * (QUALITY_BLOCK * QUALITY_BLOCK)) {
-                change.block = (double)sum / (QUALITY_BLOCK * QUALITY_BLOCK);
-                change.block_x = left;
-                change.block_y = row;
-            }
-        }
-    change.mean = (double)all / ((double)width * (double)height);
-    return change;
+    two_frames t;
+    t.before = before;
+    t.now = now;
+    t.reference_before = reference_before;
+    t.reference_now = reference_now;
+    t.width = width;
+    t.height = height;
+    return change_of_blocks(&t);
 }
 
 /* ---- Holes -------------------------------------------------------------- */
 
 enum { TERRAIN, UNSURE, SKY };
 
-/* Spreads SKY over UNSURE pixels that touch it; stack holds the sky pixels still to be looked at. */
+/* Spreads SKY over UNSURE pixels that touch it; stack holds the sky pixels whose neighbours are
+   still to be looked at. */
 static void spread_sky(uint8_t *marks, int width, int height, uint32_t *stack, size_t depth)
 {
     while (depth) {

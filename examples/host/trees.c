@@ -194,8 +194,8 @@ void trees_close(trees *t)
 
 /* ---- Drawing ------------------------------------------------------------ */
 
-/* For the screen nothing is cut. The rectangle is set nevertheless: a software rasteriser was seen to
-   cut by distances that are disabled. */
+/* For the screen nothing is cut. The rectangle is set nevertheless: a software rasteriser was seen
+   to cut by distances that are disabled. */
 static void use(const trees *t, const float matrix[16], const float eye[3])
 {
     glUseProgram(t->program);
