@@ -4,8 +4,9 @@
    Build:  make bench_frames
    Use:    build/bench_frames         (in the project's directory)
    Leaves: build/bench/frames.md (what it prints), frames.tsv (all figures, a line a scene and way),
-           frame_times.tsv (every frame), *.svg (plots), *.png (the worst frame of each way: full
-           mesh, the way, their difference)
+           frame_times.tsv (every frame), *.svg (plots), *.png (of each way the worst frame: full
+           mesh, the way, their difference), *_pop.png (around its worst pop: the full mesh before
+           and after, the way before and after)
 
    BENCH_FRAMES=n   frames of a flight [each scene's own, 60 to 120]; the thesis has 10000
    BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
@@ -256,6 +257,30 @@ static void compare_fine(contender *c, const fine *f)
                                           scene_sky));
 }
 
+enum { CROP = 160 }; /* pixels along a side */
+
+/* Keeps what is around a pop: the full mesh before and after it, then the way. */
+static void keep_pop(contender *c, const contender *full)
+{
+    const uint8_t *pictures[4];
+    int i, y, left = c->pop.block_x - (CROP - QUALITY_BLOCK) / 2;
+    int top = c->pop.block_y - (CROP - QUALITY_BLOCK) / 2;
+    left = left < 0 ? 0 : left > SCENE_WIDTH - CROP ? SCENE_WIDTH - CROP : left;
+    top = top < 0 ? 0 : top > SCENE_HEIGHT - CROP ? SCENE_HEIGHT - CROP : top;
+    pictures[0] = full->before;
+    pictures[1] = full->picture;
+    pictures[2] = c->before;
+    pictures[3] = c->picture;
+    for (i = 0; i < 4; i++) {
+        if (!c->pop_crops[i])
+            c->pop_crops[i] = need_memory((size_t)CROP * CROP * 3);
+        for (y = 0; y < CROP; y++)
+            memcpy(c->pop_crops[i] + (size_t)y * CROP * 3,
+                   pictures[i] + ((size_t)(top + y) * SCENE_WIDTH + (size_t)left) * 3,
+                   (size_t)CROP * 3);
+    }
+}
+
 static void compare_change(contender *c, const contender *full, size_t frame)
 {
     quality_change change = quality_compare_change(c->before, c->picture, full->before,
@@ -266,6 +291,7 @@ static void compare_change(contender *c, const contender *full, size_t frame)
     if (change.block > c->pop.block) {
         c->pop = change;
         c->pop_frame = frame;
+        keep_pop(c, full);
     }
 }
 
@@ -566,31 +592,44 @@ static void note_size(const run *r, const contender *ways, size_t count)
 
 /* ---- Pictures of the worst frames --------------------------------------- */
 
-/* Three pictures side by side: the full mesh, the way, and their difference. */
-static void write_worst(const run *r, const contender *c)
+/* Writes count pictures of width x height side by side, each pixel as a square of factor^2. */
+static void write_side_by_side(const run *r, const contender *c, const char *suffix,
+                               const uint8_t *const *pictures, int count, int width, int height,
+                               int factor)
 {
-    const uint8_t *parts[3];
-    size_t row = (size_t)SCENE_WIDTH * 3;
-    uint8_t *difference = need_memory(row * SCENE_HEIGHT);
-    uint8_t *wide = need_memory(row * SCENE_HEIGHT * 3);
-    char path[256], *space;
+    int wide = count * width * factor, high = height * factor, x, y;
+    uint8_t *out = need_memory((size_t)wide * (size_t)high * 3), *to = out;
+    char path[256], *letter;
     const char *trouble;
-    int part, y;
-    image_difference(c->worst, c->worst_truth, SCENE_PIXELS, 1, difference);
-    parts[0] = c->worst_truth;
-    parts[1] = c->worst;
-    parts[2] = difference;
-    for (y = 0; y < SCENE_HEIGHT; y++)
-        for (part = 0; part < 3; part++)
-            memcpy(wide + ((size_t)y * 3 + (size_t)part) * row, parts[part] + (size_t)y * row, row);
-    snprintf(path, sizeof path, "%s/%s_%s.png", work, r->scene.key, c->way->name);
-    for (space = path; *space; space++)
-        if (*space == ' ' || *space == ',')
-            *space = '_';
-    trouble = image_write_png(path, wide, SCENE_WIDTH * 3, SCENE_HEIGHT);
+    for (y = 0; y < high; y++)
+        for (x = 0; x < wide; x++, to += 3) {
+            int column = x / factor;
+            memcpy(to, pictures[column / width]
+                       + ((size_t)(y / factor * width) + (size_t)(column % width)) * 3, 3);
+        }
+    snprintf(path, sizeof path, "%s/%s_%s%s.png", work, r->scene.key, c->way->name, suffix);
+    for (letter = path; *letter; letter++)
+        if (*letter == ' ' || *letter == ',')
+            *letter = '_';
+    trouble = image_write_png(path, out, wide, high);
     if (trouble)
         scene_stop(path, trouble);
-    free(wide);
+    free(out);
+}
+
+static void write_pictures(const run *r, const contender *c)
+{
+    const uint8_t *pictures[3];
+    uint8_t *difference = need_memory((size_t)SCENE_PIXELS * 3);
+    const uint8_t *const crops[4] = { c->pop_crops[0], c->pop_crops[1], c->pop_crops[2],
+                                      c->pop_crops[3] };
+    image_difference(c->worst, c->worst_truth, SCENE_PIXELS, 1, difference);
+    pictures[0] = c->worst_truth;
+    pictures[1] = c->worst;
+    pictures[2] = difference;
+    write_side_by_side(r, c, "", pictures, 3, SCENE_WIDTH, SCENE_HEIGHT, 1);
+    if (crops[0])
+        write_side_by_side(r, c, "_pop", crops, 4, CROP, CROP, 3);
     free(difference);
 }
 
@@ -638,7 +677,7 @@ static void measure(const run *r, const context *frame)
     if (r->scene.size)
         note_size(r, ways, count);
     for (i = 1; i < count; i++)
-        write_worst(r, &ways[i]);
+        write_pictures(r, &ways[i]);
     fine_close(&f);
     quad_close(&q);
     for (i = 0; i < count; i++)

@@ -41,6 +41,7 @@ typedef struct contender {
     uint8_t *before, *picture, *worst, *worst_truth;
     size_t picture_frame, worst_frame, pop_frame;
     quality_change pop;                   /* the worst one */
+    uint8_t *pop_crops[4];                /* around it: the full mesh before and now, the way */
 } contender;
 
 /* Whether a frame depends on those before: then every frame of the flight must be drawn. */
@@ -183,6 +184,8 @@ static void contender_close(contender *c)
     free(c->picture);
     free(c->worst);
     free(c->worst_truth);
+    for (i = 0; i < 4; i++)
+        free(c->pop_crops[i]);
 }
 
 #endif
