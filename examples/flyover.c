@@ -1,6 +1,6 @@
-/* Flies a camera over a large terrain and draws it with terrain impostors, or with geometrical
-   mipmapping alone, through OpenGL without a window. Leaves pictures, a table with a line a frame,
-   and a summary.
+/* Flies a camera over a large terrain and draws it with terrain impostors and geometrical
+   mipmapping, or with one of them, through OpenGL without a window. Leaves pictures, a table with a
+   line a frame, and a summary.
    Build:  make flyover
    Use:    flyover --dem N42E001.hgt --frames 300 --out pictures --save-every 100 --compare
    Expect: `key value` lines; with --compare, PSNR and speed-up against the full mesh. */
@@ -11,7 +11,6 @@
 #include "host/context.h"
 #include "host/dem.h"
 #include "host/flight.h"
-#include "host/gl_geomip.h"
 #include "host/gl_terrain.h"
 #include "host/image.h"
 #include "host/lightmap.h"
@@ -32,7 +31,8 @@
 /* A way of drawing the terrain, with the times it took. */
 typedef struct contender {
     const char *name;
-    terrimp_view *view; /* null: geometrical mipmapping */
+    terrimp_view *view;
+    terrimp_view_desc desc; /* resolved */
     terrimp_stats now;  /* of the newest frame */
     stats ms;
     uint8_t *picture;   /* of the newest frame that was read back */
@@ -46,14 +46,13 @@ typedef struct flyover {
     terrimp_terrain_info info;
     context context;
     gl_terrain gl;
-    gl_geomip geomip;             /* with --mode geomip only */
     flight flight;
     contender chosen, full;       /* full takes part with --compare only */
     FILE *table;
     stats psnr, psnr_terrain;     /* of each compared frame [dB] */
     double captures, captured_texels, captured_triangles, triangles, draws;
+    double texels_used;
     float worst_parallax_px;
-    uint32_t repacks;
 } flyover;
 
 /* Says what is wrong, in one line, and ends the program. */
@@ -136,7 +135,7 @@ static void build_terrain(flyover *f)
            f->info.chunks_x * f->info.chunks_z, clock_ms() - start);
 }
 
-static void open_graphics(flyover *f, uint32_t atlas_size)
+static void open_graphics(flyover *f)
 {
     uint8_t *lightmap = lightmap_bake(&f->field);
     const char *trouble;
@@ -144,7 +143,10 @@ static void open_graphics(flyover *f, uint32_t atlas_size)
         stop("no memory for the lightmap");
     trouble = context_open(&f->context, (int)f->options.width, (int)f->options.height);
     if (!trouble)
-        trouble = gl_terrain_open(&f->gl, &f->context, f->terrain, &f->field, lightmap, atlas_size);
+        trouble = gl_terrain_open(&f->gl, &f->context, f->terrain, &f->field, lightmap,
+                                  f->chosen.desc.atlas_size);
+    if (!trouble && f->chosen.desc.morph_ratio > 1.0f)
+        trouble = gl_terrain_use_morphing(&f->gl);
     if (trouble)
         stop(trouble);
     free(lightmap);
@@ -153,53 +155,33 @@ static void open_graphics(flyover *f, uint32_t atlas_size)
 
 /* ---- The views and the flight ------------------------------------------- */
 
-static void name_contender(const flyover *f, contender *c, const char *name)
+static void open_contender(flyover *f, contender *c, const char *name, int mode)
 {
-    c->name = name;
-    c->picture = allocate((size_t)f->options.width * f->options.height * 3);
-}
-
-/* Returns the side of the view's atlases. */
-static uint32_t open_contender(flyover *f, contender *c, const char *name, int mode)
-{
+    const options *o = &f->options;
     terrimp_view_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.mode = mode;
-    desc.fade_start = f->options.fade[0];
-    desc.fade_end = f->options.fade[1];
-    desc.max_angle_rad = f->options.max_angle_degrees * DEGREE;
-    desc.tolerance_px = f->options.tolerance;
-    desc.texels_per_px = f->options.texels;
-    desc.atlas_size = f->options.atlas;
-    desc.max_captures = f->options.max_captures;
-    name_contender(f, c, name);
-    need(terrimp_view_desc_resolve(f->terrain, &desc, &desc));
+    desc.tolerance_px = o->tolerance;
+    desc.ground_tolerance_px = o->ground_tolerance;
+    desc.ground_rule = o->rule;
+    desc.morph_ratio = o->morph;
+    desc.fade_start = o->fade[0];
+    desc.fade_end = o->fade[1];
+    desc.max_angle_rad = o->max_angle_degrees * DEGREE;
+    desc.texels_per_px = o->texels;
+    desc.impostor_px = o->impostor_px;
+    desc.atlas_size = o->atlas;
+    desc.atlas_count = o->atlas_count;
+    desc.max_captures = o->max_captures;
+    desc.max_capture_texels = o->max_capture_texels;
+    desc.max_capture_triangles = o->max_capture_triangles;
+    desc.no_lookahead = o->no_lookahead;
+    desc.no_splits = o->no_splits;
+    desc.no_spreading = o->no_spreading;
+    c->name = name;
+    c->picture = allocate((size_t)o->width * o->height * 3);
+    need(terrimp_view_desc_resolve(f->terrain, &desc, &c->desc));
     need(terrimp_view_create(f->terrain, &desc, NULL, &c->view));
-    return desc.atlas_size;
-}
-
-/* Geometrical mipmapping draws no pictures: its atlases are as small as may be. */
-static uint32_t open_chosen(flyover *f)
-{
-    if (f->options.terrimp_mode)
-        return open_contender(f, &f->chosen, f->options.mode, f->options.terrimp_mode);
-    name_contender(f, &f->chosen, f->options.mode);
-    return 64;
-}
-
-static void open_geomip(flyover *f)
-{
-    terrimp_geomip_view settings;
-    const char *trouble;
-    double start = clock_ms();
-    memset(&settings, 0, sizeof settings);
-    settings.rule = f->options.rule;
-    settings.tolerance_px = f->options.tolerance;
-    settings.morph_ratio = f->options.morph;
-    trouble = gl_geomip_open(&f->geomip, &f->gl, &f->field, f->options.chunk, &settings);
-    if (trouble)
-        stop(trouble);
-    printf("geomip_build_ms %.1f\n", clock_ms() - start);
 }
 
 static void plan_flight(flyover *f)
@@ -260,15 +242,11 @@ static double draw_frame(flyover *f, contender *c, terrimp_camera camera)
 {
     terrimp_callbacks callbacks = gl_terrain_callbacks(&f->gl);
     double start = clock_ms(), ms;
-    if (c->view) {
-        need(terrimp_view_update(c->view, &camera));
-        need(terrimp_view_get_stats(c->view, &c->now));
-    } else {
-        need(gl_geomip_update(&f->geomip, &camera, &c->now));
-    }
+    need(terrimp_view_update(c->view, &camera));
+    need(terrimp_view_get_stats(c->view, &c->now));
     tighten(&camera, &c->now);
     need(gl_terrain_begin(&f->gl, &camera, f->options.sky));
-    need(c->view ? terrimp_view_render(c->view, &callbacks) : gl_geomip_draw(&f->geomip));
+    need(terrimp_view_render(c->view, &callbacks));
     gl_terrain_end(&f->gl);
     ms = clock_ms() - start;
     stats_add(&c->ms, ms);
@@ -294,17 +272,19 @@ static void save_frame(flyover *f, contender *c, size_t frame)
     if (f->options.wireframe) {
         uint8_t *lines = allocate((size_t)width * (size_t)height * 3);
         char name[64];
-        need(c->view ? gl_terrain_wireframe(&f->gl, c->view) : gl_geomip_wireframe(&f->geomip));
+        need(gl_terrain_wireframe(&f->gl, c->view));
         context_read(&f->context, lines);
         snprintf(name, sizeof name, "%s_wireframe", c->name);
         write_picture(f, name, frame, lines, width, height);
         free(lines);
     }
-    for (i = 0; f->options.show_atlas && c == &f->chosen && i < 2; i++) {
+    for (i = 0; f->options.show_atlas && c == &f->chosen && i < (int)c->desc.atlas_count; i++) {
         int side = f->gl.atlas_size;
         uint8_t *atlas = allocate((size_t)side * (size_t)side * 3);
+        char name[64];
+        snprintf(name, sizeof name, "atlas_%d", i);
         if (gl_terrain_read_atlas(&f->gl, i, atlas))
-            write_picture(f, i ? "atlas_1" : "atlas_0", frame, atlas, side, side);
+            write_picture(f, name, frame, atlas, side, side);
         free(atlas);
     }
 }
@@ -344,7 +324,8 @@ static void open_table(flyover *f)
     if (!f->table)
         stop_file(f->options.stats, strerror(errno));
     fprintf(f->table, "frame\tms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
-                      "captured_triangles\tvisible_chunks%s\n",
+                      "captured_triangles\tvisible\tground\timpostors\twaiting\tdue\tshortfall\t"
+                      "parallax_px\treuse%s\n",
             f->options.compare ? "\tfull_ms\tpsnr\tpsnr_terrain" : "");
 }
 
@@ -356,13 +337,16 @@ static void note_frame(flyover *f, size_t frame, double ms, double full_ms)
     f->captured_triangles += s->captured_triangles;
     f->triangles += s->triangles;
     f->draws += s->draws;
-    f->repacks = s->repacks;
+    f->texels_used += s->texels_used;
     if (s->worst_parallax_px > f->worst_parallax_px)
         f->worst_parallax_px = s->worst_parallax_px;
     if (!f->table)
         return;
     fprintf(f->table, "%zu\t%.3f\t%u\t%u\t%u\t%u\t%u\t%u", frame, ms, s->triangles, s->draws,
             s->captures, s->captured_texels, s->captured_triangles, s->visible);
+    fprintf(f->table, "\t%u\t%u\t%u\t%u\t%.3f\t%.3f\t%.1f", s->ground, s->impostors, s->waiting,
+            s->captures_due, (double)s->shortfall, (double)s->worst_parallax_px,
+            (double)s->reuse);
     if (f->options.compare)
         fprintf(f->table, "\t%.3f\t%.2f\t%.2f", full_ms, f->psnr.values[f->psnr.count - 1],
                 f->psnr_terrain.values[f->psnr_terrain.count - 1]);
@@ -396,7 +380,10 @@ static void print_summary(const flyover *f)
     printf("triangles_mean %.0f\ndraws_mean %.1f\n", f->triangles / frames, f->draws / frames);
     printf("captures_mean %.2f\ncaptured_texels_mean %.0f\ncaptured_triangles_mean %.0f\n",
            f->captures / frames, f->captured_texels / frames, f->captured_triangles / frames);
-    printf("repacks %u\nworst_parallax_px %.3f\n", f->repacks, (double)f->worst_parallax_px);
+    printf("reuse %.1f\ntexels_used_mean %.0f\natlas_failures %u\nevictions %u\n",
+           (double)f->chosen.now.reuse, f->texels_used / frames, f->chosen.now.atlas_failures,
+           f->chosen.now.evictions);
+    printf("worst_parallax_px %.3f\n", (double)f->worst_parallax_px);
     if (f->options.compare) {
         stats_summary full = stats_summarise(&f->full.ms);
         stats_print(stdout, "full_ms", full);
@@ -441,7 +428,6 @@ static void close_all(flyover *f)
     stats_free(&f->psnr);
     stats_free(&f->psnr_terrain);
     flight_free(&f->flight);
-    gl_geomip_close(&f->geomip);
     gl_terrain_close(&f->gl);
     context_close(&f->context);
     terrimp_terrain_destroy(f->terrain);
@@ -451,7 +437,6 @@ static void close_all(flyover *f)
 int main(int argc, char **argv)
 {
     static flyover f; /* all zero */
-    uint32_t atlas_size;
     if (!options_parse(&f.options, argc, argv))
         stop(f.options.error);
     if (f.options.help) {
@@ -460,12 +445,10 @@ int main(int argc, char **argv)
     }
     build_terrain(&f);
     plan_flight(&f);
-    atlas_size = open_chosen(&f);
+    open_contender(&f, &f.chosen, f.options.mode, f.options.terrimp_mode);
     if (f.options.compare)
         open_contender(&f, &f.full, "full", TERRIMP_MODE_FULL);
-    open_graphics(&f, atlas_size);
-    if (!f.chosen.view)
-        open_geomip(&f);
+    open_graphics(&f);
     if (f.options.out && mkdir(f.options.out, 0777) != 0 && errno != EEXIST)
         stop_file(f.options.out, strerror(errno));
     open_table(&f);

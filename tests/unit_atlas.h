@@ -425,6 +425,318 @@ static void pair_reports_when_nothing_fits(void)
     CHECK(terrimp_pair_repack(&pair, slots, items, 4, order, NULL) == TERRIMP_OK);
 }
 
+/* ---- the live atlas ---- */
+
+enum { LIVE_SLOTS = 64 };
+
+/* An atlas in a block that is exactly as large as it asks for, and what it should hold. */
+typedef struct live_model {
+    terrimp_live_atlas atlas;
+    void *memory;
+    terrimp_rect taken[LIVE_SLOTS]; /* by handle; width 0: unused */
+    uint32_t count, failures;
+} live_model;
+
+static void live_open(live_model *m, uint32_t width, uint32_t height, uint32_t padding,
+                      uint32_t max_slots)
+{
+    terrimp_live_atlas_desc desc;
+    size_t bytes;
+    memset(m, 0, sizeof *m);
+    memset(&desc, 0, sizeof desc);
+    desc.width = width;
+    desc.height = height;
+    desc.padding = padding;
+    desc.max_slots = max_slots;
+    bytes = terrimp_live_atlas_bytes(&desc);
+    CHECK(bytes > 0);
+    m->memory = malloc(bytes);
+    memset(m->memory, UNTOUCHED, bytes);
+    CHECK(terrimp_live_atlas_init(&m->atlas, &desc, m->memory, bytes) == TERRIMP_OK);
+}
+
+static void live_close(live_model *m)
+{
+    free(m->memory);
+}
+
+/* Whether some place of the atlas is free for a size: tries every corner that slots make. */
+static int live_fits(const live_model *m, uint32_t width, uint32_t height)
+{
+    const terrimp_live_atlas_desc *d = &m->atlas.desc;
+    uint32_t i, j, k;
+    if (m->count == d->max_slots)
+        return 0;
+    for (i = 0; i <= d->max_slots; i++)
+        for (j = 0; j <= d->max_slots; j++) {
+            terrimp_rect rect;
+            rect.x = i == d->max_slots ? 0 : m->taken[i].x + m->taken[i].width + d->padding;
+            rect.y = j == d->max_slots ? 0 : m->taken[j].y + m->taken[j].height + d->padding;
+            rect.width = width;
+            rect.height = height;
+            if ((i < d->max_slots && m->taken[i].width == 0) ||
+                (j < d->max_slots && m->taken[j].width == 0) ||
+                !rect_within(&rect, d->width, d->height))
+                continue;
+            for (k = 0; k < d->max_slots; k++)
+                if (m->taken[k].width > 0 && rects_overlap(&rect, &m->taken[k], d->padding))
+                    break;
+            if (k == d->max_slots)
+                return 1;
+        }
+    return 0;
+}
+
+/* Allocates and holds the outcome to the model. Returns the result. */
+static terrimp_result live_alloc(live_model *m, uint32_t width, uint32_t height)
+{
+    const terrimp_live_atlas_desc *d = &m->atlas.desc;
+    uint32_t slot = 0xabcdu, k;
+    terrimp_rect rect;
+    terrimp_result result = terrimp_live_atlas_alloc(&m->atlas, width, height, &slot);
+    if (result != TERRIMP_OK) {
+        CHECK(result == TERRIMP_E_CAPACITY && slot == 0xabcdu);
+        m->failures++;
+        return result;
+    }
+    CHECK(slot < d->max_slots && m->taken[slot].width == 0);
+    CHECK(terrimp_live_atlas_rect(&m->atlas, slot, &rect) == TERRIMP_OK);
+    CHECK(rect.width == width && rect.height == height);
+    CHECK(rect_within(&rect, d->width, d->height));
+    for (k = 0; k < d->max_slots; k++)
+        CHECK(m->taken[k].width == 0 || !rects_overlap(&rect, &m->taken[k], d->padding));
+    m->taken[slot] = rect;
+    m->count++;
+    return TERRIMP_OK;
+}
+
+static void live_free(live_model *m, uint32_t slot)
+{
+    CHECK(terrimp_live_atlas_free(&m->atlas, slot) == TERRIMP_OK);
+    m->taken[slot].width = 0;
+    m->count--;
+}
+
+/* One in `odds` calls frees a slot at random, if there is one; the others allocate. */
+static void live_churn(live_model *m, uint32_t odds, uint32_t most)
+{
+    uint32_t slot = random_range(0, m->atlas.desc.max_slots - 1u);
+    if (random_range(1, odds) == 1) {
+        if (m->taken[slot].width > 0)
+            live_free(m, slot);
+        return;
+    }
+    (void)live_alloc(m, random_range(1, most), random_range(1, most));
+}
+
+static void live_free_all(live_model *m)
+{
+    uint32_t k, first = random_range(0, m->atlas.desc.max_slots - 1u);
+    for (k = 0; k < m->atlas.desc.max_slots; k++) {
+        uint32_t slot = (first + k) % m->atlas.desc.max_slots;
+        if (m->taken[slot].width > 0)
+            live_free(m, slot);
+    }
+}
+
+/* Slots never overlap nor leave the atlas; an allocation fails only where nothing fits; when all
+   are freed, one slot may take the whole atlas again. */
+static void live_slots_keep_apart_inside_and_find_all_room(void)
+{
+    int run, step, failed = 0;
+    for (run = 0; run < 40; run++) {
+        live_model m;
+        uint32_t width = random_range(1, 200), height = random_range(1, 200);
+        uint32_t most = random_range(1, 60), padding = run % 4 == 0 ? random_range(0, 30) : 1;
+        live_open(&m, width, height, padding, random_range(1, LIVE_SLOTS));
+        for (step = 0; step < 200; step++) {
+            uint32_t w = random_range(1, most), h = random_range(1, most);
+            int fits = live_fits(&m, w, h);
+            CHECK((live_alloc(&m, w, h) == TERRIMP_OK) == fits);
+            failed += !fits;
+            live_churn(&m, 2, most);
+        }
+        live_free_all(&m);
+        CHECK(m.atlas.slot_count == 0 && m.atlas.texels_used == 0);
+        CHECK(live_alloc(&m, width, height) == TERRIMP_OK);
+        CHECK(live_alloc(&m, 1, 1) == TERRIMP_E_CAPACITY);
+        live_close(&m);
+    }
+    CHECK(failed > 1000);
+}
+
+static void live_statistics_count_what_is_there(void)
+{
+    int run, step;
+    for (run = 0; run < 20; run++) {
+        live_model m;
+        uint32_t width = random_range(50, 300), height = random_range(50, 300);
+        live_open(&m, width, height, random_range(0, 2), LIVE_SLOTS);
+        for (step = 0; step < 200; step++) {
+            terrimp_live_atlas_stats stats;
+            uint32_t k, texels = 0;
+            live_churn(&m, 3, 50);
+            CHECK(terrimp_live_atlas_query(&m.atlas, &stats) == TERRIMP_OK);
+            for (k = 0; k < LIVE_SLOTS; k++)
+                texels += m.taken[k].width * m.taken[k].height * (m.taken[k].width > 0);
+            CHECK(stats.slots == m.count && stats.texels_used == texels);
+            CHECK(stats.texels_free == width * height - texels && stats.failures == m.failures);
+            if (stats.largest_width > 0 && m.count < LIVE_SLOTS) {
+                CHECK(live_fits(&m, stats.largest_width, stats.largest_height));
+                CHECK(!live_fits(&m, stats.largest_width + 1u, stats.largest_height));
+                CHECK(!live_fits(&m, stats.largest_width, stats.largest_height + 1u));
+            }
+        }
+        CHECK(terrimp_live_atlas_reset(&m.atlas) == TERRIMP_OK);
+        memset(m.taken, 0, sizeof m.taken);
+        m.count = 0;
+        CHECK(m.atlas.failures == 0 && live_alloc(&m, width, height) == TERRIMP_OK);
+        live_close(&m);
+    }
+}
+
+/* What room says fits, has the shape that was asked for, and is as large as can be. */
+static void live_room_is_the_largest_of_its_shape(void)
+{
+    int run, step, reduced = 0, nothing = 0;
+    for (run = 0; run < 20; run++) {
+        live_model m;
+        live_open(&m, random_range(20, 300), random_range(20, 300), random_range(0, 3), LIVE_SLOTS);
+        for (step = 0; step < 150; step++) {
+            uint32_t width = random_range(1, 150), height = random_range(1, 150), w, h;
+            uint32_t size[2] = {77, 77};
+            live_churn(&m, 2, 60);
+            CHECK(terrimp_live_atlas_room(&m.atlas, width, height, size) == TERRIMP_OK);
+            w = size[0];
+            h = size[1];
+            if (w == width || h == height || w == 0) {
+                CHECK((w == width) == (h == height) && (w == 0) == (h == 0));
+                CHECK(w > 0 ? live_fits(&m, w, h)
+                            : !live_fits(&m, (width - 1u) / height + 1u,
+                                         (height - 1u) / width + 1u));
+                nothing += w == 0;
+                continue;
+            }
+            reduced++;
+            CHECK(live_fits(&m, w, h) && !live_fits(&m, w + 1u, h + 1u));
+            CHECK(w * height < (h + 1u) * width && h * width < (w + 1u) * height);
+        }
+        live_close(&m);
+    }
+    CHECK(reduced > 100 && nothing > 0);
+}
+
+static void live_atlas_is_deterministic(void)
+{
+    int run, step;
+    for (run = 0; run < 10; run++) {
+        live_model a, b;
+        uint32_t seed = random_bits();
+        live_open(&a, 200, 150, 1, LIVE_SLOTS);
+        live_open(&b, 200, 150, 1, LIVE_SLOTS);
+        check_state = seed;
+        for (step = 0; step < 400; step++)
+            live_churn(&a, 2, 40);
+        check_state = seed;
+        for (step = 0; step < 400; step++)
+            live_churn(&b, 2, 40);
+        CHECK(memcmp(a.taken, b.taken, sizeof a.taken) == 0);
+        live_close(&a);
+        live_close(&b);
+    }
+}
+
+/* Refused calls change nothing: neither the struct nor its memory. */
+static void live_atlas_refuses_without_a_change(void)
+{
+    terrimp_live_atlas_desc desc, bad;
+    terrimp_live_atlas atlas, before, unused;
+    terrimp_live_atlas_stats stats;
+    terrimp_rect rect;
+    unsigned char *memory, *copy;
+    uint32_t slot = 77u, size[2], first, k;
+    size_t bytes;
+    memset(&unused, 0, sizeof unused);
+    memset(&desc, 0, sizeof desc);
+    desc.width = 64;
+    desc.height = 32;
+    desc.max_slots = 5;
+    bytes = terrimp_live_atlas_bytes(&desc);
+    memory = (unsigned char *)malloc(bytes + 8u);
+    copy = (unsigned char *)malloc(bytes);
+    for (k = 0; k < 7; k++) {
+        bad = desc;
+        if (k == 0) bad.width = 0;
+        if (k == 1) bad.width = 32769;
+        if (k == 2) bad.height = 0;
+        if (k == 3) bad.height = 0xffffffffu;
+        if (k == 4) bad.padding = 1025;
+        if (k == 5) bad.max_slots = 0;
+        if (k == 6) bad.max_slots = 65537;
+        CHECK(terrimp_live_atlas_bytes(&bad) == 0);
+        memset(&atlas, UNTOUCHED, sizeof atlas);
+        CHECK(terrimp_live_atlas_init(&atlas, &bad, memory, bytes) == TERRIMP_E_RANGE);
+        CHECK(is_untouched(&atlas, sizeof atlas));
+    }
+    CHECK(terrimp_live_atlas_bytes(NULL) == 0);
+    CHECK(terrimp_live_atlas_init(NULL, &desc, memory, bytes) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_init(&atlas, NULL, memory, bytes) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_init(&atlas, &desc, NULL, bytes) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_init(&atlas, &desc, memory + 4, bytes) == TERRIMP_E_ALIGN);
+    CHECK(terrimp_live_atlas_init(&atlas, &desc, memory, bytes - 1u) == TERRIMP_E_MEMORY);
+    CHECK(is_untouched(&atlas, sizeof atlas));
+
+    CHECK(terrimp_live_atlas_init(&atlas, &desc, memory, bytes) == TERRIMP_OK);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 10, 10, &first) == TERRIMP_OK);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 10, 10, &slot) == TERRIMP_OK);
+    CHECK(terrimp_live_atlas_free(&atlas, slot) == TERRIMP_OK);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 64, 33, &k) == TERRIMP_E_CAPACITY);
+    before = atlas;
+    memcpy(copy, memory, bytes);
+    CHECK(terrimp_live_atlas_alloc(NULL, 1, 1, &k) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 1, 1, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 0, 1, &k) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 1, 0, &k) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_free(NULL, first) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_free(&atlas, slot) == TERRIMP_E_STATE); /* twice */
+    CHECK(terrimp_live_atlas_free(&atlas, 4) == TERRIMP_E_STATE);    /* never in use */
+    CHECK(terrimp_live_atlas_free(&atlas, 5) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_free(&atlas, 0xffffffffu) == TERRIMP_E_RANGE);
+    memset(&rect, UNTOUCHED, sizeof rect);
+    CHECK(terrimp_live_atlas_rect(NULL, first, &rect) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_rect(&atlas, first, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_rect(&atlas, slot, &rect) == TERRIMP_E_STATE);
+    CHECK(terrimp_live_atlas_rect(&atlas, 5, &rect) == TERRIMP_E_RANGE);
+    CHECK(is_untouched(&rect, sizeof rect));
+    memset(size, UNTOUCHED, sizeof size);
+    CHECK(terrimp_live_atlas_room(NULL, 1, 1, size) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_room(&atlas, 1, 1, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_room(&atlas, 0, 1, size) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_room(&atlas, 1, 0, size) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_room(&atlas, 65537, 1, size) == TERRIMP_E_RANGE);
+    CHECK(terrimp_live_atlas_room(&atlas, 1, 0xffffffffu, size) == TERRIMP_E_RANGE);
+    CHECK(is_untouched(size, sizeof size));
+    memset(&stats, UNTOUCHED, sizeof stats);
+    CHECK(terrimp_live_atlas_query(NULL, &stats) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_query(&atlas, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_reset(NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_live_atlas_reset(&unused) == TERRIMP_E_STATE);
+    CHECK(terrimp_live_atlas_alloc(&unused, 1, 1, &k) == TERRIMP_E_STATE);
+    CHECK(terrimp_live_atlas_free(&unused, 0) == TERRIMP_E_STATE);
+    CHECK(terrimp_live_atlas_rect(&unused, 0, &rect) == TERRIMP_E_STATE);
+    CHECK(terrimp_live_atlas_room(&unused, 1, 1, size) == TERRIMP_E_STATE);
+    CHECK(terrimp_live_atlas_query(&unused, &stats) == TERRIMP_E_STATE);
+    CHECK(is_untouched(&stats, sizeof stats));
+    CHECK(memcmp(&before, &atlas, sizeof atlas) == 0 && memcmp(copy, memory, bytes) == 0);
+
+    CHECK(terrimp_live_atlas_alloc(&atlas, 65, 1, &k) == TERRIMP_E_CAPACITY);
+    CHECK(terrimp_live_atlas_alloc(&atlas, 1, 0xffffffffu, &k) == TERRIMP_E_CAPACITY);
+    before.failures += 2;
+    CHECK(memcmp(&before, &atlas, sizeof atlas) == 0 && memcmp(copy, memory, bytes) == 0);
+    free(memory);
+    free(copy);
+}
+
 static void atlas_tests(void)
 {
     RUN(packed_rectangles_keep_apart_and_inside);
@@ -436,6 +748,11 @@ static void atlas_tests(void)
     RUN(pair_never_overwrites_a_picture_in_use);
     RUN(pair_reduces_what_does_not_fit);
     RUN(pair_reports_when_nothing_fits);
+    RUN(live_slots_keep_apart_inside_and_find_all_room);
+    RUN(live_statistics_count_what_is_there);
+    RUN(live_room_is_the_largest_of_its_shape);
+    RUN(live_atlas_is_deterministic);
+    RUN(live_atlas_refuses_without_a_change);
 }
 
 #endif

@@ -804,12 +804,12 @@ static void terrain_descriptors_are_refused(void)
     bad = good;
     bad.chunk_quads = 1;
     check_terrain_refused(TERRIMP_E_RANGE, &bad);
-    bad.chunk_quads = 129;
+    bad.chunk_quads = 130;
     check_terrain_refused(TERRIMP_E_RANGE, &bad);
     bad = good;
     bad.triangle_budget = 15;
     check_terrain_refused(TERRIMP_E_RANGE, &bad);
-    bad.triangle_budget = 513;
+    bad.triangle_budget = 401;
     check_terrain_refused(TERRIMP_E_RANGE, &bad);
     bad.triangle_budget = 0xffffffffu;
     check_terrain_refused(TERRIMP_E_RANGE, &bad);
@@ -848,12 +848,12 @@ static void terrains_are_not_read_before_they_are_built(void)
     terrimp_box box;
     terrimp_view *view;
     terrimp_view_desc view_desc, view_out;
-    float xyz[27]; /* enough for the ground of a chunk, and too little for all meshes */
+    float xyz[75]; /* enough for the ground of a node, and too little for all meshes */
     uint16_t indices[600];
     memset(&desc, 0, sizeof desc);
     memset(&view_desc, 0, sizeof view_desc);
     good_field(&desc.field);
-    desc.chunk_quads = 2;
+    desc.chunk_quads = 4;
     CHECK(terrimp_terrain_bytes(&desc) <= sizeof memory);
     CHECK(terrimp_terrain_scratch_bytes(&desc) <= sizeof scratch);
     GIVES(TERRIMP_OK, terrimp_terrain_init(&desc, memory, sizeof memory, &terrain));
@@ -861,8 +861,8 @@ static void terrains_are_not_read_before_they_are_built(void)
     REFUSES(TERRIMP_E_STATE, box, terrimp_terrain_get_box(terrain, 0, &box));
     REFUSES(TERRIMP_E_STATE, mesh, terrimp_terrain_get_mesh(terrain, 0, &mesh));
     REFUSES(TERRIMP_E_STATE, indices, terrimp_terrain_fill_indices(terrain, indices, 600));
-    REFUSES(TERRIMP_E_STATE, xyz, terrimp_terrain_fill_ground(terrain, 0, xyz, 27));
-    REFUSES(TERRIMP_E_STATE, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 27, indices, 600));
+    REFUSES(TERRIMP_E_STATE, xyz, terrimp_terrain_fill_ground(terrain, 0, xyz, 75));
+    REFUSES(TERRIMP_E_STATE, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 75, indices, 600));
     REFUSES(TERRIMP_E_STATE, view_out, terrimp_view_desc_resolve(terrain, &view_desc, &view_out));
     REFUSES(TERRIMP_E_STATE, view, terrimp_view_create(terrain, &view_desc, NULL, &view));
     REFUSES(TERRIMP_E_STATE, view, terrimp_view_init(terrain, &view_desc, memory, 9, &view));
@@ -872,11 +872,11 @@ static void terrains_are_not_read_before_they_are_built(void)
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build(NULL, scratch, sizeof scratch));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build(terrain, NULL, sizeof scratch));
     GIVES(TERRIMP_E_MEMORY, terrimp_terrain_build(terrain, scratch, 0));
-    GIVES(TERRIMP_E_NULL, terrimp_terrain_build_chunk(NULL, 0, scratch, sizeof scratch));
-    GIVES(TERRIMP_E_NULL, terrimp_terrain_build_chunk(terrain, 0, NULL, sizeof scratch));
-    GIVES(TERRIMP_E_RANGE, terrimp_terrain_build_chunk(terrain, 4, scratch, sizeof scratch));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_build_node(NULL, 0, scratch, sizeof scratch));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_build_node(terrain, 0, NULL, sizeof scratch));
+    GIVES(TERRIMP_E_RANGE, terrimp_terrain_build_node(terrain, 4, scratch, sizeof scratch));
     GIVES(TERRIMP_E_RANGE,
-          terrimp_terrain_build_chunk(terrain, 0xffffffffu, scratch, sizeof scratch));
+          terrimp_terrain_build_node(terrain, 0xffffffffu, scratch, sizeof scratch));
     GIVES(TERRIMP_OK, terrimp_terrain_build(terrain, scratch, sizeof scratch));
 
     GIVES(TERRIMP_E_NULL, terrimp_terrain_get_info(terrain, NULL));
@@ -891,15 +891,15 @@ static void terrains_are_not_read_before_they_are_built(void)
     GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_indices(terrain, NULL, 600));
     REFUSES(TERRIMP_E_NULL, indices, terrimp_terrain_fill_indices(NULL, indices, 600));
     REFUSES(TERRIMP_E_CAPACITY, indices, terrimp_terrain_fill_indices(terrain, indices, 5));
-    GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_ground(terrain, 0, NULL, 27));
-    REFUSES(TERRIMP_E_NULL, xyz, terrimp_terrain_fill_ground(NULL, 0, xyz, 27));
-    REFUSES(TERRIMP_E_RANGE, xyz, terrimp_terrain_fill_ground(terrain, 4, xyz, 27));
-    REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_ground(terrain, 0, xyz, 26));
-    REFUSES(TERRIMP_E_NULL, xyz, terrimp_terrain_fill_meshes(NULL, xyz, 27, indices, 600));
-    REFUSES(TERRIMP_E_NULL, indices, terrimp_terrain_fill_meshes(terrain, NULL, 27, indices, 600));
-    REFUSES(TERRIMP_E_NULL, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 27, NULL, 600));
-    REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 26, indices, 600));
-    REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 27, indices, 0));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_ground(terrain, 0, NULL, 75));
+    REFUSES(TERRIMP_E_NULL, xyz, terrimp_terrain_fill_ground(NULL, 0, xyz, 75));
+    REFUSES(TERRIMP_E_RANGE, xyz, terrimp_terrain_fill_ground(terrain, 4, xyz, 75));
+    REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_ground(terrain, 0, xyz, 74));
+    REFUSES(TERRIMP_E_NULL, xyz, terrimp_terrain_fill_meshes(NULL, xyz, 75, indices, 600));
+    REFUSES(TERRIMP_E_NULL, indices, terrimp_terrain_fill_meshes(terrain, NULL, 75, indices, 600));
+    REFUSES(TERRIMP_E_NULL, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 75, NULL, 600));
+    REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 74, indices, 600));
+    REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 75, indices, 0));
 }
 
 /* ---- views ---- */

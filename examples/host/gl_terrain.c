@@ -1,5 +1,6 @@
 #include "gl_terrain.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,21 +8,41 @@
 /* ---- Shaders ------------------------------------------------------------ */
 
 /* All positions are taken relative to the eye first: large coordinates keep their precision. */
-static const char ground_vertex[] =
-    "#version 330 core\n"
-    "in vec3 position;\n"
-    "uniform mat4 matrix;\n"
-    "uniform vec3 eye;\n"
-    "uniform float scale;\n"
-    "uniform vec4 field;\n"
-    "out vec2 uv;\n"
-    "out float distance_to_eye;\n"
-    "void main() {\n"
-    "    vec3 p = position - eye;\n"
-    "    uv = position.xz * field.xy + field.zw;\n"
-    "    distance_to_eye = length(p);\n"
-    "    gl_Position = matrix * vec4(p * scale, 1.0);\n"
-    "}\n";
+#define VERTEX_HEAD                           \
+    "#version 330 core\n"                     \
+    "layout(location = 0) in vec3 position;\n"
+
+#define VERTEX_MAIN                                               \
+    "uniform mat4 matrix;\n"                                      \
+    "uniform vec3 eye;\n"                                         \
+    "uniform float scale;\n"                                      \
+    "uniform vec4 field;\n"                                       \
+    "out vec2 uv;\n"                                              \
+    "void main() {\n"                                             \
+    "    vec3 p = vec3(position.x, height(), position.z) - eye;\n" \
+    "    uv = position.xz * field.xy + field.zw;\n"               \
+    "    gl_Position = matrix * vec4(p * scale, 1.0);\n"          \
+    "}\n"
+
+static const char ground_vertex[] = VERTEX_HEAD
+    "float height() { return position.y; }\n" VERTEX_MAIN;
+
+/* The formula of terrimp_geomip_weights. Sides are in the order Z0, Z1, X0, X1. Vertices that two
+   nodes share get the same sums, bit for bit, since all that differs is a product with 0. */
+const char gl_morphing_vertex[] = VERTEX_HEAD
+    "layout(location = 1) in vec3 move;\n"
+    "layout(location = 2) in vec4 odd;\n"
+    "layout(location = 3) in vec4 even;\n"
+    "layout(location = 4) in vec4 beside;\n"
+    "layout(location = 5) in float self;\n"
+    "uniform float morph;\n"
+    "uniform vec4 side, side_coarse;\n"
+    "float height() {\n"
+    "    float factor = self * morph + dot(odd, side) + dot(even, side_coarse);\n"
+    "    vec4 border = beside * side_coarse;\n"
+    "    vec2 along = vec2(border.x + border.y, border.z + border.w);\n"
+    "    return position.y + factor * (move.x + dot(move.yz, along));\n"
+    "}\n" VERTEX_MAIN;
 
 const char gl_ground_fragment[] =
     "#version 330 core\n"
@@ -33,15 +54,10 @@ const char gl_ground_fragment[] =
 static const char fading_fragment[] =
     "#version 330 core\n"
     "uniform sampler2D lightmap;\n"
-    "uniform vec2 fade;\n"
+    "uniform float alpha;\n"
     "in vec2 uv;\n"
-    "in float distance_to_eye;\n"
     "out vec4 colour;\n"
-    "void main() {\n"
-    "    float alpha = clamp(fade.x - fade.y * distance_to_eye, 0.0, 1.0);\n"
-    "    if (alpha <= 0.0) discard;\n"
-    "    colour = vec4(texture(lightmap, uv).rgb, alpha);\n"
-    "}\n";
+    "void main() { colour = vec4(texture(lightmap, uv).rgb, alpha); }\n";
 
 static const char impostor_vertex[] =
     "#version 330 core\n"
@@ -49,22 +65,22 @@ static const char impostor_vertex[] =
     "uniform mat4 matrix, texture_matrix;\n"
     "uniform vec3 eye;\n"
     "uniform float scale;\n"
-    "out vec3 stq;\n"
+    "out vec4 strq;\n"
     "void main() {\n"
-    "    stq = (texture_matrix * vec4(position, 1.0)).xyw;\n"
+    "    strq = texture_matrix * vec4(position, 1.0);\n"
     "    gl_Position = matrix * vec4((position - eye) * scale, 1.0);\n"
     "}\n";
 
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
-   them; the division brings them back. */
+   them; the division brings them back. Of a picture in two parts each keeps to its own depths. */
 static const char impostor_fragment[] =
     "#version 330 core\n"
     "uniform sampler2D atlas;\n"
-    "in vec3 stq;\n"
+    "in vec4 strq;\n"
     "out vec4 colour;\n"
     "void main() {\n"
-    "    vec4 c = textureProj(atlas, stq);\n"
-    "    if (c.a < 0.5) discard;\n"
+    "    vec4 c = textureProj(atlas, strq.xyw);\n"
+    "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
     "    colour = vec4(c.rgb / c.a, 1.0);\n"
     "}\n";
 
@@ -111,7 +127,10 @@ gl_program gl_program_make(const char *vertex_source, const char *fragment_sourc
     p.eye = glGetUniformLocation(p.id, "eye");
     p.scale = glGetUniformLocation(p.id, "scale");
     p.field = glGetUniformLocation(p.id, "field");
-    p.fade = glGetUniformLocation(p.id, "fade");
+    p.alpha = glGetUniformLocation(p.id, "alpha");
+    p.morph = glGetUniformLocation(p.id, "morph");
+    p.side = glGetUniformLocation(p.id, "side");
+    p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
     p.tint = glGetUniformLocation(p.id, "tint");
     return p;
@@ -131,29 +150,126 @@ static void make_array(GLuint *array, GLuint *vertices, GLuint *indices)
     glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
 }
 
-/* All chunks stand one after the other in one buffer: a draw names its chunk by the base vertex. */
-static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain *terrain,
-                                  const terrimp_terrain_info *info)
+/* Bytes of graphics memory that the vertices of ground may take. */
+#define POOL_BYTES ((size_t)400 << 20)
+
+/* Sends a node's vertices to a slot. */
+static terrimp_result fill_slot(gl_terrain *g, uint32_t node, uint32_t slot)
 {
-    uint32_t chunk, chunks = info->chunks_x * info->chunks_z;
-    size_t floats = (size_t)info->ground_vertex_count * 3;
+    gl_pool *p = &g->pool;
+    size_t bytes = p->node_vertices * 3 * sizeof *p->xyz;
+    terrimp_result result = terrimp_terrain_fill_ground(g->terrain, node, p->xyz,
+                                                        (size_t)p->node_vertices * 3);
+    if (result != TERRIMP_OK)
+        return result;
+    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
+    glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(slot * bytes), (GLsizeiptr)bytes, p->xyz);
+    if (!p->moves)
+        return TERRIMP_OK;
+    bytes = p->node_vertices * sizeof *p->morph;
+    result = terrimp_terrain_fill_morph(g->terrain, node, p->morph, p->node_vertices);
+    glBindBuffer(GL_ARRAY_BUFFER, p->moves);
+    glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(slot * bytes), (GLsizeiptr)bytes, p->morph);
+    return result;
+}
+
+/* The slot that was drawn longest ago. */
+static uint32_t oldest_slot(const gl_pool *p)
+{
+    uint32_t i, oldest = 0;
+    for (i = 1; i < p->slot_count; i++)
+        if (p->used[i] < p->used[oldest])
+            oldest = i;
+    return oldest;
+}
+
+static void flush(gl_terrain *g);
+
+/* The slot with a node's vertices; they are made when they are not there. */
+static uint32_t slot_of(gl_terrain *g, uint32_t node)
+{
+    gl_pool *p = &g->pool;
+    uint32_t slot = p->slot_of[node];
+    if (slot == UINT32_MAX) {
+        if (p->filled < p->slot_count) {
+            slot = p->filled++;
+        } else {
+            slot = oldest_slot(p);
+            p->slot_of[p->node_of[slot]] = UINT32_MAX;
+            if (p->used[slot] == g->frame_number)
+                flush(g); /* what waits may need the vertices that go */
+        }
+        p->slot_of[node] = slot;
+        p->node_of[slot] = node;
+        fill_slot(g, node, slot);
+    }
+    p->used[slot] = g->frame_number;
+    return slot;
+}
+
+/* Nodes stand one after the other in one buffer: a draw names its node by the base vertex. If all
+   nodes fit they are made now, so that no frame pays for them. */
+static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *info)
+{
+    gl_pool *p = &g->pool;
+    size_t bytes = info->ground_vertex_count * 3 * sizeof *p->xyz, i;
     terrimp_result result = TERRIMP_E_MEMORY;
     uint16_t *indices;
-    float *vertices;
-    make_array(&g->ground_array, &g->ground_vertices, &g->ground_indices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(chunks * floats * sizeof *vertices), NULL,
-                 GL_STATIC_DRAW);
+    p->node_vertices = info->ground_vertex_count;
+    p->node_count = info->node_count;
+    p->slot_count = (uint32_t)(POOL_BYTES / bytes);
+    if (p->slot_count > p->node_count)
+        p->slot_count = p->node_count;
+    p->slot_of = malloc(p->node_count * sizeof *p->slot_of);
+    p->node_of = calloc(p->slot_count, sizeof *p->node_of);
+    p->used = calloc(p->slot_count, sizeof *p->used);
+    p->xyz = malloc(bytes);
+    p->morph = malloc(p->node_vertices * sizeof *p->morph);
+    if (!p->slot_of || !p->node_of || !p->used || !p->xyz || !p->morph)
+        return result;
+    memset(p->slot_of, 0xff, p->node_count * sizeof *p->slot_of);
+    make_array(&p->array, &p->vertices, &g->ground_indices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(p->slot_count * bytes), NULL, GL_STATIC_DRAW);
     glBufferData(GL_ELEMENT_ARRAY_BUFFER,
                  (GLsizeiptr)(info->ground_index_count * sizeof *indices), NULL, GL_STATIC_DRAW);
-    vertices = glMapBuffer(GL_ARRAY_BUFFER, GL_WRITE_ONLY);
     indices = glMapBuffer(GL_ELEMENT_ARRAY_BUFFER, GL_WRITE_ONLY);
-    if (vertices && indices)
-        result = terrimp_terrain_fill_indices(terrain, indices, info->ground_index_count);
-    for (chunk = 0; result == TERRIMP_OK && chunk < chunks; chunk++)
-        result = terrimp_terrain_fill_ground(terrain, chunk, vertices + chunk * floats, floats);
-    glUnmapBuffer(GL_ARRAY_BUFFER);
+    if (indices)
+        result = terrimp_terrain_fill_indices(g->terrain, indices, info->ground_index_count);
     glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
+    if (p->slot_count == p->node_count)
+        for (i = 0; i < p->node_count; i++)
+            slot_of(g, (uint32_t)i);
     return result;
+}
+
+const char *gl_terrain_use_morphing(gl_terrain *g)
+{
+    gl_pool *p = &g->pool;
+    terrimp_geomip_weights *weights = malloc(p->node_vertices * sizeof *weights);
+    terrimp_terrain_info info;
+    uint32_t i;
+    if (!weights)
+        return "no memory for the morph weights";
+    terrimp_terrain_get_info(g->terrain, &info);
+    terrimp_geomip_fill_weights(info.chunk_quads, weights);
+    g->morphing = gl_program_make(gl_morphing_vertex, gl_ground_fragment);
+    glGenBuffers(1, &p->weights);
+    glBindBuffer(GL_ARRAY_BUFFER, p->weights);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(p->node_vertices * sizeof *weights), weights,
+                 GL_STATIC_DRAW);
+    free(weights);
+    glGenBuffers(1, &p->moves);
+    glBindBuffer(GL_ARRAY_BUFFER, p->moves);
+    glBufferData(GL_ARRAY_BUFFER,
+                 (GLsizeiptr)((size_t)p->slot_count * p->node_vertices * sizeof *p->morph), NULL,
+                 GL_STATIC_DRAW);
+    for (i = 0; i < p->filled; i++)
+        fill_slot(g, p->node_of[i], i);
+    if (!g->morphing.id)
+        return "a shader does not compile";
+    glUseProgram(g->morphing.id);
+    glUniform4fv(g->morphing.field, 1, g->field);
+    return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for morphing";
 }
 
 static terrimp_result fill_meshes(gl_terrain *g, const terrimp_terrain *terrain,
@@ -189,43 +305,59 @@ static GLuint make_texture(GLint least, GLint most)
     return texture;
 }
 
-/* Texel centres lie on the samples. */
-static void make_lightmap(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *rgb)
+/* Texel centres lie on the samples; where OpenGL's largest texture is too small, on some of them. */
+static int make_lightmap(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *rgb,
+                         uint32_t limit)
 {
-    float step_x = 1.0f / (field->spacing_x * (float)field->width);
-    float step_z = 1.0f / (field->spacing_z * (float)field->depth);
+    uint32_t width = field->width, depth = field->depth, step = 1, x, z;
+    uint8_t *smaller = NULL;
+    float step_x, step_z;
+    while (width > limit || depth > limit)
+        step *= 2, width = (field->width - 1) / step + 1, depth = (field->depth - 1) / step + 1;
+    if (step > 1) {
+        smaller = malloc((size_t)width * depth * 3);
+        if (!smaller)
+            return 0;
+        for (z = 0; z < depth; z++)
+            for (x = 0; x < width; x++)
+                memcpy(smaller + ((size_t)z * width + x) * 3,
+                       rgb + ((size_t)z * step * field->width + (size_t)x * step) * 3, 3);
+        rgb = smaller;
+    }
+    step_x = 1.0f / (field->spacing_x * (float)step * (float)width);
+    step_z = 1.0f / (field->spacing_z * (float)step * (float)depth);
     g->field[0] = step_x;
     g->field[1] = step_z;
-    g->field[2] = 0.5f / (float)field->width - field->origin_x * step_x;
-    g->field[3] = 0.5f / (float)field->depth - field->origin_z * step_z;
+    g->field[2] = 0.5f / (float)width - field->origin_x * step_x;
+    g->field[3] = 0.5f / (float)depth - field->origin_z * step_z;
     g->lightmap = make_texture(GL_LINEAR_MIPMAP_LINEAR, GL_LINEAR);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, (GLsizei)field->width, (GLsizei)field->depth, 0,
-                 GL_RGB, GL_UNSIGNED_BYTE, rgb);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, (GLsizei)width, (GLsizei)depth, 0, GL_RGB,
+                 GL_UNSIGNED_BYTE, rgb);
     glGenerateMipmap(GL_TEXTURE_2D);
+    free(smaller);
+    return 1;
 }
 
-static int make_atlases(gl_terrain *g, GLsizei size)
+static int make_atlas(gl_terrain *g, uint32_t i)
 {
-    int i, complete = 1;
-    g->atlas_size = size;
-    glGenRenderbuffers(1, &g->atlas_depth);
-    glBindRenderbuffer(GL_RENDERBUFFER, g->atlas_depth);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, size, size);
-    glGenFramebuffers(2, g->atlas_frame);
-    for (i = 0; i < 2; i++) {
-        g->atlas[i] = make_texture(GL_LINEAR, GL_LINEAR);
-        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, size, size, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);
-        glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[i]);
-        glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, g->atlas[i],
-                               0);
-        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
-                                  g->atlas_depth);
-        complete &= glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-        glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
-        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    if (!g->atlas_depth) {
+        glGenRenderbuffers(1, &g->atlas_depth);
+        glBindRenderbuffer(GL_RENDERBUFFER, g->atlas_depth);
+        glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, g->atlas_size, g->atlas_size);
     }
-    return complete;
+    g->atlas[i] = make_texture(GL_LINEAR, GL_LINEAR);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, g->atlas_size, g->atlas_size, 0, GL_RGBA,
+                 GL_UNSIGNED_BYTE, NULL);
+    glGenFramebuffers(1, &g->atlas_frame[i]);
+    glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[i]);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, g->atlas[i], 0);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
+                              g->atlas_depth);
+    glDisable(GL_SCISSOR_TEST);
+    glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
 static void set_field(const gl_terrain *g, const gl_program *p)
@@ -241,20 +373,20 @@ static const char *fill(gl_terrain *g, const terrimp_terrain *terrain,
     terrimp_terrain_info info;
     GLint limit = 0;
     terrimp_result result = terrimp_terrain_get_info(terrain, &info);
+    g->terrain = terrain;
     if (result == TERRIMP_OK)
-        result = fill_ground(g, terrain, &info);
+        result = fill_ground(g, &info);
     if (result == TERRIMP_OK)
         result = fill_meshes(g, terrain, &info);
     if (result != TERRIMP_OK)
         return terrimp_result_text((int)result);
-    g->chunk_vertices = info.ground_vertex_count;
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
-    if (field->width > (uint32_t)limit || field->depth > (uint32_t)limit)
-        return "the lightmap is larger than OpenGL's largest texture";
     if (atlas_size > (uint32_t)limit)
         return "the atlas is larger than OpenGL's largest texture";
-    make_lightmap(g, field, lightmap);
-    if (!make_atlases(g, (GLsizei)atlas_size))
+    if (!make_lightmap(g, field, lightmap, (uint32_t)limit))
+        return "no memory for the lightmap";
+    g->atlas_size = (GLsizei)atlas_size;
+    if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
     g->ground = gl_program_make(ground_vertex, gl_ground_fragment);
     g->fading = gl_program_make(ground_vertex, fading_fragment);
@@ -286,15 +418,22 @@ const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_t
 
 void gl_terrain_close(gl_terrain *g)
 {
-    const GLuint arrays[2] = { g->ground_array, g->mesh_array };
-    const GLuint buffers[4] = { g->ground_vertices, g->ground_indices, g->mesh_vertices,
-                                g->mesh_indices };
+    gl_pool *p = &g->pool;
+    const GLuint arrays[2] = { p->array, g->mesh_array };
+    const GLuint buffers[6] = { p->vertices, p->moves, p->weights, g->ground_indices,
+                                g->mesh_vertices, g->mesh_indices };
     glDeleteVertexArrays(2, arrays);
-    glDeleteBuffers(4, buffers);
+    glDeleteBuffers(6, buffers);
     glDeleteTextures(1, &g->lightmap);
-    glDeleteTextures(2, g->atlas);
-    glDeleteFramebuffers(2, g->atlas_frame);
+    glDeleteTextures(GL_ATLASES, g->atlas);
+    glDeleteFramebuffers(GL_ATLASES, g->atlas_frame);
     glDeleteRenderbuffers(1, &g->atlas_depth);
+    glDeleteProgram(g->morphing.id);
+    free(p->slot_of);
+    free(p->node_of);
+    free(p->used);
+    free(p->xyz);
+    free(p->morph);
     glDeleteProgram(g->ground.id);
     glDeleteProgram(g->fading.id);
     glDeleteProgram(g->impostor.id);
@@ -338,19 +477,18 @@ static void use_program(const gl_program *p, const float matrix[16], const float
 static void flush(gl_terrain *g)
 {
     gl_batch *b = &g->batch;
-    const gl_program *p = b->fade_end > 0.0f ? &g->fading : &g->ground;
+    const gl_program *p = b->alpha < 1.0f ? &g->fading : &g->ground;
     if (!b->count)
         return;
     if (g->lines)
         p = &g->line;
     glUseProgram(p->id);
-    glBindVertexArray(g->ground_array);
+    glBindVertexArray(g->pool.array);
     glBindTexture(GL_TEXTURE_2D, g->lightmap);
     glUniform1f(p->scale, 1.0f + b->depth_bias);
     glUniform3f(p->tint, 0.05f, 0.10f, 0.25f);
     if (p == &g->fading) {
-        float slope = 1.0f / (b->fade_end - b->fade_start);
-        glUniform2f(p->fade, b->fade_end * slope, slope);
+        glUniform1f(p->alpha, b->alpha);
         glEnable(GL_BLEND);
     }
     glMultiDrawElementsBaseVertex(GL_TRIANGLES, b->counts, GL_UNSIGNED_SHORT, b->offsets,
@@ -374,6 +512,8 @@ void gl_terrain_turn_to_frame(gl_terrain *g)
         g->cleared = 1;
     }
     use_program(&g->line, g->camera_matrix, g->camera_eye);
+    if (g->morphing.id)
+        use_program(&g->morphing, g->camera_matrix, g->camera_eye);
     use_program(&g->impostor, g->camera_matrix, g->camera_eye);
     use_program(&g->fading, g->camera_matrix, g->camera_eye);
     use_program(&g->ground, g->camera_matrix, g->camera_eye);
@@ -386,6 +526,8 @@ static void turn_to_atlas(gl_terrain *g, int atlas)
     if (g->target == atlas)
         return;
     flush(g);
+    if (!g->atlas[atlas])
+        make_atlas(g, (uint32_t)atlas);
     g->target = atlas;
     glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[atlas]);
     glEnable(GL_SCISSOR_TEST);
@@ -403,7 +545,7 @@ static void begin_capture(void *user, const terrimp_capture_command *command)
     turn_to_atlas(g, (int)command->atlas);
     glViewport((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
     glScissor((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    glClear((command->clear ? GL_COLOR_BUFFER_BIT : 0u) | GL_DEPTH_BUFFER_BIT);
     relative_matrix(command->view, command->projection, matrix);
     use_program(&g->ground, matrix, command->eye);
 }
@@ -459,25 +601,100 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
               c->depth_bias);
 }
 
+static void point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset)
+{
+    glEnableVertexAttribArray(location);
+    glVertexAttribPointer(location, size, type, GL_FALSE, (GLsizei)stride,
+                          (const void *)(uintptr_t)offset);
+}
+
+/* A morphing node is a draw of its own: its factors are uniforms. */
+static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32_t slot)
+{
+    const gl_pool *p = &g->pool;
+    size_t vertices = (size_t)slot * p->node_vertices;
+    size_t stride = sizeof(terrimp_geomip_weights);
+    flush(g);
+    glUseProgram(g->morphing.id);
+    glBindTexture(GL_TEXTURE_2D, g->lightmap);
+    glUniform1f(g->morphing.scale, 1.0f + c->depth_bias);
+    glUniform1f(g->morphing.morph, c->morph);
+    glUniform4fv(g->morphing.side, 1, c->side);
+    glUniform4fv(g->morphing.side_coarse, 1, c->side_coarse);
+    glBindVertexArray(p->array);
+    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
+    point(0, 3, GL_FLOAT, 0, vertices * 3 * sizeof(float));
+    glBindBuffer(GL_ARRAY_BUFFER, p->moves);
+    point(1, 3, GL_FLOAT, sizeof *p->morph,
+          vertices * sizeof *p->morph + offsetof(terrimp_geomip_vertex, move));
+    glBindBuffer(GL_ARRAY_BUFFER, p->weights);
+    point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
+    point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
+    point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
+    point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
+    glDrawElements(GL_TRIANGLES, (GLsizei)c->index_count, GL_UNSIGNED_SHORT,
+                   index_offset(c->first_index));
+    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
+    point(0, 3, GL_FLOAT, 0, 0);
+}
+
 static void draw_ground(void *user, const terrimp_ground_command *command)
 {
     gl_terrain *g = (gl_terrain *)user;
     gl_batch *b = &g->batch;
+    uint32_t slot;
     GLsizei i;
     if (g->capturing && g->lines)
         return;
     if (!g->capturing)
         gl_terrain_turn_to_frame(g);
-    if (b->count == GL_BATCH || b->fade_start != command->fade_start
-        || b->fade_end != command->fade_end || b->depth_bias != command->depth_bias)
+    slot = slot_of(g, command->node);
+    if (g->morphing.id && !g->capturing && !g->lines && command->alpha >= 1.0f) {
+        draw_morphing(g, command, slot);
+        return;
+    }
+    if (b->count == GL_BATCH || b->alpha != command->alpha
+        || b->depth_bias != command->depth_bias)
         flush(g);
-    b->fade_start = command->fade_start;
-    b->fade_end = command->fade_end;
+    b->alpha = command->alpha;
     b->depth_bias = command->depth_bias;
     i = b->count++;
     b->counts[i] = (GLsizei)command->index_count;
     b->offsets[i] = index_offset(command->first_index);
-    b->base_vertices[i] = (GLint)(command->node * g->chunk_vertices);
+    b->base_vertices[i] = (GLint)(slot * g->pool.node_vertices);
+}
+
+terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node)
+{
+    terrimp_terrain_info info;
+    terrimp_mesh_info mesh;
+    terrimp_result result = terrimp_terrain_get_info(g->terrain, &info);
+    float *xyz;
+    uint16_t *indices;
+    if (result == TERRIMP_OK && g->pool.slot_of[node] != UINT32_MAX)
+        result = fill_slot(g, node, g->pool.slot_of[node]);
+    if (result == TERRIMP_OK)
+        result = terrimp_terrain_get_mesh(g->terrain, node, &mesh);
+    if (result != TERRIMP_OK)
+        return result;
+    xyz = malloc(info.mesh_vertex_stride * 3 * sizeof *xyz);
+    indices = malloc(info.mesh_index_stride * sizeof *indices);
+    if (xyz && indices)
+        result = terrimp_terrain_fill_mesh(g->terrain, node, xyz, info.mesh_vertex_stride * 3,
+                                           indices, info.mesh_index_stride);
+    else
+        result = TERRIMP_E_MEMORY;
+    if (result == TERRIMP_OK) {
+        glBindVertexArray(g->mesh_array);
+        glBindBuffer(GL_ARRAY_BUFFER, g->mesh_vertices);
+        glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(mesh.base_vertex * 3 * sizeof *xyz),
+                        (GLsizeiptr)(mesh.vertex_count * 3 * sizeof *xyz), xyz);
+        glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(mesh.first_index * sizeof *indices),
+                        (GLsizeiptr)(mesh.index_count * sizeof *indices), indices);
+    }
+    free(xyz);
+    free(indices);
+    return result;
 }
 
 /* ---- A frame ------------------------------------------------------------ */
@@ -494,6 +711,7 @@ terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
     memcpy(g->sky, sky, sizeof g->sky);
     g->target = GL_TO_NOTHING;
     g->cleared = 0;
+    g->frame_number++;
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LEQUAL);
     glEnable(GL_CULL_FACE);

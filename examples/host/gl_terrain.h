@@ -10,7 +10,8 @@ typedef struct gl_program {
     GLuint id;
     GLint matrix, eye, scale;        /* all: vertices are drawn at eye + (p - eye) * scale */
     GLint field;                     /* ground: world x, z to lightmap coordinates */
-    GLint fade;                      /* fading ground: alpha = x - y * distance */
+    GLint alpha;                     /* fading ground */
+    GLint morph, side, side_coarse;  /* morphing ground */
     GLint texture_matrix;            /* impostors */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
 } gl_program;
@@ -30,18 +31,35 @@ typedef struct gl_batch {
     const void *offsets[GL_BATCH];
     GLint base_vertices[GL_BATCH];
     GLsizei count;
-    float fade_start, fade_end, depth_bias;
+    float alpha, depth_bias;
 } gl_batch;
+
+/* The vertices of ground nodes: as many as fit its buffer, those that were drawn last. */
+typedef struct gl_pool {
+    GLuint array, vertices, moves, weights; /* moves and weights: with morphing */
+    uint32_t node_vertices;          /* of one node */
+    uint32_t slot_count, node_count;
+    uint32_t filled;                 /* slots that have been filled so far */
+    uint32_t *slot_of;               /* [node_count] UINT32_MAX: not there */
+    uint32_t *node_of, *used;        /* [slot_count] node, and frame that drew it last */
+    float *xyz;                      /* of one node, to be sent */
+    terrimp_geomip_vertex *morph;
+} gl_pool;
+
+enum { GL_ATLASES = 16 };
 
 typedef struct gl_terrain {
     const context *frame;
-    uint32_t chunk_vertices;         /* of one chunk's ground */
-    GLuint ground_array, ground_vertices, ground_indices;
+    const terrimp_terrain *terrain;
+    gl_pool pool;
+    uint32_t frame_number;
+    GLuint ground_indices;
     GLuint mesh_array, mesh_vertices, mesh_indices;
     GLuint lightmap;
     GLsizei atlas_size;
-    GLuint atlas[2], atlas_frame[2], atlas_depth; /* one depth buffer serves both */
-    gl_program ground, fading, impostor, line;
+    GLuint atlas[GL_ATLASES], atlas_frame[GL_ATLASES]; /* made when they are first used */
+    GLuint atlas_depth;              /* one depth buffer serves all */
+    gl_program ground, fading, morphing, impostor, line;
     float camera_matrix[16], camera_eye[3];
     float field[4];                  /* x, z scale and offset of the lightmap coordinates */
     gl_batch batch;
@@ -52,11 +70,18 @@ typedef struct gl_terrain {
     int lines;                       /* draw outlines, and no captures */
 } gl_terrain;
 
-/* Fills the buffers of a built terrain. The lightmap is rgb[depth][width][3] of the field's size.
-   Returns null, or one line that says what is wrong; then there is nothing to close. */
+/* Fills the buffers of a built terrain, which outlives them. The lightmap is rgb[depth][width][3]
+   of the field's size. Returns null, or one line that says what is wrong; then there is nothing to
+   close. */
 const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_terrain *terrain,
                             const terrimp_heightfield *field, const uint8_t *lightmap,
                             uint32_t atlas_size);
+
+/* Prepares for ground commands that morph. Returns null, or what is wrong. */
+const char *gl_terrain_use_morphing(gl_terrain *g);
+
+/* After an edit: sends a node's ground and its coarse mesh anew. */
+terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node);
 
 /* Starts a frame: clears it to the sky's colour and takes the camera's matrices. */
 terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,

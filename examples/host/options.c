@@ -97,16 +97,15 @@ static int take_format(const char *text, int *format)
 
 static int take_mode(options *o, const char *text)
 {
+    static const char *const names[] = { "full", "geomip", "impostor", "auto" };
+    int i;
     o->mode = text;
-    if (strcmp(text, "full") == 0)
-        o->terrimp_mode = TERRIMP_MODE_FULL;
-    else if (strcmp(text, "impostor") == 0)
-        o->terrimp_mode = TERRIMP_MODE_IMPOSTOR;
-    else if (strcmp(text, "geomip") == 0)
-        o->terrimp_mode = 0;
-    else
-        return 0;
-    return 1;
+    for (i = 0; i < 4; i++)
+        if (strcmp(text, names[i]) == 0) {
+            o->terrimp_mode = TERRIMP_MODE_FULL + i;
+            return 1;
+        }
+    return 0;
 }
 
 static int take_rule(const char *text, int *rule)
@@ -146,8 +145,9 @@ static int take_colour(const char *text, uint8_t colour[3])
 
 typedef enum option_id {
     DEM, FORMAT, RAW_SIZE, CROP, TERRAIN_SIZE, SEED, SPACING, HEIGHT_SCALE, MODE, SIZE, FOV, SKY,
-    FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, TEXELS, ATLAS, MAX_CAPTURES, RULE,
-    MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
+    FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
+    IMPOSTOR_PX, ATLAS, ATLAS_COUNT, MAX_CAPTURES, MAX_CAPTURE_TEXELS, MAX_CAPTURE_TRIANGLES,
+    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
 } option_id;
 
 typedef struct option {
@@ -164,7 +164,7 @@ static const option table[OPTION_COUNT] = {
     { SEED, "--seed", "N", "of the procedural terrain [1]" },
     { SPACING, "--spacing", "X[,Z]", "units between samples [1; a .hgt: metres]" },
     { HEIGHT_SCALE, "--height-scale", "S", "units for a step of a sample [1]" },
-    { MODE, "--mode", "full|impostor|geomip", "how to draw [impostor]" },
+    { MODE, "--mode", "full|geomip|impostor|auto", "how to draw [auto]" },
     { SIZE, "--size", "WxH", "of the picture in pixels [1280x1024]" },
     { FOV, "--fov", "DEG", "vertical field of view [60]" },
     { SKY, "--sky", "RRGGBB", "colour behind the terrain [a8c8e8]" },
@@ -175,12 +175,20 @@ static const option table[OPTION_COUNT] = {
     { CHUNK, "--chunk", "QUADS", "along the side of a chunk [64]" },
     { FADE, "--fade", "START,END", "distances between which ground gives way to impostors" },
     { MAX_ANGLE, "--max-angle", "DEG", "view angle that outdates a picture [5]" },
-    { TOLERANCE, "--tolerance", "PIXELS", "error that outdates a picture; geomip: of a node [1]" },
+    { TOLERANCE, "--tolerance", "PIXELS", "error that outdates a picture [1]" },
+    { GROUND_TOLERANCE, "--ground-tolerance", "PIXELS", "error of ground, but in full [half of it]" },
     { TEXELS, "--texels", "N", "texels for a pixel in a new picture [2]" },
-    { ATLAS, "--atlas", "N", "texels along the side of each of the two atlases [4096]" },
-    { MAX_CAPTURES, "--max-captures", "N", "pictures renewed in one frame [no limit]" },
-    { RULE, "--rule", "picture|bound|distance", "of geomip: what is tolerated [picture]" },
-    { MORPH, "--morph", "RATIO", "of geomip: of the distances where nodes morph [1: not]" },
+    { IMPOSTOR_PX, "--impostor-px", "PIXELS", "side of an impostor before it is split [320]" },
+    { ATLAS, "--atlas", "N", "texels along the side of an atlas [4096]" },
+    { ATLAS_COUNT, "--atlas-count", "N", "atlases [1]" },
+    { MAX_CAPTURES, "--max-captures", "N", "pictures begun in one frame [64]" },
+    { MAX_CAPTURE_TEXELS, "--max-capture-texels", "N", "their texels [no limit]" },
+    { MAX_CAPTURE_TRIANGLES, "--max-capture-triangles", "N", "their triangles [no limit]" },
+    { NO_LOOKAHEAD, "--no-lookahead", NULL, "pictures are made from where the eye is" },
+    { NO_SPLITS, "--no-splits", NULL, "no picture in two parts" },
+    { NO_SPREADING, "--no-spreading", NULL, "pictures are renewed when they are due" },
+    { RULE, "--rule", "picture|bound|distance", "of ground: what is tolerated [picture]" },
+    { MORPH, "--morph", "RATIO", "of ground: of the distances where nodes morph [1: not]" },
     { OUT, "--out", "DIR", "directory for the pictures; made if it is missing" },
     { SAVE_EVERY, "--save-every", "N", "save every Nth frame" },
     { SAVE_FRAMES, "--save-frames", "LIST", "save these frames: 0,10,20" },
@@ -233,13 +241,22 @@ static int take(options *o, option_id id, const char *text)
     case SPEED: return take_positive(text, &o->speed);
     case FPS: return take_positive(text, &o->fps);
     case PATH: return take_text(text, &o->path);
-    case CHUNK: return take_unsigned(text, &o->chunk) && o->chunk >= 2 && o->chunk <= 128;
+    case CHUNK: return take_unsigned(text, &o->chunk) && o->chunk >= 4 && o->chunk <= 128
+                       && o->chunk % 2 == 0;
     case FADE: return take_fade(text, o->fade);
     case MAX_ANGLE: return take_number(text, 0.06f, 85.0f, &o->max_angle_degrees);
     case TOLERANCE: return take_number(text, 0.05f, 100.0f, &o->tolerance);
     case TEXELS: return take_number(text, 0.1f, 8.0f, &o->texels);
     case ATLAS: return take_unsigned(text, &o->atlas) && o->atlas >= 64 && o->atlas <= 32768;
-    case MAX_CAPTURES: return take_unsigned(text, &o->max_captures);
+    case GROUND_TOLERANCE: return take_number(text, 0.05f, 100.0f, &o->ground_tolerance);
+    case IMPOSTOR_PX: return take_number(text, 8.0f, 4096.0f, &o->impostor_px);
+    case ATLAS_COUNT: return take_unsigned(text, &o->atlas_count) && o->atlas_count <= 16;
+    case MAX_CAPTURES: return take_unsigned(text, &o->max_captures) && o->max_captures <= 1024;
+    case MAX_CAPTURE_TEXELS: return take_unsigned(text, &o->max_capture_texels);
+    case MAX_CAPTURE_TRIANGLES: return take_unsigned(text, &o->max_capture_triangles);
+    case NO_LOOKAHEAD: return take_flag(&o->no_lookahead);
+    case NO_SPLITS: return take_flag(&o->no_splits);
+    case NO_SPREADING: return take_flag(&o->no_spreading);
     case RULE: return take_rule(text, &o->rule);
     case MORPH: return take_number(text, 1.0f, 4.0f, &o->morph);
     case OUT: return take_text(text, &o->out);
@@ -259,8 +276,8 @@ static void set_defaults(options *o)
 {
     static const uint8_t light_blue[3] = { 0xa8, 0xc8, 0xe8 };
     memset(o, 0, sizeof *o);
-    o->mode = "impostor";
-    o->terrimp_mode = TERRIMP_MODE_IMPOSTOR;
+    o->mode = "auto";
+    o->terrimp_mode = TERRIMP_MODE_AUTO;
     o->terrain_size = 2049;
     o->seed = 1;
     o->width = 1280;

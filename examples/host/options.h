@@ -11,8 +11,8 @@ enum { OPTIONS_MAX_SAVED = 256 };
 
 /* Numbers that were not given are 0, texts are null: the program or the library has a default. */
 typedef struct options {
-    const char *mode;                  /* as written; default "impostor" */
-    int terrimp_mode;                  /* what it means to the library; 0: geometrical mipmapping */
+    const char *mode;                  /* as written; default "auto" */
+    int terrimp_mode;                  /* what it means to the library */
     const char *dem, *path, *out, *stats;
     dem_desc file;                     /* --format, --raw-size, --crop */
     uint32_t terrain_size, seed;
@@ -21,8 +21,10 @@ typedef struct options {
     uint32_t frames;
     float speed, fps;
     float spacing[2], height_scale;
-    uint32_t chunk, atlas, max_captures;
-    float fade[2], max_angle_degrees, tolerance, texels;
+    uint32_t chunk, atlas, atlas_count;
+    uint32_t max_captures, max_capture_texels, max_capture_triangles;
+    float fade[2], max_angle_degrees, tolerance, ground_tolerance, texels, impostor_px;
+    int no_lookahead, no_splits, no_spreading;
     int rule;                          /* terrimp_geomip_rule */
     float morph;
     uint32_t save_every;
