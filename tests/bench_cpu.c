@@ -24,7 +24,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-enum { BASE = 1025, THREADED_UP_TO = 2049, NODES_TIMED = 512 };
+enum { BASE = 1025, THREADED_UP_TO = 2049 };
 
 /* A mode of the view, or the geomip room alone. */
 typedef struct way {
@@ -35,7 +35,9 @@ typedef struct way {
 
 static const way ways[] = {
     { "full", TERRIMP_MODE_FULL, 0.0f },
-    { "impostor", TERRIMP_MODE_IMPOSTOR, 0.0f },
+    { "geomip 1 px", TERRIMP_MODE_GEOMIP, 1.0f },
+    { "impostor 1 px", TERRIMP_MODE_IMPOSTOR, 1.0f },
+    { "auto 1 px", TERRIMP_MODE_AUTO, 1.0f },
     { "geomip room, bound 2 px", 0, 2.0f }
 };
 enum { WAY_COUNT = sizeof ways / sizeof *ways };
@@ -128,7 +130,7 @@ static terrimp_terrain_desc describe(const uint16_t *samples, uint32_t size)
 
 typedef struct worker {
     terrimp_terrain *terrain;
-    uint32_t first, step, count;
+    uint32_t first, step, count; /* of nodes */
     size_t scratch_bytes;
     terrimp_result result;
 } worker;
@@ -137,27 +139,28 @@ static void *build_some(void *user)
 {
     worker *w = user;
     void *scratch = need_memory(w->scratch_bytes);
-    uint32_t chunk;
-    for (chunk = w->first; chunk < w->count && w->result == TERRIMP_OK; chunk += w->step)
-        w->result = terrimp_terrain_build_chunk(w->terrain, chunk, scratch, w->scratch_bytes);
+    uint32_t node;
+    for (node = w->first; node < w->count && w->result == TERRIMP_OK; node += w->step)
+        w->result = terrimp_terrain_build_node(w->terrain, node, scratch, w->scratch_bytes);
     free(scratch);
     return NULL;
 }
 
 /* Builds with so many threads, 1 or 2; returns milliseconds of the clock. */
 static double build(const terrimp_terrain_desc *desc, void *memory, size_t bytes, uint32_t threads,
-                    uint32_t chunks, terrimp_terrain **terrain)
+                    uint32_t nodes, terrimp_terrain **terrain)
 {
     worker w[2];
     pthread_t thread;
     double start = clock_ms();
     uint32_t i;
     need(terrimp_terrain_init(desc, memory, bytes, terrain));
+    need(terrimp_terrain_build_begin(*terrain));
     for (i = 0; i < threads; i++) {
         w[i].terrain = *terrain;
         w[i].first = i;
         w[i].step = threads;
-        w[i].count = chunks;
+        w[i].count = nodes;
         w[i].scratch_bytes = terrimp_terrain_scratch_bytes(desc);
         w[i].result = TERRIMP_OK;
     }
@@ -238,6 +241,8 @@ static void fly_view(const terrimp_terrain *terrain, const way *w, const flight 
     memset(&desc, 0, sizeof desc);
     desc.mode = w->mode;
     desc.tolerance_px = w->tolerance_px;
+    if (w->mode == TERRIMP_MODE_GEOMIP)
+        desc.ground_tolerance_px = w->tolerance_px;
     c->bytes = terrimp_view_bytes(terrain, &desc);
     memory = need_memory(c->bytes);
     need(terrimp_view_init(terrain, &desc, memory, c->bytes, &view));
@@ -326,7 +331,7 @@ static void say_way(uint32_t size, const way *w, const cost *c)
 typedef struct built {
     double one_thread_ms, two_threads_ms; /* of the clock */
     double one_thread_cpu_ms, geomip_cpu_ms;
-    uint32_t chunks;
+    uint32_t nodes;
     size_t terrain_bytes, scratch_bytes;
 } built;
 
@@ -335,6 +340,17 @@ static size_t frame_count(void)
     const char *frames = getenv("BENCH_FRAMES");
     long count = frames ? strtol(frames, NULL, 10) : 0;
     return count > 1 ? (size_t)count : 60;
+}
+
+/* Of a square quadtree with so many chunks along a side. */
+static uint32_t count_nodes(uint32_t chunks)
+{
+    uint32_t count = chunks * chunks;
+    while (chunks > 1) {
+        chunks = (chunks + 1) / 2;
+        count += chunks * chunks;
+    }
+    return count;
 }
 
 static built measure(uint32_t size)
@@ -350,12 +366,12 @@ static built measure(uint32_t size)
     memset(&b, 0, sizeof b);
     b.terrain_bytes = terrimp_terrain_bytes(&desc);
     b.scratch_bytes = terrimp_terrain_scratch_bytes(&desc);
-    b.chunks = ((size - 2) / 64 + 1) * ((size - 2) / 64 + 1);
+    b.nodes = count_nodes((size - 2) / 64 + 1);
     memory = need_memory(b.terrain_bytes);
     if (size <= THREADED_UP_TO)
-        b.two_threads_ms = build(&desc, memory, b.terrain_bytes, 2, b.chunks, &terrain);
+        b.two_threads_ms = build(&desc, memory, b.terrain_bytes, 2, b.nodes, &terrain);
     b.one_thread_cpu_ms = clock_cpu_ms();
-    b.one_thread_ms = build(&desc, memory, b.terrain_bytes, 1, b.chunks, &terrain);
+    b.one_thread_ms = build(&desc, memory, b.terrain_bytes, 1, b.nodes, &terrain);
     b.one_thread_cpu_ms = clock_cpu_ms() - b.one_thread_cpu_ms;
     need(terrimp_terrain_get_info(terrain, &info));
     if (!flight_circle(&f, &desc.field, frame_count(), 80.0f / 60.0f))
@@ -382,21 +398,21 @@ static void say_built(const built *all, size_t count)
 {
     size_t i;
     say("\nBuilding; seconds of the clock, where a busy machine shows, and of the processor:\n\n"
-        "| size | chunks | one thread | two threads | processor | ms a chunk | geomip room | "
-        "terrain MiB | bytes a chunk | bytes a sample | scratch KiB |\n"
+        "| size | nodes | one thread | two threads | processor | ms a node | geomip room | "
+        "terrain MiB | bytes a node | bytes a sample | scratch KiB |\n"
         "|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < count; i++) {
         const built *b = &all[i];
-        double chunks = (double)b->chunks, bytes = (double)b->terrain_bytes;
-        say("| %u | %u | %.2f | ", (unsigned)sizes[i], (unsigned)b->chunks,
+        double nodes = (double)b->nodes, bytes = (double)b->terrain_bytes;
+        say("| %u | %u | %.2f | ", (unsigned)sizes[i], (unsigned)b->nodes,
             b->one_thread_ms * 1e-3);
         if (b->two_threads_ms > 0.0)
             say("%.2f | ", b->two_threads_ms * 1e-3);
         else
             say("| ");
         say("%.2f | %.2f | %.2f | %.2f | %.0f | %.3f | %.0f |\n", b->one_thread_cpu_ms * 1e-3,
-            b->one_thread_cpu_ms / chunks, b->geomip_cpu_ms * 1e-3, bytes / 1048576.0,
-            bytes / chunks, bytes / ((double)sizes[i] * sizes[i]),
+            b->one_thread_cpu_ms / nodes, b->geomip_cpu_ms * 1e-3, bytes / 1048576.0,
+            bytes / nodes, bytes / ((double)sizes[i] * sizes[i]),
             (double)b->scratch_bytes / 1024.0);
     }
 }

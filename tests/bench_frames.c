@@ -31,73 +31,48 @@
 
 /* ---- What is measured --------------------------------------------------- */
 
+#define FULL { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL }
+#define AUTO(tolerance_)                                                                  \
+    { .name = "auto " #tolerance_ " px", .family = "auto", .mode = TERRIMP_MODE_AUTO,     \
+      .tolerance_px = (float)tolerance_ }
+#define IMPOSTOR(tolerance_)                                                              \
+    { .name = "impostor " #tolerance_ " px", .family = "impostor",                        \
+      .mode = TERRIMP_MODE_IMPOSTOR, .tolerance_px = (float)tolerance_ }
+#define GEOMIP(tolerance_)                                                                \
+    { .name = "geomip " #tolerance_ " px", .family = "geomip", .mode = TERRIMP_MODE_GEOMIP, \
+      .tolerance_px = (float)tolerance_ }
+#define BOUND(tolerance_)                                                                 \
+    { .name = "geomip bound " #tolerance_ " px", .family = "geomip bound",                \
+      .mode = TERRIMP_MODE_GEOMIP, .rule = TERRIMP_GEOMIP_BOUND,                          \
+      .tolerance_px = (float)tolerance_ }
+#define MORPHING(tolerance_)                                                              \
+    { .name = "geomip " #tolerance_ " px, morphing", .family = "geomip morphing",         \
+      .mode = TERRIMP_MODE_GEOMIP, .tolerance_px = (float)tolerance_, .morph_ratio = 1.5f }
+/* As in the thesis but for the atlas; foreground and chunk width as in its tables: "200, 64". */
+#define HESS(foreground_, chunk_)                                                         \
+    { .name = "Hess " #foreground_ ", " #chunk_, .family = "Hess " #chunk_,               \
+      .mode = TERRIMP_MODE_IMPOSTOR, .chunk_quads = chunk_, .foreground = foreground_,    \
+      .angle_alone = 1 }
+
 static const way path_ways[] = {
-    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
-    { .name = "impostor as Hess", .family = "impostor (Hess)", .mode = TERRIMP_MODE_IMPOSTOR,
-      .tolerance_px = 100.0f },
-    { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
-    { .name = "impostor 2 px, 1 texel", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR,
-      .tolerance_px = 2.0f, .texels_per_px = 1.0f },
-    { .name = "geomip picture 0.5 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 0.5f },
-    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 1.0f },
-    { .name = "geomip picture 2 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 2.0f },
-    { .name = "geomip picture 4 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 4.0f },
-    { .name = "geomip picture 8 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 8.0f },
-    { .name = "geomip bound 1 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 1.0f },
-    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f },
-    { .name = "geomip bound 4 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 4.0f },
-    { .name = "geomip bound 8 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 8.0f },
-    { .name = "geomip 1 px, morphing", .family = "geomip morphing", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 1.0f, .morph_ratio = 1.5f }
+    FULL, AUTO(0.5), AUTO(1), AUTO(2), AUTO(4), AUTO(8),
+    { .name = "Hess, foreground 2 chunks", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR,
+      .angle_alone = 1 },
+    IMPOSTOR(1),
+    GEOMIP(0.25), GEOMIP(0.5), GEOMIP(1), GEOMIP(2), GEOMIP(4), GEOMIP(8),
+    BOUND(1), BOUND(2), BOUND(4), BOUND(8), MORPHING(1)
 };
 
 static const way look_ways[] = {
-    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
-    { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
-    { .name = "geomip picture 0.5 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 0.5f },
-    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 1.0f },
-    { .name = "geomip picture 4 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 4.0f },
-    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f },
-    { .name = "geomip bound 4 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 4.0f }
+    FULL, AUTO(1), AUTO(2), AUTO(4), IMPOSTOR(1),
+    GEOMIP(0.5), GEOMIP(1), GEOMIP(4), BOUND(2), BOUND(4)
 };
 
-static const way tile_ways[] = {
-    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
-    { .name = "impostor 1 px", .family = "impostor", .mode = TERRIMP_MODE_IMPOSTOR },
-    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 1.0f },
-    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f }
-};
-
-/* Foreground and chunk width as in the thesis' tables: "200, 64". */
-#define HESS(foreground_, chunk_)                                                      \
-    { .name = "impostor " #foreground_ ", " #chunk_, .family = "impostor " #chunk_,   \
-      .mode = TERRIMP_MODE_IMPOSTOR, .chunk_quads = chunk_, .foreground = foreground_, \
-      .tolerance_px = 100.0f }
+static const way tile_ways[] = { FULL, AUTO(1), AUTO(2), IMPOSTOR(1), GEOMIP(1), BOUND(2) };
 
 static const way thesis_ways[] = {
-    { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL },
-    { .name = "geomip picture 1 px", .family = "geomip picture", .mode = WAY_SEPARATE_GEOMIP,
-      .tolerance_px = 1.0f },
-    { .name = "geomip bound 2 px", .family = "geomip bound", .mode = WAY_SEPARATE_GEOMIP,
-      .rule = TERRIMP_GEOMIP_BOUND, .tolerance_px = 2.0f },
-    HESS(400, 64), HESS(400, 128),
-    /* only with BENCH_ALL, or in the terrain of 2049: */
+    FULL, AUTO(1), GEOMIP(1), HESS(400, 64), HESS(400, 128),
+    /* only with BENCH_ALL, or on the terrain of 2049: */
     HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128)
 };
 
@@ -190,9 +165,10 @@ static void say_machine(void)
     line[strcspn(line, "\n")] = 0;
     say("Machine: %s; load at the start %s\nRenderer: %s\n",
         strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
-    say("Pictures of %d x %d, 60 degrees. Every column of times but the first is in multiples of "
-        "the full mesh's median;\nthe first frame, which makes all pictures at once, stands "
-        "apart. PSNR [dB] is over terrain unless it says picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
+    say("Pictures of %d x %d, 60 degrees. Times but the first are in multiples of the full mesh's "
+        "median. The first sixth of\na flight, 20 frames at most, is its start, when all pictures "
+        "are made: it has a column, and no other figure has it in.\nPSNR [dB] is over terrain "
+        "unless it says picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
 }
 
 /* ---- Quality ------------------------------------------------------------ */
@@ -297,23 +273,42 @@ static void compare_change(contender *c, const contender *full, size_t frame)
 
 /* ---- A flight ----------------------------------------------------------- */
 
-/* What is done with a frame beside drawing it. */
+/* What is done with a frame. At the start only what has a memory is drawn. */
 typedef struct frame_plan {
+    int start;
     int look;   /* compare with the full mesh */
     int change; /* and with the frame before */
     int ssim, fine;
 } frame_plan;
 
+static size_t start_of(size_t frames)
+{
+    return frames / 6 < 20 ? frames / 6 : 20;
+}
+
 /* SSIM is dear: every other look has it. The supersampled reference is dearer: three looks do. */
 static frame_plan plan_frame(const run *r, size_t frame, size_t frames, size_t stride)
 {
-    size_t looks = (frames + stride - 1) / stride, index = frame / stride;
-    frame_plan plan;
+    size_t start = start_of(frames), looks = (frames - start + stride - 1) / stride, index;
+    frame_plan plan = { 1, 0, 0, 0, 0 };
+    if (frame < start)
+        return plan;
+    frame -= start;
+    index = frame / stride;
+    plan.start = 0;
     plan.look = frame % stride == 0;
     plan.change = stride == 1 ? frame > 0 : frame % stride == 1;
     plan.ssim = plan.look && index % 2 == 0;
     plan.fine = r->curve && plan.look && index % ((looks + 2) / 3) == 0;
     return plan;
+}
+
+static void note_time(const scene *s, const contender *c, size_t frame, int at_start)
+{
+    const stats *ms = at_start ? &c->start_ms : &c->ms;
+    fprintf(times, "%s\t%s\t%zu\t%d\t%.3f\t%u\t%u\t%u\t%u\n", s->desc->key, c->way->name, frame,
+            at_start, ms->values[ms->count - 1], c->now.triangles, c->now.draws, c->now.captures,
+            c->now.captured_texels);
 }
 
 static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
@@ -325,13 +320,10 @@ static void draw_frame(contender *ways, size_t count, const scene *s, size_t fra
         contender *c = &ways[i];
         if (!plan.look && !plan.change && !way_has_memory(c->way))
             continue;
-        contender_draw(c, camera, frame);
+        contender_draw(c, camera, plan.start);
         if (plan.look || plan.change)
             contender_read(c, s->context, frame);
-        fprintf(times, "%s\t%s\t%zu\t%.3f\t%.3f\t%u\t%u\t%u\t%u\n", s->desc->key, c->way->name,
-                frame, frame ? c->ms.values[c->ms.count - 1] : c->first_ms,
-                frame ? c->cpu_ms.values[c->cpu_ms.count - 1] : 0.0, c->now.triangles,
-                c->now.draws, c->now.captures, c->now.captured_texels);
+        note_time(s, c, frame, plan.start);
     }
 }
 
@@ -361,18 +353,12 @@ static void fly(const run *r, contender *ways, size_t count, const scene *s, qua
 
 /* ---- Tables ------------------------------------------------------------- */
 
-/* Frames that a picture is drawn, on average; 0 for ways without pictures. */
-static double reuse(const contender *c)
-{
-    return c->captures > 0.0 ? c->impostors / c->captures : 0.0;
-}
-
 static void print_times(const contender *ways, size_t count, double quad_ms)
 {
     double unit = stats_summarise(&ways[0].ms).median;
     double cpu = mean(&ways[0].cpu_ms);
     size_t i;
-    say("\n| way | ms | ratio | mean | sd | 95 %% | 99 %% | worst | first | CPU ratio | quads | "
+    say("\n| way | ms | ratio | mean | sd | 95 %% | 99 %% | worst | start | CPU ratio | quads | "
         "triangles | draws | captures | ktexels | reuse |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < count; i++) {
@@ -382,9 +368,9 @@ static void print_times(const contender *ways, size_t count, double quad_ms)
         say("| %s | %.1f | %.3f | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f | %.3f | %.1f | %.0f | "
             "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, ms.median / unit,
             ms.mean / unit, ms.deviation / unit, ms.p95 / unit, ms.p99 / unit, ms.worst / unit,
-            c->first_ms / unit, mean(&c->cpu_ms) / cpu, ms.median / quad_ms,
+            mean(&c->start_ms) / unit, mean(&c->cpu_ms) / cpu, ms.median / quad_ms,
             c->triangles / n, c->draws / n, c->captures / n, c->captured_texels / n / 1e3,
-            reuse(c));
+            (double)c->now.reuse);
     }
     say("\nA textured quad over the whole picture: %.1f ms.\n", quad_ms);
 }
@@ -420,10 +406,10 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
         fprintf(figures, "%s\t%s\t%s\t%zu\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t"
                 "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
                 ms.median / unit, ms.mean / unit, ms.deviation / unit, ms.p95 / unit,
-                ms.p99 / unit, ms.worst / unit, c->first_ms / unit,
+                ms.p99 / unit, ms.worst / unit, mean(&c->start_ms) / unit,
                 mean(&c->cpu_ms) / cpu, quad_ms);
-        fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t", c->triangles / n, c->draws / n,
-                c->captures / n, c->captured_texels / n, reuse(c));
+        fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t%.2f\t", c->triangles / n, c->draws / n,
+                c->captures / n, c->captured_texels / n, (double)c->now.reuse, c->waiting / n);
         fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
                 mean(&c->psnr_terrain), smallest(&c->psnr_terrain), mean(&c->psnr),
                 mean(&c->ssim), mean(&c->fine_psnr), mean(&c->fine_ssim), mean(&c->shimmer),
@@ -435,10 +421,10 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
 static void write_headings(void)
 {
     fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio\tmean\tdeviation\tp95\tp99\t"
-            "worst\tfirst\tcpu_ratio\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
-            "reuse\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\tssim_4x4\t"
-            "shimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
-    fprintf(times, "scene\tway\tframe\tms\tcpu_ms\ttriangles\tdraws\tcaptures\t"
+            "worst\tstart\tcpu_ratio\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+            "reuse\twaiting\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\t"
+            "ssim_4x4\tshimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
+    fprintf(times, "scene\tway\tframe\tstart\tms\ttriangles\tdraws\tcaptures\t"
             "captured_texels\n");
 }
 

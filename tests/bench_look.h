@@ -5,7 +5,6 @@
 
 #include "bench_scene.h"
 
-#include "examples/host/gl_geomip.h"
 #include "examples/host/shading.h"
 #include "examples/host/trees.h"
 
@@ -38,16 +37,10 @@ static void look_open(look *l, int kind, scene *s)
     }
 }
 
-/* Once for each terrain of OpenGL's, and for each geomip. */
+/* Once for each terrain of OpenGL's. */
 static void look_dress(const look *l, gl_terrain *gl)
 {
-    if (l->kind == LOOK_MATERIALS && !shading_dress_terrain(gl))
-        scene_stop("shading", "a dressed shader does not compile");
-}
-
-static void look_dress_geomip(const look *l, gl_geomip *g)
-{
-    if (l->kind == LOOK_MATERIALS && !shading_dress(&g->ground))
+    if (l->kind == LOOK_MATERIALS && !shading_dress(gl))
         scene_stop("shading", "a dressed shader does not compile");
 }
 
@@ -65,19 +58,6 @@ static terrimp_result look_render(look *l, gl_terrain *gl, terrimp_view *view)
     result = terrimp_view_render(view, &callbacks);
     if (l->kind == LOOK_TREES)
         trees_end(&l->trees);
-    return result;
-}
-
-static terrimp_result look_draw_geomip(look *l, gl_geomip *g, const terrimp_camera *camera)
-{
-    terrimp_result result;
-    if (l->kind == LOOK_MATERIALS) {
-        shading_begin(&l->shading, g->gl, l->seconds);
-        shading_set_clouds(&l->shading, &g->ground, 1.0f);
-    }
-    result = gl_geomip_draw(g);
-    if (result == TERRIMP_OK && l->kind == LOOK_TREES)
-        result = trees_draw_all(&l->trees, g->gl, camera);
     return result;
 }
 

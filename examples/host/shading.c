@@ -92,7 +92,7 @@ static void set_samplers(GLuint program)
 /* The program's own shaders go on doing all that they did; where they looked the lightmap up they
    ask for the ground, and what they paint lies under the clouds. So a change of how positions are
    made, or alpha, needs no change here. */
-int shading_dress(gl_program *program)
+static int dress(gl_program *program)
 {
     char vertex[SOURCE], fragment[SOURCE];
     gl_program dressed;
@@ -114,14 +114,22 @@ int shading_dress(gl_program *program)
     return 1;
 }
 
-int shading_dress_terrain(gl_terrain *g)
+static void set_field(const gl_terrain *g, const gl_program *p)
 {
-    if (!shading_dress(&g->ground) || !shading_dress(&g->fading) || !shading_dress(&g->impostor))
+    glUseProgram(p->id);
+    glUniform4fv(p->field, 1, g->field);
+}
+
+int shading_dress(gl_terrain *g)
+{
+    if (!dress(&g->ground) || !dress(&g->fading) || !dress(&g->impostor))
         return 0;
-    glUseProgram(g->ground.id);
-    glUniform4fv(g->ground.field, 1, g->field);
-    glUseProgram(g->fading.id);
-    glUniform4fv(g->fading.field, 1, g->field);
+    if (g->morphing.id && !dress(&g->morphing))
+        return 0;
+    set_field(g, &g->ground);
+    set_field(g, &g->fading);
+    if (g->morphing.id)
+        set_field(g, &g->morphing);
     return 1;
 }
 
@@ -271,7 +279,8 @@ void shading_close(shading *s)
 
 /* ---- A frame ------------------------------------------------------------ */
 
-void shading_set_clouds(const shading *s, const gl_program *program, float strength)
+/* Strength: 0 none, 1 as they are. */
+static void set_clouds(const shading *s, const gl_program *program, float strength)
 {
     glUseProgram(program->id);
     glUniform4f(glGetUniformLocation(program->id, "repeats"),
@@ -294,23 +303,25 @@ void shading_begin(shading *s, const gl_terrain *g, float seconds)
     glActiveTexture(GL_TEXTURE0);
     s->drift[0] = fmodf(seconds * CLOUD_SPEED, 1.0f);
     s->drift[1] = fmodf(seconds * CLOUD_SPEED * 0.6f, 1.0f);
-    shading_set_clouds(s, &g->ground, 1.0f);
-    shading_set_clouds(s, &g->fading, 1.0f);
-    shading_set_clouds(s, &g->impostor, 1.0f);
+    set_clouds(s, &g->ground, 1.0f);
+    set_clouds(s, &g->fading, 1.0f);
+    set_clouds(s, &g->impostor, 1.0f);
+    if (g->morphing.id)
+        set_clouds(s, &g->morphing, 1.0f);
 }
 
 static void begin_capture(void *user, const terrimp_capture_command *command)
 {
     shading *s = user;
     s->inner.begin_capture(s->inner.user, command);
-    shading_set_clouds(s, &s->gl->ground, 0.0f);
+    set_clouds(s, &s->gl->ground, 0.0f);
 }
 
 static void end_capture(void *user, const terrimp_capture_command *command)
 {
     shading *s = user;
     s->inner.end_capture(s->inner.user, command);
-    shading_set_clouds(s, &s->gl->ground, 1.0f);
+    set_clouds(s, &s->gl->ground, 1.0f);
 }
 
 static void draw_impostor(void *user, const terrimp_impostor_command *command)

@@ -23,19 +23,12 @@ typedef struct shading {
 /* Makes the textures; field and lightmap as for gl_terrain_open. Returns null, or what is wrong. */
 const char *shading_open(shading *s, const terrimp_heightfield *field, const uint8_t *lightmap);
 
-/* Has a program of gl_terrain or gl_geomip shade like this. It must be one that looks the lightmap
-   up, or one that draws impostors. Uniforms that were set must be set again. Returns 0 when it does
-   not compile, and leaves the program alone. */
-int shading_dress(gl_program *program);
-
-/* The same for all programs of a terrain, with their uniforms. */
-int shading_dress_terrain(gl_terrain *g);
+/* Has all programs of a terrain shade like this; after gl_terrain_use_morphing, if that is used.
+   Returns 0 when one does not compile. */
+int shading_dress(gl_terrain *g);
 
 /* Before a frame: binds the textures, to units 1 and up, and sets where the clouds are. */
 void shading_begin(shading *s, const gl_terrain *g, float seconds);
-
-/* Sets the clouds of one more program: 0 none, 1 as they are. */
-void shading_set_clouds(const shading *s, const gl_program *program, float strength);
 
 /* Callbacks around gl_terrain's that leave the clouds out of captures. */
 terrimp_callbacks shading_callbacks(shading *s, const gl_terrain *g, terrimp_callbacks inner);

@@ -21,7 +21,6 @@ static const char tree_vertex[] =
     "uniform vec3 eye;\n"
     "uniform vec4 clip;\n"
     "out vec3 shade;\n"
-    "out float distance_to_eye;\n"
     "void main() {\n"
     "    vec3 p = instance.xyz + position * instance.w;\n"
     "    vec2 side = position.xz / max(length(position.xz), 0.001);\n"
@@ -31,19 +30,15 @@ static const char tree_vertex[] =
     "    gl_ClipDistance[1] = p.z - clip.y;\n"
     "    gl_ClipDistance[2] = clip.z - p.x;\n"
     "    gl_ClipDistance[3] = clip.w - p.z;\n"
-    "    distance_to_eye = length(p - eye);\n"
     "    gl_Position = matrix * vec4(p - eye, 1.0);\n"
     "}\n";
 
 static const char tree_fragment[] =
     "#version 330 core\n"
-    "uniform vec2 fade;\n" /* alpha = x - y * distance */
+    "uniform float alpha;\n"
     "in vec3 shade;\n"
-    "in float distance_to_eye;\n"
     "out vec4 colour;\n"
-    "void main() {\n"
-    "    colour = vec4(shade, clamp(fade.x - fade.y * distance_to_eye, 0.0, 1.0));\n"
-    "}\n";
+    "void main() { colour = vec4(shade, alpha); }\n";
 
 /* ---- Planting ----------------------------------------------------------- */
 
@@ -144,7 +139,7 @@ static int make_program(trees *t)
     t->program = p.id;
     t->matrix = p.matrix;
     t->eye = p.eye;
-    t->fade = p.fade;
+    t->alpha = p.alpha;
     t->clip = glGetUniformLocation(p.id, "clip");
     return p.id != 0;
 }
@@ -161,7 +156,6 @@ const char *trees_open(trees *t, const terrimp_terrain *terrain, const terrimp_h
     if (terrimp_heightfield_resolve(field, &resolved) != TERRIMP_OK
         || terrimp_terrain_get_info(terrain, &info) != TERRIMP_OK)
         return "the terrain is wrong";
-    t->terrain = terrain;
     t->chunks_x = info.chunks_x;
     t->chunks_z = info.chunks_z;
     chunks = t->chunks_x * t->chunks_z;
@@ -202,7 +196,7 @@ static void use(const trees *t, const float matrix[16], const float eye[3])
     glBindVertexArray(t->array);
     glUniformMatrix4fv(t->matrix, 1, GL_FALSE, matrix);
     glUniform3fv(t->eye, 1, eye);
-    glUniform2f(t->fade, 1.0f, 0.0f);
+    glUniform1f(t->alpha, 1.0f);
     glUniform4f(t->clip, -1e30f, -1e30f, 1e30f, 1e30f);
 }
 
@@ -231,10 +225,27 @@ static void relative_matrix(const float view[16], const float projection[16], fl
         }
 }
 
-/* Trees of a chunk and its eight neighbours stand in its picture, as far as the rectangle goes. */
+/* Draws the trees of all chunks under a node, and of so many more around it. Nodes are numbered
+   level by level, row by row. */
+static void draw_node(const trees *t, uint32_t node, uint32_t level, uint32_t around)
+{
+    uint32_t columns = t->chunks_x, rows = t->chunks_z, i, x, z, x0, z0;
+    for (i = 0; i < level; i++) {
+        node -= columns * rows;
+        columns = (columns + 1) / 2;
+        rows = (rows + 1) / 2;
+    }
+    x0 = node % columns << level;
+    z0 = node / columns << level;
+    for (z = z0 > around ? z0 - around : 0; z < z0 + (1u << level) + around; z++)
+        for (x = x0 > around ? x0 - around : 0; x < x0 + (1u << level) + around; x++)
+            if (x < t->chunks_x && z < t->chunks_z)
+                draw_chunk(t, z * t->chunks_x + x);
+}
+
+/* Trees of the neighbours stand in a picture too, as far as its rectangle goes. */
 static void draw_captured(trees *t, const terrimp_capture_command *c)
 {
-    uint32_t column = c->node % t->chunks_x, row = c->node / t->chunks_x, x, z;
     float matrix[16];
     GLenum i;
     relative_matrix(c->view, c->projection, matrix);
@@ -242,9 +253,7 @@ static void draw_captured(trees *t, const terrimp_capture_command *c)
     glUniform4f(t->clip, c->clip_min[0], c->clip_min[1], c->clip_max[0], c->clip_max[1]);
     for (i = 0; i < 4; i++)
         glEnable(GL_CLIP_DISTANCE0 + i);
-    for (z = row ? row - 1 : 0; z <= row + 1 && z < t->chunks_z; z++)
-        for (x = column ? column - 1 : 0; x <= column + 1 && x < t->chunks_x; x++)
-            draw_chunk(t, z * t->chunks_x + x);
+    draw_node(t, c->node, c->level, 1);
     for (i = 0; i < 4; i++)
         glDisable(GL_CLIP_DISTANCE0 + i);
 }
@@ -277,9 +286,9 @@ static void draw_ground(void *user, const terrimp_ground_command *command)
     t->inner.draw_ground(t->inner.user, command);
     if (!t->capture && t->draw_count < t->chunks_x * t->chunks_z) {
         trees_draw *draw = &t->draws[t->draw_count++];
-        draw->chunk = command->node;
-        draw->fade_start = command->fade_start;
-        draw->fade_end = command->fade_end;
+        draw->node = command->node;
+        draw->level = command->level;
+        draw->alpha = command->alpha;
     }
 }
 
@@ -313,27 +322,10 @@ void trees_end(trees *t)
     use(t, t->gl->camera_matrix, t->gl->camera_eye);
     for (i = 0; i < t->draw_count; i++) {
         const trees_draw *draw = &t->draws[i];
-        float slope = draw->fade_end > 0.0f ? 1.0f / (draw->fade_end - draw->fade_start) : 0.0f;
-        glUniform2f(t->fade, slope > 0.0f ? draw->fade_end * slope : 1.0f, slope);
-        if (slope > 0.0f)
+        glUniform1f(t->alpha, draw->alpha);
+        if (draw->alpha < 1.0f)
             glEnable(GL_BLEND);
-        draw_chunk(t, draw->chunk);
+        draw_node(t, draw->node, draw->level, 0);
         glDisable(GL_BLEND);
     }
-}
-
-terrimp_result trees_draw_all(trees *t, gl_terrain *g, const terrimp_camera *camera)
-{
-    terrimp_frustum frustum;
-    terrimp_result result = terrimp_camera_frustum(camera, &frustum);
-    uint32_t chunk;
-    gl_terrain_turn_to_frame(g);
-    use(t, g->camera_matrix, g->camera_eye);
-    for (chunk = 0; result == TERRIMP_OK && chunk < t->chunks_x * t->chunks_z; chunk++) {
-        terrimp_box box;
-        result = terrimp_terrain_get_box(t->terrain, chunk, &box);
-        if (result == TERRIMP_OK && terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) >= 0)
-            draw_chunk(t, chunk);
-    }
-    return result;
 }

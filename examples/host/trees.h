@@ -6,17 +6,17 @@
 
 #include "gl_terrain.h"
 
+/* Ground on the screen, as its command said. */
 typedef struct trees_draw {
-    uint32_t chunk;
-    float fade_start, fade_end; /* as in a ground command */
+    uint32_t node, level;
+    float alpha;
 } trees_draw;
 
 typedef struct trees {
-    const terrimp_terrain *terrain;
     uint32_t chunks_x, chunks_z;
     uint32_t *first;         /* [chunks + 1] where a chunk's instances begin */
     GLuint array, vertices, instances, program;
-    GLint matrix, eye, clip, fade; /* places of the uniforms */
+    GLint matrix, eye, clip, alpha; /* places of the uniforms */
     gl_terrain *gl;          /* for the callbacks, with what they go round */
     terrimp_callbacks inner;
     trees_draw *draws;       /* [chunks] of the frame, in the order of the ground commands */
@@ -35,9 +35,6 @@ terrimp_callbacks trees_callbacks(trees *t, gl_terrain *g, terrimp_callbacks inn
 
 /* After terrimp_view_render, before gl_terrain_end: the trees of all ground on the screen. */
 void trees_end(trees *t);
-
-/* Instead of both: the trees of all chunks in a camera's sight. */
-terrimp_result trees_draw_all(trees *t, gl_terrain *g, const terrimp_camera *camera);
 
 void trees_close(trees *t);
 
