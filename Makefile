@@ -6,7 +6,9 @@
 ##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
 ## make test      runs every test
-## make bench     measures
+## make bench     measures; tables and plots also go to build/bench/
+##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
+##                  BENCH_ALL=1      the whole protocol, for hours
 ## make check-portable   every compiler, other machines under an emulator, no operating system
 ## make sizes     bytes of code for small machines
 ## make fuzz SECONDS=60   looks for input that breaks the library, so long for each fuzzer
@@ -79,9 +81,13 @@ demo: flyover
 test: | $(DEPS)
 	@sh tests/run.sh
 
-bench: $(BENCHES) flyover
+bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
 	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
-	@BUILD=$(BUILD) sh tests/bench_frames.sh
+
+# The rough terrain on which other engines have been measured.
+build/bench/rough.hgt: ../shared/tools/rough.c
+	@mkdir -p $(@D)
+	@$(CC) -O2 $< -o build/bench/rough -lm && build/bench/rough 2049 $@
 
 deps-portable:
 	@sh tests/deps_portable.sh
@@ -124,7 +130,7 @@ LINK = $(CC)
 $(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread
 
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
-$(BUILD)/bench_%: LIBS = $(BENCH_LIBS)
+$(BUILD)/bench_%: LIBS = $(BENCH_LIBS) -pthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 

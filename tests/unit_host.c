@@ -5,6 +5,7 @@
 #include "terrimp.h"
 
 #include "check.h"
+#include "unit_host_quality.h"
 
 #include "examples/host/dem.h"
 #include "examples/host/flight.h"
@@ -725,6 +726,7 @@ int main(void)
     RUN(figures_agree_with_brute_force);
     RUN(few_values_give_figures_too);
     RUN(the_clock_goes_forward);
+    run_quality_tests();
     RUN(an_hgt_is_square_and_big_endian);
     RUN(a_pgm_keeps_its_sample_size);
     RUN(a_malformed_pgm_is_refused);
