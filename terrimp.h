@@ -6878,6 +6878,12 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
     return TERRIMP_OK;
 }
 
+/* A side at a scale <= 1; whole at 1, since a float could round a huge one out of its type. */
+static uint32_t terrimpi_pair_side(uint32_t side, float scale)
+{
+    return scale < 1.0f ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
+}
+
 /* Inserts the non-empty items, tallest first, at a scale, into emptied shelves; returns whether all
    of them fitted. The sizes of `items` stay as asked for; rectangles go to the slots. */
 static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_pair_slot *slots,
@@ -6892,8 +6898,8 @@ static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_p
         terrimp_rect *rect = &slots[k].rect[atlas];
         if (items[k].rect.width < 1u || items[k].rect.height < 1u)
             continue;
-        rect->width = terrimpi_max_u32(1u, (uint32_t)((float)items[k].rect.width * scale));
-        rect->height = terrimpi_max_u32(1u, (uint32_t)((float)items[k].rect.height * scale));
+        rect->width = terrimpi_pair_side(items[k].rect.width, scale);
+        rect->height = terrimpi_pair_side(items[k].rect.height, scale);
         if (terrimp_shelves_insert(shelves, rect) != TERRIMP_OK)
             return 0;
     }
