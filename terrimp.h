@@ -1625,8 +1625,9 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Calls back with the frame's commands: captures, each with its ground; impostors and the ground
-   between them, front to back; the floor; the ground before them, front to back.
+/* Calls back with the frame's commands: captures, each with its ground; opaque ground; impostors
+   and the ground between them; the floor; fading ground. Each kind front to back: what is hidden by
+   something drawn before it need not be shaded.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate and touch until the next one */
@@ -10624,6 +10625,9 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     for (i = 0; i < view->job_count; i++)
         terrimpi_render_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
+    for (i = 0; i < view->leaf_count; i++)
+        if (view->shown[view->leaves[i]] >= 1.0f)
+            terrimpi_render_ground(view, view->leaves[i], callbacks);
     for (i = 0; i < view->item_count; i++)
         if (view->items[i].is_impostor)
             terrimpi_render_impostor(view, &view->records[view->items[i].index], callbacks);
@@ -10632,7 +10636,7 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     if (callbacks->draw_floor && terrimpi_floor_wanted(view))
         terrimpi_render_floor(view, callbacks);
     for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] > 0.0f)
+        if (view->shown[view->leaves[i]] > 0.0f && view->shown[view->leaves[i]] < 1.0f)
             terrimpi_render_ground(view, view->leaves[i], callbacks);
     return TERRIMP_OK;
 }
