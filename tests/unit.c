@@ -25,6 +25,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_impostor.h"
 #include "unit_atlas.h"
 #include "unit_terrain.h"
+#include "unit_bake.h"
 #include "unit_bad_input.h"
 
 int main(void)
@@ -36,6 +37,7 @@ int main(void)
     impostor_tests();
     atlas_tests();
     terrain_tests();
+    bake_tests();
     bad_input_tests();
     return check_report();
 }
