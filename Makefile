@@ -91,6 +91,7 @@ $(BUILD)/%.o: %.c | $(DEPS)
 
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
 $(BUILD)/bench_%: LIBS = $(BENCH_LIBS)
+$(BUILD)/parallel_build: LIBS = -lpthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
