@@ -1211,7 +1211,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
               E_STATE before build_begin; E_VOID, E_NOT_FINITE for such a sample
    Cost       1.4 ms for 64 x 64 quads at level 0; at every level that, and the visits to all of the
               node's samples, 25 ns for each
-   Source     Hess 2010, section 6.5, asks for meshes of several chunks; de Boer: the tree */
+   Source     Hess 2010, section 6.5, asks for meshes of several chunks */
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
@@ -1223,7 +1223,39 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
 TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void *scratch,
                                                  size_t bytes);
 
+/* Builds anew, after the host has changed samples, the nodes of all levels that these belong to,
+   and finishes. The result is that of building everything anew, bit for bit, with the same range of
+   heights: name one in the descriptor, so that it does not hang on what the samples once were. No
+   view may update meanwhile, and the pictures of the nodes are old; terrimp_terrain_touched lists
+   whose vertices are.
+
+   samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
+              it begins inside the field]; what reaches over the last column and row is cut
+   scratch    [bytes] at least terrimp_terrain_scratch_bytes
+   Errors     E_NULL; E_MEMORY; E_ALIGN; E_RANGE for a rectangle outside of the limits or a height
+              outside of the range; E_VOID, E_NOT_FINITE for such a sample; E_STATE before
+              build_finish and for a terrain that uses a bake. Nothing has changed then
+   Cost       that of build_node for each such node: the root has every sample. A host that cannot
+              wait calls build_node itself, a few nodes a frame, from the finest level up */
+TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, void *scratch,
+                                                   size_t bytes);
+
 #endif /* TERRIMP_NO_BUILD */
+
+/* Lists the nodes whose vertices have to be filled anew after some samples have changed: ground and
+   coarse meshes; the floor, too, may have changed.
+
+   samples    as in terrimp_terrain_rebuild
+   morph      nonzero: also the nodes beside them whose morph data has changed
+   nodes      [capacity] out, rising; NULL: only counted
+   count      out: how many there are, also when they are more than capacity
+   Errors     E_NULL; E_RANGE; E_STATE; E_CAPACITY: nodes is untouched
+   Cost       O(count) */
+TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, int morph,
+                                                   uint32_t *nodes, uint32_t capacity,
+                                                   uint32_t *count);
 
 /* Sizes and extents. Before terrimp_terrain_build_finish: E_STATE. */
 TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terrain,
@@ -7711,6 +7743,127 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
     terrimpi_mesh_place(terrain, node, mesh);
     return TERRIMP_OK;
 }
+
+/* ---- edits ---- */
+
+/* The nodes of a level that some samples belong to: columns and rows, first and last. */
+typedef struct terrimpi_touched {
+    uint32_t x0, z0, x1, z1;
+} terrimpi_touched;
+
+/* The nodes of a level that have one of `count` samples from `first` on, or one that is not more
+   than `margin` beside them, along one axis of `samples` samples and `nodes` nodes. */
+static void terrimpi_touched_along(uint32_t first, uint32_t count, uint32_t margin, uint32_t side,
+                                   uint32_t samples, uint32_t nodes, uint32_t *from, uint32_t *to)
+{
+    uint32_t last = count > samples - first ? samples - 1u : first + count - 1u;
+    first = first > margin ? first - margin : 0u;
+    last = last < samples - 1u - terrimpi_min_u32(margin, samples - 1u) ? last + margin
+                                                                        : samples - 1u;
+    *from = first > 0 ? (first - 1u) / side : 0u; /* a border belongs to both of its nodes */
+    *to = terrimpi_min_u32(last / side, nodes - 1u);
+}
+
+static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const terrimp_rect *rect,
+                                               uint32_t level, uint32_t margin)
+{
+    uint32_t side = t->desc.chunk_quads << level;
+    terrimpi_touched out;
+    terrimpi_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
+                           t->tree.level_x[level], &out.x0, &out.x1);
+    terrimpi_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
+                           t->tree.level_z[level], &out.z0, &out.z1);
+    return out;
+}
+
+static terrimp_result terrimpi_check_touched(const terrimp_terrain *t, const terrimp_rect *rect)
+{
+    if (!t || !rect)
+        return TERRIMP_E_NULL;
+    if (!t->built)
+        return TERRIMP_E_STATE;
+    if (rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
+        rect->y >= t->desc.field.depth)
+        return TERRIMP_E_RANGE;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, int morph,
+                                                   uint32_t *nodes, uint32_t capacity,
+                                                   uint32_t *count)
+{
+    terrimp_result result = terrimpi_check_touched(terrain, samples);
+    uint32_t level, x, z, all = 0;
+    int pass;
+    if (!count)
+        return TERRIMP_E_NULL;
+    if (result != TERRIMP_OK)
+        return result;
+    for (pass = 0; pass < 2; pass++) {
+        for (level = 0; level < terrain->tree.level_count; level++) {
+            /* what vertices move by hangs on the triangles of two levels above */
+            terrimpi_touched in =
+                terrimpi_touched_nodes(terrain, samples, level, morph ? 4u << level : 0u);
+            if (pass == 0)
+                all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
+            else
+                for (z = in.z0; z <= in.z1; z++)
+                    for (x = in.x0; x <= in.x1; x++)
+                        *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
+        }
+        *count = all;
+        if (!nodes)
+            return TERRIMP_OK;
+        if (all > capacity)
+            return TERRIMP_E_CAPACITY;
+    }
+    return TERRIMP_OK;
+}
+
+#ifndef TERRIMP_NO_BUILD
+
+TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, void *scratch,
+                                                   size_t bytes)
+{
+    terrimp_result result = terrimpi_check_touched(terrain, samples);
+    const terrimp_heightfield *f;
+    terrimpi_build build;
+    terrimpi_scan scan;
+    uint32_t level, x, z;
+    if (result == TERRIMP_OK && terrain->baked)
+        result = TERRIMP_E_STATE;
+    if (result == TERRIMP_OK)
+        result = terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build));
+    if (result != TERRIMP_OK)
+        return result;
+    f = &terrain->desc.field;
+    scan.skip_voids = 0;
+    result = terrimpi_scan_tile(f, samples->x, samples->y,
+                                terrimpi_min_u32(samples->width, f->width - samples->x),
+                                terrimpi_min_u32(samples->height, f->depth - samples->y), 1,
+                                &scan);
+    if (result != TERRIMP_OK)
+        return result;
+    if (terrimpi_world_height(f, scan.low) < terrain->sample_low ||
+        terrimpi_world_height(f, scan.high) > terrain->sample_high)
+        return TERRIMP_E_RANGE;
+    for (level = 0; level < terrain->tree.level_count; level++) {
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, 0);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++) {
+                uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
+                result = terrimp_terrain_build_node(terrain, node, scratch, bytes);
+                if (result != TERRIMP_OK)
+                    return result;
+            }
+    }
+    return terrimp_terrain_build_finish(terrain);
+}
+
+#endif /* TERRIMP_NO_BUILD */
 
 /* ---- the shared index buffer: geomip patterns, then rectangles of quads for captures ---- */
 

@@ -424,6 +424,195 @@ static void bakes_may_have_company(void)
     baked_free(&b);
 }
 
+/* ---- edits ---- */
+
+/* All that a host holds of one node. */
+static size_t node_floats(const land *l)
+{
+    return 3u * (l->info.ground_vertex_count + l->info.mesh_vertex_stride);
+}
+
+typedef struct host_copy {
+    float *floats;
+    uint16_t *indices;
+    terrimp_geomip_vertex *morph;
+} host_copy;
+
+static host_copy copy_host(const land *l, const terrimp_terrain *terrain)
+{
+    host_copy c;
+    uint32_t node, count = l->info.node_count, vertices = l->info.ground_vertex_count;
+    c.floats = (float *)malloc(count * node_floats(l) * sizeof(float));
+    c.indices = (uint16_t *)malloc((size_t)count * l->info.mesh_index_stride * sizeof(uint16_t));
+    c.morph = (terrimp_geomip_vertex *)malloc((size_t)count * vertices * sizeof *c.morph);
+    for (node = 0; node < count; node++) {
+        float *at = c.floats + node * node_floats(l);
+        CHECK(terrimp_terrain_fill_ground(terrain, node, at, 3u * vertices) == TERRIMP_OK);
+        CHECK(terrimp_terrain_fill_morph(terrain, node, c.morph + (size_t)node * vertices,
+                                         vertices) == TERRIMP_OK);
+        CHECK(terrimp_terrain_fill_mesh(terrain, node, at + 3u * vertices,
+                                        3u * l->info.mesh_vertex_stride,
+                                        c.indices + (size_t)node * l->info.mesh_index_stride,
+                                        l->info.mesh_index_stride) == TERRIMP_OK);
+    }
+    return c;
+}
+
+static void free_host(host_copy *c)
+{
+    free(c->floats);
+    free(c->indices);
+    free(c->morph);
+}
+
+static int listed(const uint32_t *nodes, uint32_t count, uint32_t node)
+{
+    while (count-- > 0)
+        if (nodes[count] == node)
+            return 1;
+    return 0;
+}
+
+/* What touched does not list is as it was. */
+static void check_touched(const land *l, const terrimp_rect *rect, const host_copy *before,
+                          const host_copy *after)
+{
+    uint32_t *nodes[2], count[2] = {0, 0}, node, i;
+    size_t floats = node_floats(l), morphs = l->info.ground_vertex_count;
+    int morph;
+    for (morph = 0; morph < 2; morph++) {
+        CHECK(terrimp_terrain_touched(l->terrain, rect, morph, NULL, 0, &count[morph]) ==
+              TERRIMP_OK);
+        nodes[morph] = (uint32_t *)malloc((count[morph] + 1u) * sizeof(uint32_t));
+        CHECK(terrimp_terrain_touched(l->terrain, rect, morph, nodes[morph], count[morph] - 1u,
+                                      &count[morph]) == TERRIMP_E_CAPACITY);
+        CHECK(terrimp_terrain_touched(l->terrain, rect, morph, nodes[morph], count[morph],
+                                      &count[morph]) == TERRIMP_OK);
+        for (i = 0; i < count[morph]; i++)
+            CHECK(nodes[morph][i] < l->info.node_count &&
+                  (i == 0 || nodes[morph][i] > nodes[morph][i - 1u]));
+        CHECK(listed(nodes[morph], count[morph], l->info.node_count - 1u)); /* the root */
+    }
+    CHECK(count[0] <= count[1]);
+    for (node = 0; node < l->info.node_count; node++) {
+        if (!listed(nodes[0], count[0], node)) {
+            CHECK(memcmp(before->floats + node * floats, after->floats + node * floats,
+                         floats * sizeof(float)) == 0);
+            CHECK(memcmp(before->indices + node * l->info.mesh_index_stride,
+                         after->indices + node * l->info.mesh_index_stride,
+                         l->info.mesh_index_stride * sizeof(uint16_t)) == 0);
+        }
+        if (!listed(nodes[1], count[1], node))
+            CHECK(memcmp(before->morph + node * morphs, after->morph + node * morphs,
+                         morphs * sizeof *before->morph) == 0);
+    }
+    free(nodes[0]);
+    free(nodes[1]);
+}
+
+/* After edits a terrain is, byte for byte, the one that is built of the new samples. */
+static void rebuilt_terrains_equal_those_built_anew(void)
+{
+    static const uint32_t sizes[][3] = {{70, 59, 8}, {131, 40, 6}, {2, 90, 4}, {33, 33, 32}};
+    size_t i;
+    for (i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        land l;
+        int edit;
+        void *scratch;
+        size_t scratch_bytes, bytes;
+        land_prepare(&l, sizes[i][0], sizes[i][1], TERRIMP_FORMAT_F32, LAND_HILLS);
+        l.desc.chunk_quads = sizes[i][2];
+        l.desc.height_low = -10.0f;
+        l.desc.height_high = 300.0f;
+        if (!land_build(&l)) {
+            land_free(&l);
+            continue;
+        }
+        scratch_bytes = terrimp_terrain_scratch_bytes(&l.desc);
+        scratch = malloc(scratch_bytes);
+        bytes = terrimp_bake_bytes(l.terrain);
+        for (edit = 0; edit < 8; edit++) {
+            terrimp_terrain *anew = NULL;
+            terrimp_rect rect;
+            uint32_t x, z;
+            host_copy before = copy_host(&l, l.terrain), after;
+            unsigned char *block[2];
+            rect.x = random_range(0, sizes[i][0] - 1u);
+            rect.y = random_range(0, sizes[i][1] - 1u);
+            rect.width = edit == 0 ? UINT32_MAX : random_range(1, 9);
+            rect.height = edit == 0 ? UINT32_MAX : random_range(1, 9);
+            for (z = rect.y; z < sizes[i][1] && z - rect.y < rect.height; z++)
+                for (x = rect.x; x < sizes[i][0] && x - rect.x < rect.width; x++)
+                    l.samples[(size_t)z * sizes[i][0] + x] = random_float(-10.0f, 300.0f);
+            CHECK(terrimp_terrain_rebuild(l.terrain, &rect, scratch, scratch_bytes) == TERRIMP_OK);
+            CHECK(terrimp_terrain_create(&l.desc, NULL, &anew) == TERRIMP_OK);
+            block[0] = (unsigned char *)malloc(bytes);
+            block[1] = (unsigned char *)malloc(bytes);
+            CHECK(terrimp_bake_write(l.terrain, block[0], bytes) == TERRIMP_OK);
+            CHECK(terrimp_bake_write(anew, block[1], bytes) == TERRIMP_OK);
+            CHECK(memcmp(block[0], block[1], bytes) == 0);
+            after = copy_host(&l, l.terrain);
+            check_touched(&l, &rect, &before, &after);
+            free_host(&before);
+            free_host(&after);
+            free(block[0]);
+            free(block[1]);
+            terrimp_terrain_destroy(anew);
+        }
+        free(scratch);
+        land_free(&l);
+    }
+}
+
+/* What cannot be rebuilt is refused, and the terrain stays as it was. */
+static void bad_edits_change_nothing(void)
+{
+    baked_land b;
+    if (bake_land(&b, 40, 30, TERRIMP_FORMAT_F32, LAND_HILLS, 8, 0)) {
+        size_t scratch_bytes = terrimp_terrain_scratch_bytes(&b.l.desc);
+        uint64_t *scratch = (uint64_t *)malloc(scratch_bytes + 1u);
+        terrimp_rect rect = {7, 7, 1, 1}, bad;
+        float *sample = b.l.samples + 7 * 40 + 7, old = *sample;
+        unsigned char *block = (unsigned char *)malloc(b.bytes);
+        terrimp_terrain *t = b.l.terrain;
+        uint32_t count = 77;
+        CHECK(baked_open(&b) == TERRIMP_OK);
+        CHECK(terrimp_terrain_rebuild(b.opened, &rect, scratch, scratch_bytes) == TERRIMP_E_STATE);
+        *sample = 10000.0f;
+        CHECK(terrimp_terrain_rebuild(t, &rect, scratch, scratch_bytes) == TERRIMP_E_RANGE);
+        *sample = -10000.0f;
+        CHECK(terrimp_terrain_rebuild(t, &rect, scratch, scratch_bytes) == TERRIMP_E_RANGE);
+        *sample = (float)NAN;
+        CHECK(terrimp_terrain_rebuild(t, &rect, scratch, scratch_bytes) == TERRIMP_E_NOT_FINITE);
+        *sample = old;
+        CHECK(terrimp_terrain_rebuild(NULL, &rect, scratch, scratch_bytes) == TERRIMP_E_NULL);
+        CHECK(terrimp_terrain_rebuild(t, NULL, scratch, scratch_bytes) == TERRIMP_E_NULL);
+        CHECK(terrimp_terrain_rebuild(t, &rect, NULL, scratch_bytes) == TERRIMP_E_NULL);
+        CHECK(terrimp_terrain_rebuild(t, &rect, scratch, scratch_bytes - 1u) == TERRIMP_E_MEMORY);
+        CHECK(terrimp_terrain_rebuild(t, &rect, (char *)scratch + 1, scratch_bytes) ==
+              TERRIMP_E_ALIGN);
+        bad = rect;
+        bad.x = 40;
+        CHECK(terrimp_terrain_rebuild(t, &bad, scratch, scratch_bytes) == TERRIMP_E_RANGE);
+        CHECK(terrimp_terrain_touched(t, &bad, 0, NULL, 0, &count) == TERRIMP_E_RANGE);
+        bad = rect;
+        bad.y = 0xffffffffu;
+        CHECK(terrimp_terrain_rebuild(t, &bad, scratch, scratch_bytes) == TERRIMP_E_RANGE);
+        bad = rect;
+        bad.height = 0;
+        CHECK(terrimp_terrain_rebuild(t, &bad, scratch, scratch_bytes) == TERRIMP_E_RANGE);
+        CHECK(terrimp_terrain_touched(NULL, &rect, 0, NULL, 0, &count) == TERRIMP_E_NULL);
+        CHECK(terrimp_terrain_touched(t, NULL, 0, NULL, 0, &count) == TERRIMP_E_NULL);
+        CHECK(count == 77);
+        CHECK(terrimp_terrain_touched(t, &rect, 0, NULL, 0, NULL) == TERRIMP_E_NULL);
+        CHECK(terrimp_bake_write(t, block, b.bytes) == TERRIMP_OK);
+        CHECK(memcmp(block, b.block, b.bytes) == 0);
+        free(block);
+        free(scratch);
+    }
+    baked_free(&b);
+}
+
 static void bake_tests(void)
 {
     RUN(opened_bakes_are_the_terrain_that_was_baked);
@@ -435,6 +624,8 @@ static void bake_tests(void)
     RUN(every_false_number_of_a_bake_is_refused);
     RUN(truncated_bakes_are_refused);
     RUN(bakes_may_have_company);
+    RUN(rebuilt_terrains_equal_those_built_anew);
+    RUN(bad_edits_change_nothing);
 }
 
 #endif
