@@ -461,6 +461,16 @@ typedef struct terrimp_capture {
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture);
 
+/* Narrows a fitted capture to points, for instance the vertices that its picture is drawn on: its
+   sides touch their projections. The clip distances stay.
+
+   xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
+   Errors       E_NULL; E_RANGE; E_BEHIND when a point is not in front of the eye: the capture is
+                unchanged
+   Cost         O(count) */
+TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
+                                                   uint32_t count);
+
 /* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
@@ -1709,7 +1719,8 @@ typedef struct terrimp_stats {
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
     uint32_t texels_used, texels_free; /* of all atlases */
-    uint32_t atlas_failures;     /* pictures that found no room, so far */
+    uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
+                                    are made */
     uint32_t evictions;          /* pictures given up for others, so far */
     float ground_tolerance_px;   /* what max_ground made of it */
     float worst_angle_rad;       /* of the impostors on the screen */
@@ -3273,6 +3284,41 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     terrimpi_widen(&c.tan_left, &c.tan_right, slope);
     terrimpi_widen(&c.tan_down, &c.tan_up, slope);
     *capture = c;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
+                                                   uint32_t count)
+{
+    float low[2], high[2], slope = 1.0f; /* tangents; a ray's length over its depth */
+    uint32_t i, k;
+    if (!capture || !xyz)
+        return TERRIMP_E_NULL;
+    if (count == 0)
+        return TERRIMP_E_RANGE;
+    low[0] = low[1] = TERRIMPI_FLOAT_MAX;
+    high[0] = high[1] = -TERRIMPI_FLOAT_MAX;
+    for (i = 0; i < count; i++, xyz += 3) {
+        float p[3], depth, tangent[2];
+        for (k = 0; k < 3u; k++)
+            p[k] = xyz[k] - capture->eye[k];
+        depth = terrimpi_dot(p, capture->forward);
+        if (!(depth > 0.0f))
+            return TERRIMP_E_BEHIND;
+        tangent[0] = terrimpi_dot(p, capture->right) / depth;
+        tangent[1] = terrimpi_dot(p, capture->up) / depth;
+        slope = terrimpi_max(slope, terrimpi_length(p) / depth);
+        for (k = 0; k < 2u; k++) {
+            low[k] = terrimpi_min(low[k], tangent[k]);
+            high[k] = terrimpi_max(high[k], tangent[k]);
+        }
+    }
+    for (k = 0; k < 2u; k++)
+        terrimpi_widen(&low[k], &high[k], slope);
+    capture->tan_left = low[0];
+    capture->tan_right = high[0];
+    capture->tan_down = low[1];
+    capture->tan_up = high[1];
     return TERRIMP_OK;
 }
 
@@ -10658,13 +10704,18 @@ static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *wan
         memcpy(eye, v->camera.eye, sizeof v->camera.eye);
 }
 
-/* Size of the slot that a capture needs. Returns 0 when no frustum fits. */
-static int terrimpi_slot_size(const terrimp_view *v, const terrimp_box *box, const float eye[3],
-                              terrimp_capture *capture, uint32_t size[2])
+/* The frustum around a node's mesh, and the size of the slot that it needs. Returns 0 when none
+   fits. */
+static int terrimpi_slot_size(terrimp_view *v, const terrimpi_site *s, const terrimp_box *box,
+                              const float eye[3], terrimp_capture *capture, uint32_t size[2])
 {
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
+    terrimp_mesh_info mesh;
+    terrimpi_mesh_place(v->terrain, s->node, &mesh);
+    terrimpi_fill_mesh(v->terrain, s->node, v->mesh_xyz, v->mesh_indices);
     if (terrimp_capture_fit(box, eye, capture) != TERRIMP_OK ||
+        terrimp_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count) != TERRIMP_OK ||
         terrimp_impostor_size(capture, v->pixel_factor, v->desc.texels_per_px,
                               TERRIMPI_SMALLEST_PICTURE, largest, size, NULL) != TERRIMP_OK)
         return 0;
@@ -10710,7 +10761,8 @@ static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_j
 }
 
 /* Whether the picture of a node is better made in two parts, and where: when smears of what hides
-   behind its ridges would show before it is renewed, and a split spares most of them. */
+   behind its ridges would show before it is renewed, and a split spares most of them. The node's
+   mesh is in mesh_xyz. */
 static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
                              const terrimp_capture *capture, float *distance)
 {
@@ -10719,7 +10771,6 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
     terrimp_split split;
     if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || v->desc.max_capture_triangles)
         return 0;
-    terrimpi_fill_mesh(v->terrain, want->site.node, v->mesh_xyz, v->mesh_indices);
     terrimp_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
                           3u * mesh->triangle_count, &split);
     sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
@@ -10742,7 +10793,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
     job->site = want->site;
     terrimpi_site_box(v, &want->site, &box);
     terrimpi_capture_eye(v, want, &box, eye);
-    if (!terrimpi_slot_size(v, &box, eye, front, size))
+    if (!terrimpi_slot_size(v, &want->site, &box, eye, front, size))
         return 0;
     job->record = v->record_of[want->site.node];
     if (job->record == TERRIMPI_NO_RECORD)
