@@ -6,7 +6,9 @@
 ##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
 ## make test      runs every test
-## make bench     measures
+## make bench     measures; tables and plots also go to build/bench/
+##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
+##                  BENCH_ALL=1      the whole protocol, for hours
 ## make check-portable   every compiler, other machines under an emulator, no operating system
 ## make sizes     bytes of code for small machines
 ## make fuzz SECONDS=60   looks for input that breaks the library, so long for each fuzzer
@@ -19,6 +21,11 @@
 ## GL=osmesa|egl, which windowless OpenGL; without it OSMesa where its header is, else EGL.
 
 CONFIG ?= release
+
+# The C++ compiler that belongs to the C compiler, unless CXX is given.
+ifeq ($(origin CXX),default)
+CXX := $(subst clang,clang++,$(subst gcc,g++,$(patsubst cc,c++,$(CC))))
+endif
 
 # What is asked for by name builds into a folder of its own, e.g. build/debug/egl.
 BUILD := build$(addprefix /,$(filter-out release,$(CONFIG)))$(addprefix /,$(GL))
@@ -33,6 +40,8 @@ endif
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wdouble-promotion \
             -Wcast-qual -Wundef -Wvla -Wstrict-prototypes -Wmissing-prototypes
+CXX_WARNINGS := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion \
+                -Wdouble-promotion -Wcast-qual -Wundef -Wvla
 
 # The compiler is asked as late as a recipe runs, so that `make deps demo` sees what deps installed.
 has_header = $(shell $(CC) -E -include $(1) -x c /dev/null >/dev/null 2>&1 && echo yes)
@@ -47,14 +56,15 @@ BENCH_FLAGS = $(if $(call has_header,meshoptimizer.h),-DTERRIMP_HAVE_MESHOPT)
 BENCH_LIBS  = $(if $(call has_header,meshoptimizer.h),-lmeshoptimizer)
 
 EXAMPLES := $(patsubst examples/%.c,%,$(wildcard examples/*.c))
+EXAMPLES_CPP := $(patsubst examples/%.cpp,%,$(wildcard examples/*.cpp))
 BENCHES  := $(patsubst tests/%.c,%,$(wildcard tests/bench_*.c))
 TESTS    := unit unit_host render
 HOST     := $(patsubst examples/%.c,$(BUILD)/%.o,$(wildcard examples/host/*.c))
 DEPS     := $(filter deps deps-portable,$(MAKECMDGOALS))
 
-all: $(EXAMPLES)
+all: $(EXAMPLES) $(if $(shell command -v $(firstword $(CXX))),$(EXAMPLES_CPP))
 
-$(EXAMPLES) $(BENCHES) $(TESTS): %: $(BUILD)/%
+$(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS): %: $(BUILD)/%
 
 help:
 	@sed -n 's/^## \{0,1\}//p' Makefile
@@ -71,9 +81,13 @@ demo: flyover
 test: | $(DEPS)
 	@sh tests/run.sh
 
-bench: $(BENCHES) flyover
+bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
 	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
-	@BUILD=$(BUILD) sh tests/bench_frames.sh
+
+# The rough terrain on which other engines have been measured.
+build/bench/rough.hgt: ../shared/tools/rough.c
+	@mkdir -p $(@D)
+	@$(CC) -O2 $< -o build/bench/rough -lm && build/bench/rough 2049 $@
 
 deps-portable:
 	@sh tests/deps_portable.sh
@@ -90,10 +104,11 @@ clean:
 
 # Every program is one source file of examples/ or tests/, and what it uses of examples/host/.
 vpath %.c examples tests
+vpath %.cpp examples
 
 $(BUILD)/%: $(BUILD)/%.o $(BUILD)/host.a
 	@echo "link    $@"
-	@$(CC) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) -lpng -lm -o $@
+	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) -lpng -lm -o $@
 
 $(BUILD)/host.a: $(HOST)
 	@rm -f $@
@@ -105,11 +120,20 @@ $(BUILD)/%.o: %.c | $(DEPS)
 	@$(CC) -std=c99 $(WARNINGS) $(CONFIG_$(CONFIG)) $(GL_FLAGS_$(GL)) $(FLAGS) -I. -MMD -MP \
 	    $(CFLAGS) -c $< -o $@
 
+$(BUILD)/%.o: %.cpp | $(DEPS)
+	@mkdir -p $(@D)
+	@echo "compile $<"
+	@$(CXX) -std=c++11 -pthread $(CXX_WARNINGS) $(CONFIG_$(CONFIG)) $(FLAGS) -I. -MMD -MP \
+	    $(CXXFLAGS) -c $< -o $@
+
+LINK = $(CC)
+$(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread
+
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
-$(BUILD)/bench_%: LIBS = $(BENCH_LIBS)
+$(BUILD)/bench_%: LIBS = $(BENCH_LIBS) -pthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
 .PHONY: all help deps demo test bench clean deps-portable check-portable sizes coverage analyse fuzz \
-        $(EXAMPLES) $(BENCHES) $(TESTS)
+        $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
 .SECONDARY:

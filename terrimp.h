@@ -44,7 +44,7 @@
        >>geomipmap    levels, errors, crack-free index patterns, selection, morphing
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
-       >>atlas        first-fit decreasing height packing; two atlases in turn
+       >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
        >>terrain      the quadtree, building, what the host's buffers hold
        >>view         the per-frame decision, the schedule, the draw commands
    The implementation has the same sections in the same order, tagged impl-. Each uses only
@@ -1222,11 +1222,11 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
    costs      [max_slots] of losing each slot that is in use; one whose cost is negative, infinite
               or NaN stays. Texels times how likely they are to be made again is a good cost
    victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
-              only handles were wanting
+              only handles were wanting. Scratch: it changes on E_CAPACITY too
    count      out: how many
    Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
               larger than the atlas or every such place holds a slot that stays: nothing changes
-   Cost       O(slots * (slots + free rectangles)) at worst */
+   Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count);
@@ -1450,9 +1450,9 @@ typedef enum terrimp_mode {
 typedef struct terrimp_costs {
     float draw;        /* one draw call [Limits: >= 0] [Default 0 -> 40] */
     float triangle;    /* one triangle with its share of vertices [Limits: >= 0] [Default 0 -> 1] */
-    float ground_px;   /* to shade a pixel of ground [Limits: >= 0] [Default 0 -> 0.08] */
-    float impostor_px; /* to shade a pixel of an impostor [Limits: >= 0] [Default 0 -> 0.08] */
-    float capture;     /* to begin and end a capture [Limits: >= 0] [Default 0 -> 1000] */
+    float ground_px;   /* to shade a pixel of ground [Limits: >= 0] [Default 0 -> 0.25] */
+    float impostor_px; /* to shade a pixel of an impostor [Limits: >= 0] [Default 0 -> 0.25] */
+    float capture;     /* to begin and end a capture [Limits: >= 0] [Default 0 -> 1400] */
 } terrimp_costs;
 
 /* The settings of a view. */
@@ -6878,6 +6878,12 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
     return TERRIMP_OK;
 }
 
+/* A side at a scale <= 1; whole at 1, since a float could round a huge one out of its type. */
+static uint32_t terrimpi_pair_side(uint32_t side, float scale)
+{
+    return scale < 1.0f ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
+}
+
 /* Inserts the non-empty items, tallest first, at a scale, into emptied shelves; returns whether all
    of them fitted. The sizes of `items` stay as asked for; rectangles go to the slots. */
 static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_pair_slot *slots,
@@ -6892,8 +6898,8 @@ static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_p
         terrimp_rect *rect = &slots[k].rect[atlas];
         if (items[k].rect.width < 1u || items[k].rect.height < 1u)
             continue;
-        rect->width = terrimpi_max_u32(1u, (uint32_t)((float)items[k].rect.width * scale));
-        rect->height = terrimpi_max_u32(1u, (uint32_t)((float)items[k].rect.height * scale));
+        rect->width = terrimpi_pair_side(items[k].rect.width, scale);
+        rect->height = terrimpi_pair_side(items[k].rect.height, scale);
         if (terrimp_shelves_insert(shelves, rect) != TERRIMP_OK)
             return 0;
     }
@@ -7360,87 +7366,143 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
     return TERRIMP_OK;
 }
 
-/* The cost of all slots that a place overlaps, or `limit` as soon as it is not below that. */
-static float terrimpi_live_cost(const terrimp_live_atlas *atlas, const terrimp_rect *place,
-                                const float *costs, float limit)
+/* The search for the place whose slots cost least. */
+typedef struct terrimpi_live_search {
+    const terrimp_live_atlas *atlas;
+    const float *costs;
+    uint32_t *by_x;    /* the slots in use from left to right */
+    uint32_t count;
+    uint32_t widest;   /* of these, with padding */
+    terrimp_rect best; /* its size is the one that is searched for */
+    float best_cost;
+} terrimpi_live_search;
+
+/* Lists the slots in use from left to right (Shell's sort: no recursion, no extra memory). */
+static void terrimpi_live_list(terrimpi_live_search *s)
+{
+    const terrimp_rect *slots = s->atlas->slots;
+    uint32_t i, k, gap;
+    s->count = s->widest = 0;
+    for (i = 0; i < s->atlas->slot_end; i++)
+        if (slots[i].width > 0) {
+            s->by_x[s->count++] = i;
+            s->widest = terrimpi_max_u32(s->widest, slots[i].width + s->atlas->desc.padding);
+        }
+    for (gap = 1; gap < s->count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < s->count; i++) {
+            uint32_t moved = s->by_x[i];
+            for (k = i; k >= gap && slots[s->by_x[k - gap]].x > slots[moved].x; k -= gap)
+                s->by_x[k] = s->by_x[k - gap];
+            s->by_x[k] = moved;
+        }
+}
+
+/* The first in the list of slots that may reach over a column. */
+static uint32_t terrimpi_live_reaching(const terrimpi_live_search *s, uint32_t x)
+{
+    uint32_t low = 0, high = s->count;
+    while (low < high) {
+        uint32_t middle = (low + high) / 2u;
+        if (s->atlas->slots[s->by_x[middle]].x + s->widest <= x)
+            low = middle + 1u;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Takes a place if its slots cost less than those of the best one so far. */
+static void terrimpi_live_weigh(terrimpi_live_search *s, const terrimp_rect *place)
 {
     float cost = 0.0f;
     uint32_t i;
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect taken = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &taken))
+    for (i = terrimpi_live_reaching(s, place->x); i < s->count; i++) {
+        uint32_t slot = s->by_x[i];
+        terrimp_rect taken = terrimpi_live_padded(s->atlas, slot);
+        if (taken.x >= place->x + place->width)
+            break;
+        if (!terrimpi_rects_overlap(place, &taken))
             continue;
-        cost += costs[i];
-        if (!(costs[i] >= 0.0f && cost < limit))
-            return limit;
+        cost += s->costs[slot];
+        if (!(s->costs[slot] >= 0.0f && cost < s->best_cost))
+            return;
     }
-    return cost;
+    if (cost < s->best_cost) {
+        s->best_cost = cost;
+        s->best = *place;
+    }
 }
 
-/* Tries a rectangle at the four corners of another one, shifted into the atlas. */
-static void terrimpi_live_try(const terrimp_live_atlas *atlas, const terrimp_rect *at,
-                              const float *costs, terrimp_rect *best, float *best_cost)
+/* Tries a place at the four corners of a rectangle, shifted into the atlas. */
+static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
 {
-    terrimp_rect whole = terrimpi_live_whole(atlas);
-    uint32_t corner;
+    terrimp_rect whole = terrimpi_live_whole(s->atlas);
+    uint32_t corner, right = at->x + at->width, top = at->y + at->height;
     for (corner = 0; corner < 4u; corner++) {
-        uint32_t x = corner & 1u ? at->x + at->width : at->x;
-        uint32_t y = corner & 2u ? at->y + at->height : at->y;
-        terrimp_rect place = *best;
-        float cost;
-        place.x = corner & 1u ? x - terrimpi_min_u32(x, place.width) : x;
-        place.y = corner & 2u ? y - terrimpi_min_u32(y, place.height) : y;
+        terrimp_rect place = s->best;
+        place.x = corner & 1u ? right - terrimpi_min_u32(right, place.width) : at->x;
+        place.y = corner & 2u ? top - terrimpi_min_u32(top, place.height) : at->y;
         place.x = terrimpi_min_u32(place.x, whole.width - place.width);
         place.y = terrimpi_min_u32(place.y, whole.height - place.height);
-        cost = terrimpi_live_cost(atlas, &place, costs, *best_cost);
-        if (cost < *best_cost) {
-            *best_cost = cost;
-            *best = place;
-        }
+        terrimpi_live_weigh(s, &place);
     }
 }
 
-/* The place of a size, at a corner of a hole or of a slot, whose slots cost least. Returns 0 when
-   all such places hold a slot that stays. */
-static int terrimpi_live_cheapest(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
-                                  const float *costs, terrimp_rect *place)
+/* Searches at the corners of holes and slots, where there are very many at every so manieth.
+   Returns 0 when all such places hold a slot that stays. */
+static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
 {
     const float none = 3e38f;
-    float cost = none;
-    uint32_t i;
-    *place = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
-    for (i = 0; i < atlas->hole_count; i++)
-        terrimpi_live_try(atlas, &atlas->holes[i], costs, place, &cost);
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width > 0)
-            terrimpi_live_try(atlas, &slot, costs, place, &cost);
+    const terrimp_live_atlas *atlas = s->atlas;
+    uint32_t i, step = 1u + (atlas->hole_count + atlas->slot_count) / 512u;
+    s->best_cost = none;
+    s->best = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
+    terrimpi_live_list(s);
+    for (i = 0; i < atlas->hole_count; i += step)
+        terrimpi_live_try(s, &atlas->holes[i]);
+    for (i = 0; i < s->count; i += step) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, s->by_x[i]);
+        terrimpi_live_try(s, &slot);
     }
-    return cost < none;
+    return s->best_cost < none;
 }
 
-/* The same for a mere handle: the place of the slot that costs least. */
-static int terrimpi_live_cheapest_slot(const terrimp_live_atlas *atlas, const float *costs,
-                                       terrimp_rect *place)
+/* The same for a mere handle: the slot that costs least. */
+static int terrimpi_live_cheapest_slot(terrimpi_live_search *s)
 {
-    float cost = 3e38f;
-    int found = 0;
+    const float none = 3e38f;
     uint32_t i;
-    for (i = 0; i < atlas->slot_end; i++)
-        if (atlas->slots[i].width > 0 && costs[i] >= 0.0f && costs[i] < cost) {
-            cost = costs[i];
-            *place = terrimpi_live_padded(atlas, i);
-            found = 1;
+    s->best_cost = none;
+    for (i = 0; i < s->atlas->slot_end; i++)
+        if (s->atlas->slots[i].width > 0 && s->costs[i] >= 0.0f && s->costs[i] < s->best_cost) {
+            s->best_cost = s->costs[i];
+            s->best = terrimpi_live_padded(s->atlas, i);
         }
-    return found;
+    return s->best_cost < none;
+}
+
+/* Frees the slots that overlap a place; returns how many. */
+static uint32_t terrimpi_live_clear(terrimp_live_atlas *atlas, const terrimp_rect *place,
+                                    uint32_t *victims)
+{
+    uint32_t i, count = 0;
+    for (i = 0; i < atlas->slot_end; i++) {
+        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &slot))
+            continue;
+        terrimp_live_atlas_free(atlas, i);
+        victims[count++] = i;
+    }
+    return count;
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count)
 {
-    terrimp_rect place;
-    uint32_t i, freed = 0;
+    terrimpi_live_search search;
     int fits;
     if (!atlas || !costs || !victims || !count)
         return TERRIMP_E_NULL;
@@ -7455,17 +7517,13 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
         *count = 0;
         return TERRIMP_OK;
     }
-    if (!(fits ? terrimpi_live_cheapest_slot(atlas, costs, &place)
-               : terrimpi_live_cheapest(atlas, width, height, costs, &place)))
+    search.atlas = atlas;
+    search.costs = costs;
+    search.by_x = victims;
+    if (!(fits ? terrimpi_live_cheapest_slot(&search)
+               : terrimpi_live_cheapest(&search, width, height)))
         return TERRIMP_E_CAPACITY;
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(&place, &slot))
-            continue;
-        terrimp_live_atlas_free(atlas, i);
-        victims[freed++] = i;
-    }
-    *count = freed;
+    *count = terrimpi_live_clear(atlas, &search.best, victims);
     return TERRIMP_OK;
 }
 
@@ -8819,7 +8877,8 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
-#define TERRIMPI_SPLIT_GAIN 0.7f  /* ... is split when its smears fall to this at most */
+#define TERRIMPI_SPLIT_SMEAR 4.0f /* ... is split when its smears exceed the tolerance by this */
+#define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
 
 /* A node and where it stands. */
 typedef struct terrimpi_site {
@@ -8955,9 +9014,9 @@ static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)
         return TERRIMP_E_RANGE;
     terrimpi_default(&c->draw, 40.0f);
     terrimpi_default(&c->triangle, 1.0f);
-    terrimpi_default(&c->ground_px, 0.08f);
-    terrimpi_default(&c->impostor_px, 0.08f);
-    terrimpi_default(&c->capture, 1000.0f);
+    terrimpi_default(&c->ground_px, 0.25f);
+    terrimpi_default(&c->impostor_px, 0.25f);
+    terrimpi_default(&c->capture, 1400.0f);
     return TERRIMP_OK;
 }
 
@@ -9824,6 +9883,13 @@ static uint32_t terrimpi_piece_triangles(const terrimp_view *v, const terrimpi_j
     return triangles;
 }
 
+/* The sine of the angle at which a capture looks down on the ground, not to be taken too small. */
+static float terrimpi_sine_of_view(const terrimp_capture *capture, const terrimp_box *box)
+{
+    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
+    return terrimpi_max(drop / capture->z_far, 0.1f);
+}
+
 /* The strip of neighbours that a capture needs, as a number of terrimpi_strip_quads: the texels
    that bilinear reads and the parallax can reach, in world units. At a grazing angle a texel is as
    many times longer on the ground as the sine of that angle is smaller. */
@@ -9836,8 +9902,7 @@ static uint32_t terrimpi_strip_width(const terrimp_view *v, const terrimpi_job *
     float texels = 1.5f + v->desc.tolerance_px * v->desc.texels_per_px;
     float per_texel_x = (capture->tan_right - capture->tan_left) / (float)job->rects[0].width;
     float per_texel_y = (capture->tan_up - capture->tan_down) / (float)job->rects[0].height;
-    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    float sine = terrimpi_max(drop / capture->z_far, 0.1f);
+    float sine = terrimpi_sine_of_view(capture, box);
     float reach = texels * capture->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
     float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << job->source);
     while (width < strips && (float)terrimpi_strip_quads(quads, width) * step < reach)
@@ -9929,7 +9994,8 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
                           3u * mesh->triangle_count, &split);
     sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
     *distance = split.distance;
-    return split.gap * sine * v->pixel_factor > v->desc.tolerance_px &&
+    return split.gap * sine * v->pixel_factor >
+               TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
            split.gap_left < split.gap * TERRIMPI_SPLIT_GAIN;
 }
 
@@ -9968,8 +10034,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
     *back = *front;
-    if (job->part_count == 2u) { /* the parts overlap by what the mesh may be off */
-        float overlap = 2.0f * terrimpi_mesh_error(v, want->site.node);
+    if (job->part_count == 2u) { /* the parts overlap by what the mesh may be off along a ray */
+        float overlap = 2.0f * terrimpi_mesh_error(v, want->site.node) /
+                        terrimpi_sine_of_view(front, &box);
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
     }

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs what the examples and tests need and this Debian lacks: a C compiler, libc's headers,
+# Installs what the examples and tests need and this Debian lacks: compilers, libc's headers,
 # libpng, and OpenGL without a window from OSMesa and from EGL, of which one is enough.
 # Each need is tested by building (and running) the smallest program that has it.
 
@@ -20,6 +20,12 @@ builds()
 has_compiler()
 {
     command -v "${CC%% *}" > /dev/null
+}
+
+has_cxx_compiler()
+{
+    cxx=${CXX:-c++}
+    command -v "${cxx%% *}" > /dev/null
 }
 
 has_libc()
@@ -66,13 +72,15 @@ egl_packages="libegl-dev libopengl-dev libegl-mesa0 libgl1-mesa-dri"
 missing()
 {
     has_compiler || echo gcc
+    has_cxx_compiler || echo g++
     has_libc     || echo libc6-dev
     has_png      || echo libpng-dev
     has_osmesa   || echo "$osmesa_packages"
     has_egl      || echo "$egl_packages"
 }
 
-# The needs themselves, once nothing more can be installed: OSMesa or EGL is enough.
+# The needs themselves, once nothing more can be installed: OSMesa or EGL is enough, and C++ is for
+# one example.
 enough()
 {
     has_compiler && has_libc && has_png && { has_osmesa || has_egl; }

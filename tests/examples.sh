@@ -60,6 +60,26 @@ geomip_runs()
     (cd $work && ../../geomip) > $work/geomip.txt && [ -s $work/geomip.png ]
 }
 
+# ---- hosts of other kinds: each compares its pictures with its own full mesh
+
+# Runs in the work folder and leaves its picture there.
+host_runs() # name
+{
+    (cd $work && ../../$1) > $work/$1.txt && [ -s $work/$1.png ] || { cat $work/$1.txt; false; }
+}
+
+# OpenGL functions that fixed_function calls and OpenGL 1.1 lacks. Whoever needs another old one
+# adds it to the list.
+newer_than_opengl_1_1()
+{
+    nm -u build/fixed_function.o | awk '$2 ~ /^gl/ { print $2 }' | grep -vxE \
+        'gl(AlphaFunc|BindTexture|BlendFunc|Clear|ClearColor|Color4f|CopyTexSubImage2D)|'\
+'gl(DepthFunc|DepthMask|Disable|DrawElements|Enable|EnableClientState|GenTextures|GetError)|'\
+'gl(LoadIdentity|LoadMatrixf|MatrixMode|MultMatrixf|PixelStorei|PopMatrix|PushMatrix|Scalef)|'\
+'gl(Scissor|ShadeModel|TexCoordPointer|TexEnvi|TexImage2D|TexParameteri|Translatef)|'\
+'gl(ClipPlane|VertexPointer|Viewport|ColorMask|Begin|End|TexCoord2f|Vertex2f)'
+}
+
 # ---- flyover: the pictures are looked at by tests/render.c, here it is its manners
 
 fly()
@@ -118,6 +138,17 @@ unknown_options()
 check "make builds every example" make -s all
 if [ -x build/geomip ]; then
     check "geomip draws its frames and leaves a picture" geomip_runs
+fi
+check "software draws its frames without a GPU, close to the full mesh" host_runs software
+if [ -x build/fixed_function ]; then
+    check "fixed_function draws its frames, close to the full mesh" host_runs fixed_function
+    check "fixed_function calls nothing newer than OpenGL 1.1" \
+        prints_nothing newer_than_opengl_1_1
+fi
+if [ -x build/cpp_host ]; then
+    check "cpp_host draws its frames, close to the full mesh" host_runs cpp_host
+else
+    skip "cpp_host: there is no C++ compiler"
 fi
 if [ -x build/flyover ]; then
     check "flyover flies over its own terrain" prints_nothing flies_quietly

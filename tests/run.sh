@@ -99,6 +99,7 @@ done
 suite "documentation" sh tests/docs.sh
 suite "compilers and build options" sh tests/compile/run.sh
 suite "hygiene" sh tests/hygiene.sh
+suite "fuzzers, over their corpus" sh tests/fuzz.sh
 suite "examples" sh tests/examples.sh
 
 if has_library GL/osmesa.h -lOSMesa; then

@@ -1,10 +1,11 @@
 /* Tests of what the examples share and that needs no OpenGL: pictures, statistics, elevation files,
-   flights, the command line, procedural terrain, the lightmap.
+   flights, the command line, procedural terrain, the lightmap, the span rasteriser.
    Build:  make unit_host  (cc -std=c99 -I. tests/unit_host.c examples/host/{...}.c -lpng -lm) */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
 #include "check.h"
+#include "unit_host_quality.h"
 
 #include "examples/host/dem.h"
 #include "examples/host/flight.h"
@@ -12,6 +13,7 @@
 #include "examples/host/lightmap.h"
 #include "examples/host/options.h"
 #include "examples/host/procedural.h"
+#include "examples/host/raster.h"
 #include "examples/host/stats.h"
 
 #include <math.h>
@@ -518,6 +520,202 @@ static void any_size_of_field_is_lit(void)
     free(rgb);
 }
 
+/* ---- The span rasteriser ------------------------------------------------ */
+
+enum { RASTER_WIDTH = 80, RASTER_HEIGHT = 60, RASTER_PITCH = 90, RASTER_SIDE = 64 };
+
+typedef struct raster_scene {
+    raster r;
+    raster_texture texture;
+    uint16_t texels[RASTER_SIDE * RASTER_SIDE]; /* each its own number, none of them the key */
+    uint16_t pixels[RASTER_PITCH * (RASTER_HEIGHT + 2)];
+    uint16_t depth[RASTER_WIDTH * RASTER_HEIGHT + 2];
+    raster_style style;
+    terrimp_camera camera;
+} raster_scene;
+
+/* World x, z of -32..32 to the whole texture. */
+static const float plane_matrix[16] = { 1.0f / 64, 0, 0, 0, 0, 0, 0, 0, 0, 1.0f / 64, 0, 0,
+                                        0.5f, 0.5f, 0, 1 };
+
+static void open_raster_scene(raster_scene *s, int row_0_is_top)
+{
+    float view[16], projection[16];
+    int i;
+    memset(s, 0, sizeof *s);
+    for (i = 0; i < RASTER_SIDE * RASTER_SIDE; i++)
+        s->texels[i] = (uint16_t)i;
+    s->texture.levels[0] = s->texels;
+    s->texture.level_count = 1;
+    s->texture.log2_side = 6;
+    s->style.texture = &s->texture;
+    s->style.texture_matrix = plane_matrix;
+    s->style.alpha = RASTER_OPAQUE;
+    s->camera.eye[0] = random_float(-10.0f, 10.0f);
+    s->camera.eye[1] = random_float(5.0f, 20.0f);
+    s->camera.eye[2] = random_float(-10.0f, 10.0f);
+    s->camera.forward[0] = random_float(-0.3f, 0.3f);
+    s->camera.forward[1] = -1.0f;
+    s->camera.forward[2] = random_float(-0.3f, 0.3f);
+    s->camera.width_px = RASTER_WIDTH;
+    s->camera.height_px = RASTER_HEIGHT;
+    s->camera.z_near = 0.5f;
+    s->camera.z_far = 100.0f;
+    CHECK(terrimp_camera_matrices(&s->camera, view, projection) == TERRIMP_OK);
+    raster_begin(&s->r, s->pixels + RASTER_PITCH, s->depth + 1, RASTER_PITCH, RASTER_WIDTH,
+                 RASTER_HEIGHT, row_0_is_top, view, projection, s->camera.eye);
+    raster_clear(&s->r, RASTER_KEY);
+    raster_clear_depth(&s->r);
+}
+
+/* A plane y = 0 of random triangles, wider than what is in view. */
+static void draw_plane(raster_scene *s)
+{
+    enum { QUADS = 12, ROW = QUADS + 1 };
+    float xyz[ROW * ROW][3];
+    uint16_t indices[QUADS * QUADS * 6];
+    size_t count = 0;
+    int x, z, k;
+    for (z = 0; z < ROW; z++)
+        for (x = 0; x < ROW; x++) {
+            xyz[z * ROW + x][0] = ((float)x - 6.0f) * 30.0f + random_float(-9.0f, 9.0f);
+            xyz[z * ROW + x][1] = 0.0f;
+            xyz[z * ROW + x][2] = ((float)z - 6.0f) * 30.0f + random_float(-9.0f, 9.0f);
+        }
+    for (z = 0; z < QUADS; z++)
+        for (x = 0; x < QUADS; x++) {
+            int a = z * ROW + x;
+            const int corners[6] = { a, a + ROW, a + 1, a + 1, a + ROW, a + ROW + 1 };
+            for (k = 0; k < 6; k++)
+                indices[count++] = (uint16_t)corners[k];
+        }
+    raster_draw(&s->r, &s->style, xyz[0], indices, count);
+}
+
+/* The texel coordinates where a pixel's ray meets the plane; 0 when that is off the texture. */
+static int meet_plane(const raster_scene *s, int x, int y, float texel[2])
+{
+    float view[16], projection[16], direction[3], k;
+    float right = ((float)x + 0.5f) / RASTER_WIDTH * 2.0f - 1.0f;
+    float up = ((float)y + 0.5f) / RASTER_HEIGHT * 2.0f - 1.0f;
+    int i;
+    terrimp_camera_matrices(&s->camera, view, projection);
+    if (s->r.row_0_is_top)
+        up = -up;
+    for (i = 0; i < 3; i++)
+        direction[i] = view[i * 4] * right / projection[0]
+                       + view[i * 4 + 1] * up / projection[5] - view[i * 4 + 2];
+    k = -s->camera.eye[1] / direction[1];
+    texel[0] = s->camera.eye[0] + k * direction[0] + 32.0f;
+    texel[1] = s->camera.eye[2] + k * direction[2] + 32.0f;
+    return k > 0.0f && texel[0] > 0.0f && texel[0] < 64.0f && texel[1] > 0.0f && texel[1] < 64.0f;
+}
+
+/* Within 16 pixels the texture goes straight, which here costs less than half a texel. */
+static void rasterised_pixels_are_what_their_rays_meet(void)
+{
+    static raster_scene s;
+    int round, x, y, met = 0;
+    for (round = 0; round < 40; round++) {
+        open_raster_scene(&s, round % 2);
+        draw_plane(&s);
+        for (y = 0; y < RASTER_HEIGHT; y++)
+            for (x = 0; x < RASTER_WIDTH; x++) {
+                uint16_t pixel = s.r.pixels[y * RASTER_PITCH + x];
+                float texel[2];
+                CHECK(pixel != RASTER_KEY); /* no gap between triangles */
+                if (!meet_plane(&s, x, y, texel))
+                    continue;
+                met++;
+                CHECK(fabsf((float)(pixel % RASTER_SIDE) + 0.5f - texel[0]) < 1.0f);
+                CHECK(fabsf((float)(pixel / RASTER_SIDE) + 0.5f - texel[1]) < 1.0f);
+            }
+    }
+    CHECK(met > 100000);
+}
+
+/* Triangles anywhere, behind the eye and across it too. */
+static void rasterised_triangles_stay_in_their_target(void)
+{
+    static raster_scene s;
+    int round, i, x, y;
+    for (round = 0; round < 50; round++) {
+        float xyz[30][3];
+        uint16_t indices[60];
+        open_raster_scene(&s, round % 2);
+        for (i = 0; i < 90; i++)
+            xyz[i / 3][i % 3] = s.camera.eye[i % 3]
+                                + random_float(-1.0f, 1.0f) * (random_bits() % 4 ? 40.0f : 0.6f);
+        for (i = 0; i < 60; i++)
+            indices[i] = (uint16_t)(random_bits() % 30);
+        raster_draw(&s.r, &s.style, xyz[0], indices, 60);
+        for (y = 0; y < RASTER_HEIGHT + 2; y++)
+            for (x = 0; x < RASTER_PITCH; x++)
+                CHECK(s.pixels[y * RASTER_PITCH + x] == 0
+                      || (y > 0 && y <= RASTER_HEIGHT && x < RASTER_WIDTH));
+        CHECK(s.depth[0] == 0 && s.depth[RASTER_WIDTH * RASTER_HEIGHT + 1] == 0);
+    }
+}
+
+/* Two planes, one above the other: the upper one is seen, whichever comes first; but not when a
+   bias takes it deeper, and not when it has the colour of nothing. */
+static void the_nearer_of_two_pixels_wins(void)
+{
+    static raster_scene s;
+    const uint16_t indices[3] = { 0, 2, 1 };
+    const float low[3][3] = { { -200, 0, -200 }, { 200, 0, -200 }, { 0, 0, 200 } };
+    const float high[3][3] = { { -200, 2, -200 }, { 200, 2, -200 }, { 0, 2, 200 } };
+    const int middle = RASTER_HEIGHT / 2 * RASTER_PITCH + RASTER_WIDTH / 2;
+    int i, order;
+    for (order = 0; order < 4; order++) {
+        const uint16_t colours[2] = { 0x001f, order == 3 ? RASTER_KEY : 0x07e0 };
+        open_raster_scene(&s, 1);
+        for (i = 0; i < 2; i++) {
+            int is_high = (i + order) % 2;
+            s.texture.levels[0] = &colours[is_high];
+            s.texture.log2_side = 0;
+            s.style.depth_bias = order == 2 && is_high ? 2.0f : 0.0f;
+            raster_draw(&s.r, &s.style, is_high ? high[0] : low[0], indices, 3);
+        }
+        CHECK(s.r.pixels[middle] == (order < 2 ? 0x07e0 : 0x001f));
+    }
+}
+
+static void half_alpha_is_the_mean_of_both_colours(void)
+{
+    static raster_scene s;
+    int i;
+    open_raster_scene(&s, 1);
+    raster_clear(&s.r, 0);
+    for (i = 0; i < RASTER_SIDE * RASTER_SIDE; i++)
+        s.texels[i] = 0xffff;
+    s.style.alpha = RASTER_OPAQUE / 2;
+    draw_plane(&s);
+    for (i = 0; i < RASTER_HEIGHT; i++)
+        CHECK(s.r.pixels[i * RASTER_PITCH + i] == (15 << 11 | 31 << 5 | 15));
+}
+
+static void a_mipmap_is_the_mean_of_its_texels_and_never_the_key(void)
+{
+    static uint8_t rgb[16 * 16 * 3];
+    uint16_t texels[16 * 16 * 4 / 3 + 1];
+    raster_texture texture;
+    int i;
+    for (i = 0; i < 16 * 16 * 3; i++)
+        rgb[i] = (uint8_t)(i / 3 % 2 ? 255 : i % 3 == 0 ? 255 : 0); /* white and red, in turn */
+    raster_make_texture(&texture, texels, rgb, 4);
+    CHECK(texture.level_count == 5 && texture.log2_side == 4);
+    CHECK(texture.levels[0][0] == 0xf800 && texture.levels[0][1] == 0xffff);
+    for (i = 1; i < 5; i++)
+        CHECK(texture.levels[i][0] == (31 << 11 | 31 << 5 | 15));
+    CHECK(texture.levels[4] - texels == 16 * 16 + 8 * 8 + 4 * 4 + 2 * 2);
+    for (i = 0; i < 16 * 16 * 3; i++)
+        rgb[i] = i % 3 == 1 ? 0 : 255; /* the key's own colour */
+    raster_make_texture(&texture, texels, rgb, 4);
+    for (i = 0; i < 16 * 16; i++)
+        CHECK(texels[i] != RASTER_KEY);
+}
+
 int main(void)
 {
     RUN(a_written_picture_reads_back_alike);
@@ -528,6 +726,7 @@ int main(void)
     RUN(figures_agree_with_brute_force);
     RUN(few_values_give_figures_too);
     RUN(the_clock_goes_forward);
+    run_quality_tests();
     RUN(an_hgt_is_square_and_big_endian);
     RUN(a_pgm_keeps_its_sample_size);
     RUN(a_malformed_pgm_is_refused);
@@ -545,6 +744,11 @@ int main(void)
     RUN(procedural_terrain_has_peaks_and_valleys);
     RUN(a_wall_throws_its_shadow_away_from_the_sun);
     RUN(any_size_of_field_is_lit);
+    RUN(rasterised_pixels_are_what_their_rays_meet);
+    RUN(rasterised_triangles_stay_in_their_target);
+    RUN(the_nearer_of_two_pixels_wins);
+    RUN(half_alpha_is_the_mean_of_both_colours);
+    RUN(a_mipmap_is_the_mean_of_its_texels_and_never_the_key);
     remove(scratch_file);
     return check_report();
 }

@@ -5,7 +5,8 @@
 #include <string.h>
 
 /* The windowless system: system_open makes a context current and stores what system_close
-   needs; both are written once for OSMesa and once for EGL. */
+   needs; both are written once for OSMesa and once for EGL. A context of the old kind has a frame
+   buffer of its own, width x height pixels with alpha and depth; the other draws into none. */
 
 #if defined(HOST_OSMESA)
 
@@ -13,20 +14,21 @@
 
 #define SYSTEM_NAME "OSMesa"
 
-/* OSMesa insists on a buffer of its own; nothing is ever drawn into it. */
+/* OSMesa insists on a buffer of its own; a context of the new kind never draws into it. */
 typedef struct osmesa_system {
     OSMesaContext context;
-    uint8_t unused_frame[4 * 4 * 4];
+    uint8_t *frame;
 } osmesa_system;
 
 static void system_close(void *system)
 {
     osmesa_system *s = system;
     OSMesaDestroyContext(s->context);
+    free(s->frame);
     free(s);
 }
 
-static const char *system_open(void **system)
+static const char *system_open(void **system, int width, int height, int old)
 {
     static const int attributes[] = { OSMESA_FORMAT, OSMESA_RGBA,
                                       OSMESA_DEPTH_BITS, 24,
@@ -34,14 +36,20 @@ static const char *system_open(void **system)
                                       OSMESA_CONTEXT_MAJOR_VERSION, 3,
                                       OSMESA_CONTEXT_MINOR_VERSION, 3, 0 };
     osmesa_system *s = calloc(1, sizeof *s);
-    if (!s)
-        return "out of memory";
-    s->context = OSMesaCreateContextAttribs(attributes, NULL);
-    if (!s->context) {
+    if (s)
+        s->frame = malloc((size_t)width * (size_t)height * 4u);
+    if (!s || !s->frame) {
         free(s);
-        return "OSMesa gives no OpenGL 3.3 context";
+        return "out of memory";
     }
-    if (!OSMesaMakeCurrent(s->context, s->unused_frame, GL_UNSIGNED_BYTE, 4, 4)) {
+    s->context = old ? OSMesaCreateContextExt(OSMESA_RGBA, 24, 0, 0, NULL)
+                     : OSMesaCreateContextAttribs(attributes, NULL);
+    if (!s->context) {
+        free(s->frame);
+        free(s);
+        return old ? "OSMesa gives no OpenGL context" : "OSMesa gives no OpenGL 3.3 context";
+    }
+    if (!OSMesaMakeCurrent(s->context, s->frame, GL_UNSIGNED_BYTE, width, height)) {
         system_close(s);
         return "OSMesa does not make its context current";
     }
@@ -59,6 +67,7 @@ static const char *system_open(void **system)
 typedef struct egl_system {
     EGLDisplay display;
     EGLContext context;
+    EGLSurface surface;
 } egl_system;
 
 static void system_close(void *system)
@@ -67,6 +76,8 @@ static void system_close(void *system)
     eglMakeCurrent(s->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (s->context != EGL_NO_CONTEXT)
         eglDestroyContext(s->display, s->context);
+    if (s->surface != EGL_NO_SURFACE)
+        eglDestroySurface(s->display, s->surface);
     eglTerminate(s->display);
     free(s);
 }
@@ -82,10 +93,15 @@ static EGLDisplay surfaceless_display(void)
     return display != EGL_NO_DISPLAY ? display : eglGetDisplay(EGL_DEFAULT_DISPLAY);
 }
 
-static const char *make_egl_context(egl_system *s)
+static const char *make_egl_context(egl_system *s, int width, int height, int old)
 {
     static const EGLint config_attributes[] = { EGL_SURFACE_TYPE, EGL_PBUFFER_BIT,
-                                                EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE };
+                                                EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
+                                                EGL_RED_SIZE, 8, EGL_GREEN_SIZE, 8,
+                                                EGL_BLUE_SIZE, 8, EGL_ALPHA_SIZE, 8,
+                                                EGL_DEPTH_SIZE, 24, EGL_NONE };
+    static const EGLint no_attributes[] = { EGL_NONE };
+    const EGLint sides[] = { EGL_WIDTH, width, EGL_HEIGHT, height, EGL_NONE };
     static const EGLint attributes[] = { EGL_CONTEXT_MAJOR_VERSION, 3,
                                          EGL_CONTEXT_MINOR_VERSION, 3,
                                          EGL_CONTEXT_OPENGL_PROFILE_MASK,
@@ -96,27 +112,33 @@ static const char *make_egl_context(egl_system *s)
         return "EGL has no desktop OpenGL";
     if (!eglChooseConfig(s->display, config_attributes, &config, 1, &configs) || configs < 1)
         return "EGL has no configuration for OpenGL";
-    s->context = eglCreateContext(s->display, config, EGL_NO_CONTEXT, attributes);
+    s->context = eglCreateContext(s->display, config, EGL_NO_CONTEXT,
+                                  old ? no_attributes : attributes);
     if (s->context == EGL_NO_CONTEXT)
-        return "EGL gives no OpenGL 3.3 context";
-    if (!eglMakeCurrent(s->display, EGL_NO_SURFACE, EGL_NO_SURFACE, s->context))
-        return "EGL cannot make a context current without a surface";
+        return old ? "EGL gives no OpenGL context" : "EGL gives no OpenGL 3.3 context";
+    if (old)
+        s->surface = eglCreatePbufferSurface(s->display, config, sides);
+    if (old && s->surface == EGL_NO_SURFACE)
+        return "EGL gives no frame buffer of that size";
+    if (!eglMakeCurrent(s->display, s->surface, s->surface, s->context))
+        return "EGL cannot make its context current";
     return NULL;
 }
 
-static const char *system_open(void **system)
+static const char *system_open(void **system, int width, int height, int old)
 {
     const char *trouble;
     egl_system *s = calloc(1, sizeof *s);
     if (!s)
         return "out of memory";
     s->context = EGL_NO_CONTEXT;
+    s->surface = EGL_NO_SURFACE;
     s->display = surfaceless_display();
     if (s->display == EGL_NO_DISPLAY || !eglInitialize(s->display, NULL, NULL)) {
         free(s);
         return "EGL has no display without a window";
     }
-    trouble = make_egl_context(s);
+    trouble = make_egl_context(s, width, height, old);
     if (trouble) {
         system_close(s);
         return trouble;
@@ -145,9 +167,6 @@ static const char *make_framebuffer(context *c)
     glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &limit);
     if (c->width > limit || c->height > limit)
         return "the frame is larger than OpenGL's limit";
-    c->reading = malloc((size_t)c->width * (size_t)c->height * 4u);
-    if (!c->reading)
-        return "out of memory";
     glGenFramebuffers(1, &c->framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, c->framebuffer);
     c->colour = attach_renderbuffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, c->width, c->height);
@@ -157,7 +176,7 @@ static const char *make_framebuffer(context *c)
     return NULL;
 }
 
-const char *context_open(context *c, int width, int height)
+static const char *open_context(context *c, int width, int height, int old)
 {
     const char *trouble;
     memset(c, 0, sizeof *c);
@@ -165,14 +184,28 @@ const char *context_open(context *c, int width, int height)
     c->height = height;
     if (width < 1 || height < 1)
         return "the frame needs at least one pixel";
-    trouble = system_open(&c->system);
-    if (!trouble)
+    trouble = system_open(&c->system, old ? width : 4, old ? height : 4, old);
+    if (!trouble && !old)
         trouble = make_framebuffer(c);
+    if (!trouble)
+        c->reading = malloc((size_t)width * (size_t)height * 4u);
+    if (!trouble && !c->reading)
+        trouble = "out of memory";
     if (trouble)
         context_close(c);
     else
         context_bind(c);
     return trouble;
+}
+
+const char *context_open(context *c, int width, int height)
+{
+    return open_context(c, width, height, 0);
+}
+
+const char *context_open_old(context *c, int width, int height)
+{
+    return open_context(c, width, height, 1);
 }
 
 void context_bind(const context *c)

@@ -1,4 +1,4 @@
-/* An OpenGL 3.3 context without a window, and one framebuffer to draw frames into.
+/* An OpenGL context without a window, 3.3 or an old one, and one framebuffer to draw frames into.
    OSMesa (-DHOST_OSMESA) or EGL without a surface (-DHOST_EGL): only context.c knows which. */
 #ifndef HOST_CONTEXT_H
 #define HOST_CONTEXT_H
@@ -18,6 +18,11 @@ typedef struct context {
 /* Makes a context current and binds its framebuffer, width x height pixels.
    Returns null, or one line that says what is missing. */
 const char *context_open(context *c, int width, int height);
+
+/* The same for programs that use nothing newer than OpenGL 1.1: a context of the old kind, with
+   matrix stacks and client arrays. The frame is the system's own frame buffer, framebuffer 0, with
+   8 bits of alpha and 24 of depth. */
+const char *context_open_old(context *c, int width, int height);
 
 /* Draw calls go to the frame again (after a capture); the viewport is all of it. */
 void context_bind(const context *c);

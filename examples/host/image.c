@@ -87,3 +87,21 @@ void image_difference(const uint8_t *a, const uint8_t *b, size_t pixel_count, in
         out[i] = (uint8_t)(ink < 255 ? 255 - ink : 0);
     }
 }
+
+size_t image_holes(const uint8_t *rgb, const uint8_t *full, int width, int height,
+                   const uint8_t *sky)
+{
+    size_t holes = 0;
+    int x, y, i, covered;
+    for (y = 1; y + 1 < height; y++)
+        for (x = 1; x + 1 < width; x++) {
+            if (!is_colour(rgb + (y * width + x) * 3, sky))
+                continue;
+            for (i = covered = 0; i < 9; i++) {
+                int neighbour = (y + i / 3 - 1) * width + x + i % 3 - 1;
+                covered += !is_colour(full + neighbour * 3, sky);
+            }
+            holes += covered == 9;
+        }
+    return holes;
+}

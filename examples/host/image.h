@@ -21,6 +21,11 @@ double image_mean_square(const uint8_t *a, const uint8_t *b, size_t pixel_count,
 /* Peak signal to noise ratio of a mean square, [dB]; 99 for equal pictures. */
 double image_psnr(double mean_square);
 
+/* Pixels of a picture that are sky although terrain lies there and all round it in the full mesh's
+   picture of the same frame. */
+size_t image_holes(const uint8_t *rgb, const uint8_t *full, int width, int height,
+                   const uint8_t *sky);
+
 /* Difference picture: white where a and b are equal, darker by factor times the difference.
    out may be a or b. */
 void image_difference(const uint8_t *a, const uint8_t *b, size_t pixel_count, int factor,

@@ -7,11 +7,21 @@
 #include <string.h>
 #include <time.h>
 
-double clock_ms(void)
+static double read_clock(clockid_t clock)
 {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(clock, &now);
     return (double)now.tv_sec * 1e3 + (double)now.tv_nsec * 1e-6;
+}
+
+double clock_ms(void)
+{
+    return read_clock(CLOCK_MONOTONIC);
+}
+
+double clock_cpu_ms(void)
+{
+    return read_clock(CLOCK_PROCESS_CPUTIME_ID);
 }
 
 int stats_add(stats *s, double value)
@@ -94,4 +104,46 @@ void stats_free(stats *s)
 {
     free(s->values);
     memset(s, 0, sizeof *s);
+}
+
+/* ---- Cost of a quality -------------------------------------------------- */
+
+/* By cost; of equal costs the better one first. */
+static int compare_points(const void *left, const void *right)
+{
+    const stats_point *a = left, *b = right;
+    if (a->cost != b->cost)
+        return a->cost < b->cost ? -1 : 1;
+    return (a->quality < b->quality) - (a->quality > b->quality);
+}
+
+/* Keeps the points that are better than every cheaper one; both rise along what is kept. */
+static size_t keep_front(stats_point *points, size_t count)
+{
+    size_t kept = 0, i;
+    qsort(points, count, sizeof *points, compare_points);
+    for (i = 0; i < count; i++)
+        if (kept == 0 || points[i].quality > points[kept - 1].quality)
+            points[kept++] = points[i];
+    return kept;
+}
+
+int stats_cost_at(const stats_point *points, size_t count, double quality, double *cost)
+{
+    stats_point *front = count ? malloc(count * sizeof *front) : NULL;
+    size_t kept, i = 0;
+    if (!front)
+        return 0;
+    memcpy(front, points, count * sizeof *front);
+    kept = keep_front(front, count);
+    while (i < kept && front[i].quality < quality)
+        i++;
+    if (i > 0 && i < kept) {
+        double part = (quality - front[i - 1].quality) / (front[i].quality - front[i - 1].quality);
+        *cost = front[i - 1].cost * pow(front[i].cost / front[i - 1].cost, part);
+    } else if (i == 0) {
+        *cost = front[0].cost;
+    }
+    free(front);
+    return i < kept;
 }

@@ -1,0 +1,380 @@
+/* Shows a host in C++: the header compiled as C++, its objects in unique_ptr, its results turned into
+   exceptions, and its commands recorded. A command is plain values, so a list of copies is all that
+   a render thread needs: here frame n + 1 is decided and recorded while frame n is drawn.
+   Build:  make cpp_host
+   Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
+           cpp_host.png. Exit code 1 when one has holes or is too far from the full mesh. */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+extern "C" {
+#include "host/context.h"
+#include "host/gl_terrain.h"
+#include "host/image.h"
+#include "host/scene.h"
+}
+
+#include <cstdio>
+#include <future>
+#include <memory>
+#include <stdexcept>
+#include <unordered_map>
+#include <vector>
+
+namespace {
+
+constexpr int width = 640, height = 480;
+constexpr uint32_t atlas_size = 1024;
+
+void check(terrimp_result result)
+{
+    if (result != TERRIMP_OK)
+        throw std::runtime_error(terrimp_result_text(result));
+}
+
+void check(const char *trouble)
+{
+    if (trouble)
+        throw std::runtime_error(trouble);
+}
+
+struct Destroy {
+    void operator()(terrimp_terrain *terrain) const { terrimp_terrain_destroy(terrain); }
+    void operator()(terrimp_view *view) const { terrimp_view_destroy(view); }
+};
+using Terrain = std::unique_ptr<terrimp_terrain, Destroy>;
+using View = std::unique_ptr<terrimp_view, Destroy>;
+
+Terrain make_terrain(const terrimp_terrain_desc &desc)
+{
+    terrimp_terrain *terrain = nullptr;
+    check(terrimp_terrain_create(&desc, nullptr, &terrain));
+    return Terrain(terrain);
+}
+
+View make_view(const Terrain &terrain, int mode)
+{
+    terrimp_view_desc desc{};
+    terrimp_view *view = nullptr;
+    desc.mode = mode;
+    desc.atlas_size = atlas_size;
+    check(terrimp_view_create(terrain.get(), &desc, nullptr, &view));
+    return View(view);
+}
+
+/* ---- The commands of a frame -------------------------------------------- */
+
+struct Command {
+    enum Kind { begin_capture, end_capture, impostor, ground, floor } kind;
+    union {
+        terrimp_capture_command capture;
+        terrimp_impostor_command mesh;
+        terrimp_ground_command node;
+        terrimp_floor_command below;
+    };
+};
+
+struct Frame {
+    terrimp_camera camera{};
+    terrimp_stats stats{};
+    std::vector<Command> commands;
+};
+
+template <Command::Kind kind, typename T, T Command::*member>
+void append(void *frame, const T *command)
+{
+    Command copy{};
+    copy.kind = kind;
+    copy.*member = *command;
+    static_cast<Frame *>(frame)->commands.push_back(copy);
+}
+
+/* Touches nothing but the view: any thread may do it. */
+Frame record(terrimp_view *view, const terrimp_camera &camera)
+{
+    Frame frame;
+    terrimp_callbacks callbacks{};
+    callbacks.user = &frame;
+    callbacks.begin_capture =
+        append<Command::begin_capture, terrimp_capture_command, &Command::capture>;
+    callbacks.end_capture =
+        append<Command::end_capture, terrimp_capture_command, &Command::capture>;
+    callbacks.draw_impostor = append<Command::impostor, terrimp_impostor_command, &Command::mesh>;
+    callbacks.draw_ground = append<Command::ground, terrimp_ground_command, &Command::node>;
+    callbacks.draw_floor = append<Command::floor, terrimp_floor_command, &Command::below>;
+    frame.camera = camera;
+    check(terrimp_view_update(view, &camera));
+    check(terrimp_view_get_stats(view, &frame.stats));
+    check(terrimp_view_render(view, &callbacks));
+    return frame;
+}
+
+/* ---- OpenGL ------------------------------------------------------------- */
+
+/* One program draws everything: ground wears the lightmap, impostors the atlas, both through a
+   texture matrix. Pictures hold colours times alpha, hence the division; of a picture in two parts
+   each shows only what lies within its own depth. */
+const char vertex_source[] =
+    "#version 330 core\n"
+    "in vec3 position;\n"
+    "uniform mat4 view, projection, texture_matrix;\n"
+    "uniform vec3 eye;\n"
+    "uniform float scale;\n"
+    "out vec4 strq;\n"
+    "void main() {\n"
+    "    strq = texture_matrix * vec4(position, 1.0);\n"
+    "    gl_Position = projection * vec4(mat3(view) * ((position - eye) * scale), 1.0);\n"
+    "}\n";
+const char fragment_source[] =
+    "#version 330 core\n"
+    "uniform sampler2D picture;\n"
+    "uniform float alpha;\n"
+    "uniform bool part;\n"
+    "in vec4 strq;\n"
+    "out vec4 colour;\n"
+    "void main() {\n"
+    "    if (part && (strq.z < 0.0 || strq.z > strq.w)) discard;\n"
+    "    vec4 c = textureProj(picture, strq);\n"
+    "    if (c.a < 0.5) discard;\n"
+    "    colour = vec4(c.rgb / c.a, alpha);\n"
+    "}\n";
+
+GLuint make_texture(uint32_t size, GLenum format, const uint8_t *texels, GLint smaller)
+{
+    GLuint texture;
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, smaller);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, GLsizei(size), GLsizei(size), 0, format,
+                 GL_UNSIGNED_BYTE, texels);
+    return texture;
+}
+
+class Renderer {
+public:
+    Renderer(const terrimp_terrain *terrain, const scene &shown);
+    ~Renderer() { context_close(&context_); }
+    Renderer(const Renderer &) = delete;
+    Renderer &operator=(const Renderer &) = delete;
+    std::vector<uint8_t> draw(const Frame &frame);
+
+private:
+    GLuint vertices_of(uint32_t node);
+    GLuint make_array(const std::vector<float> &xyz, GLuint indices);
+    void set_camera(const float view[16], const float projection[16], const float eye[3]);
+    void turn_to_screen(const terrimp_camera &camera, float z_far);
+    void begin_capture(const terrimp_capture_command &c);
+    void draw_range(GLuint array, uint32_t base_vertex, uint32_t first_index, uint32_t index_count,
+                    GLuint texture, const float *texture_matrix, float depth_bias, float alpha);
+    GLint uniform(const char *name) const { return glGetUniformLocation(program_, name); }
+
+    const terrimp_terrain *terrain_;
+    terrimp_terrain_info info_{};
+    context context_{};
+    GLuint program_ = 0, ground_indices_ = 0, meshes_ = 0, lightmap_ = 0;
+    GLuint atlas_ = 0, atlas_frame_ = 0;
+    const float *lightmap_matrix_;
+    std::unordered_map<uint32_t, GLuint> nodes_; // vertex arrays of what was drawn so far
+    bool capturing_ = false, on_screen_ = false;
+};
+
+GLuint make_buffer(GLenum target, const void *data, size_t bytes)
+{
+    GLuint buffer;
+    glGenBuffers(1, &buffer);
+    glBindBuffer(target, buffer);
+    glBufferData(target, GLsizeiptr(bytes), data, GL_STATIC_DRAW);
+    return buffer;
+}
+
+GLuint Renderer::make_array(const std::vector<float> &xyz, GLuint indices)
+{
+    GLuint array;
+    glGenVertexArrays(1, &array);
+    glBindVertexArray(array);
+    make_buffer(GL_ARRAY_BUFFER, xyz.data(), xyz.size() * sizeof(float));
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices);
+    glEnableVertexAttribArray(0);
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, nullptr);
+    return array;
+}
+
+Renderer::Renderer(const terrimp_terrain *terrain, const scene &shown)
+    : terrain_(terrain), lightmap_matrix_(shown.lightmap_matrix)
+{
+    check(context_open(&context_, width, height));
+    check(terrimp_terrain_get_info(terrain, &info_));
+    program_ = gl_program_make(vertex_source, fragment_source).id;
+    check(program_ ? nullptr : "the shaders do not compile");
+    glUseProgram(program_);
+
+    std::vector<uint16_t> indices(info_.ground_index_count);
+    check(terrimp_terrain_fill_indices(terrain, indices.data(), indices.size()));
+    ground_indices_ = make_buffer(GL_ARRAY_BUFFER, indices.data(), indices.size() * 2);
+
+    std::vector<float> xyz(size_t(info_.mesh_vertex_count) * 3);
+    indices.resize(info_.mesh_index_count);
+    check(terrimp_terrain_fill_meshes(terrain, xyz.data(), xyz.size(), indices.data(),
+                                      indices.size()));
+    meshes_ = make_array(xyz, make_buffer(GL_ARRAY_BUFFER, indices.data(), indices.size() * 2));
+
+    lightmap_ = make_texture(SCENE_SIDE, GL_RGB, shown.lightmap, GL_LINEAR_MIPMAP_LINEAR);
+    glGenerateMipmap(GL_TEXTURE_2D);
+
+    GLuint depth;
+    glGenRenderbuffers(1, &depth);
+    glBindRenderbuffer(GL_RENDERBUFFER, depth);
+    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, atlas_size, atlas_size);
+    atlas_ = make_texture(atlas_size, GL_RGBA, nullptr, GL_LINEAR);
+    glGenFramebuffers(1, &atlas_frame_);
+    glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, atlas_, 0);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
+    glEnable(GL_DEPTH_TEST);
+    glEnable(GL_CULL_FACE);
+    glEnable(GL_SCISSOR_TEST);
+    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+}
+
+GLuint Renderer::vertices_of(uint32_t node)
+{
+    GLuint &array = nodes_[node];
+    if (!array) {
+        std::vector<float> xyz(size_t(info_.ground_vertex_count) * 3);
+        check(terrimp_terrain_fill_ground(terrain_, node, xyz.data(), xyz.size()));
+        array = make_array(xyz, ground_indices_);
+    }
+    return array;
+}
+
+void Renderer::set_camera(const float view[16], const float projection[16], const float eye[3])
+{
+    glUniformMatrix4fv(uniform("view"), 1, GL_FALSE, view);
+    glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection);
+    glUniform3fv(uniform("eye"), 1, eye);
+}
+
+void Renderer::begin_capture(const terrimp_capture_command &c)
+{
+    const GLint x = GLint(c.slot.x), y = GLint(c.slot.y);
+    glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_);
+    glViewport(x, y, GLsizei(c.slot.width), GLsizei(c.slot.height));
+    glScissor(x, y, GLsizei(c.slot.width), GLsizei(c.slot.height));
+    glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
+    glClear((c.clear ? GL_COLOR_BUFFER_BIT : 0u) | GL_DEPTH_BUFFER_BIT);
+    set_camera(c.view, c.projection, c.eye);
+    on_screen_ = false;
+    capturing_ = true;
+}
+
+/* The projection reaches as far as the depth bias moves things. */
+void Renderer::turn_to_screen(const terrimp_camera &camera, float z_far)
+{
+    float view[16], projection[16];
+    terrimp_camera deep = camera;
+    if (on_screen_ || capturing_)
+        return;
+    on_screen_ = true;
+    deep.z_far = z_far;
+    check(terrimp_camera_matrices(&deep, view, projection));
+    context_bind(&context_);
+    glScissor(0, 0, width, height);
+    glClearColor(float(scene_sky[0]) / 255.0f, float(scene_sky[1]) / 255.0f,
+                 float(scene_sky[2]) / 255.0f, 1.0f);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    set_camera(view, projection, camera.eye);
+}
+
+void Renderer::draw_range(GLuint array, uint32_t base_vertex, uint32_t first_index,
+                          uint32_t index_count, GLuint texture, const float *texture_matrix,
+                          float depth_bias, float alpha)
+{
+    glBindVertexArray(array);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glUniformMatrix4fv(uniform("texture_matrix"), 1, GL_FALSE, texture_matrix);
+    glUniform1f(uniform("scale"), 1.0f + depth_bias);
+    glUniform1f(uniform("alpha"), alpha);
+    if (alpha < 1.0f)
+        glEnable(GL_BLEND);
+    glDrawElementsBaseVertex(GL_TRIANGLES, GLsizei(index_count), GL_UNSIGNED_SHORT,
+                             reinterpret_cast<const void *>(size_t(first_index) * 2),
+                             GLint(base_vertex));
+    glDisable(GL_BLEND);
+}
+
+std::vector<uint8_t> Renderer::draw(const Frame &frame)
+{
+    std::vector<uint8_t> rgb(size_t(width) * height * 3);
+    on_screen_ = false;
+    for (const Command &c : frame.commands) {
+        if (c.kind == Command::begin_capture) {
+            begin_capture(c.capture);
+            continue;
+        }
+        if (c.kind == Command::end_capture) {
+            capturing_ = false;
+            continue;
+        }
+        turn_to_screen(frame.camera, frame.stats.z_far);
+        glUniform1i(uniform("part"), c.kind == Command::impostor && c.mesh.part_count > 1);
+        if (c.kind == Command::impostor)
+            draw_range(meshes_, c.mesh.base_vertex, c.mesh.first_index, c.mesh.index_count,
+                       atlas_, c.mesh.texture_matrix, c.mesh.depth_bias, 1.0f);
+        else if (c.kind == Command::floor)
+            draw_range(meshes_, c.below.base_vertex, c.below.first_index, c.below.index_count,
+                       lightmap_, lightmap_matrix_, c.below.depth_bias, 1.0f);
+        else
+            draw_range(vertices_of(c.node.node), 0, c.node.first_index, c.node.index_count,
+                       lightmap_, lightmap_matrix_, c.node.depth_bias, c.node.alpha);
+    }
+    turn_to_screen(frame.camera, frame.stats.z_far); // also when there is nothing to draw
+    context_read(&context_, rgb.data());
+    return rgb;
+}
+
+/* ---- A terrain and a flight --------------------------------------------- */
+
+struct Scene : scene {
+    Scene() { check(scene_open(this)); }
+    ~Scene() { scene_close(this); }
+    Scene(const Scene &) = delete;
+    Scene &operator=(const Scene &) = delete;
+};
+
+bool fly()
+{
+    Scene shown;
+    const Terrain terrain = make_terrain(shown.desc);
+    const View view = make_view(terrain, TERRIMP_MODE_DEFAULT);
+    const View yardstick = make_view(terrain, TERRIMP_MODE_FULL);
+    Renderer renderer(terrain.get(), shown);
+    std::vector<uint8_t> rgb;
+    Frame frame = record(view.get(), scene_camera(0, width, height));
+    for (int i = 0; i < SCENE_FRAMES; i++) {
+        std::future<Frame> next = std::async(std::launch::async, record, view.get(),
+                                             scene_camera(i + 1, width, height));
+        rgb = renderer.draw(frame);
+        if (scene_judges(i)) {
+            const auto full = renderer.draw(record(yardstick.get(), frame.camera));
+            scene_judge(&shown, i, &frame.stats, rgb.data(), full.data(), width, height);
+        }
+        frame = next.get();
+    }
+    check(image_write_png("cpp_host.png", rgb.data(), width, height));
+    check(glGetError() == GL_NO_ERROR ? nullptr : "OpenGL reports an error");
+    return scene_accepts(&shown, 35.0);
+}
+
+} // namespace
+
+int main()
+{
+    try {
+        return fly() ? 0 : 1;
+    } catch (const std::exception &trouble) {
+        std::fprintf(stderr, "cpp_host: %s\n", trouble.what());
+        return 2;
+    }
+}

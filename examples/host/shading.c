@@ -1,0 +1,358 @@
+#include "shading.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DETAIL = 256, SOURCE = 4096 }; /* texels of a repeated texture; bytes of a shader's text */
+
+#define MATERIAL_REPEAT 24.0f /* samples that a material covers once */
+#define CLOUD_REPEAT 1200.0f
+#define CLOUD_SPEED 0.02f     /* repeats a second */
+
+/* ---- Shaders ------------------------------------------------------------ */
+
+static const char vertex_head[] =
+    "out vec2 place;\n";
+
+static const char fragment_head[] =
+    "in vec2 place;\n"
+    "uniform sampler2D material_a, material_b, material_c, cover_b, cover_c, clouds;\n"
+    "uniform vec4 repeats;\n" /* of materials, of clouds, drift along x and z */
+    "uniform float cloudiness;\n"
+    "vec3 ground(vec3 light_a, vec2 at) {\n"
+    "    vec2 t = place * repeats.x;\n"
+    "    vec4 light_b = texture(cover_b, at), light_c = texture(cover_c, at);\n"
+    "    vec3 c = light_a * texture(material_a, t).rgb;\n"
+    "    c = mix(c, light_b.rgb * texture(material_b, t * 1.7).rgb, light_b.a);\n"
+    "    c = mix(c, light_c.rgb * texture(material_c, t * 0.6).rgb, light_c.a);\n"
+    "    return 2.0 * c;\n"
+    "}\n"
+    "vec3 under_clouds(vec3 c) {\n"
+    "    if (cloudiness == 0.0) return c;\n"
+    "    return c * (1.0 - cloudiness * texture(clouds, place * repeats.y + repeats.zw).r);\n"
+    "}\n";
+
+/* Replaces the first `from` in text[SOURCE] by `to`; returns 0 when there is none, or no room. */
+static int replace(char *text, const char *from, const char *to)
+{
+    char *at = strstr(text, from);
+    size_t removed = strlen(from), added = strlen(to);
+    if (!at || strlen(text) + added >= SOURCE)
+        return 0;
+    memmove(at + added, at + removed, strlen(at + removed) + 1);
+    memcpy(at, to, added);
+    return 1;
+}
+
+/* Puts lines behind the first one, which is the version. */
+static int insert_head(char *text, const char *head)
+{
+    char *end = strchr(text, '\n');
+    size_t added = strlen(head);
+    if (!end || strlen(text) + added >= SOURCE)
+        return 0;
+    memmove(end + 1 + added, end + 1, strlen(end + 1) + 1);
+    memcpy(end + 1, head, added);
+    return 1;
+}
+
+static int append(char *text, const char *tail)
+{
+    if (strlen(text) + strlen(tail) >= SOURCE)
+        return 0;
+    strcat(text, tail);
+    return 1;
+}
+
+static int read_source(GLuint program, GLenum wanted, char text[SOURCE])
+{
+    GLuint shaders[2];
+    GLsizei count = 0, length = 0, i;
+    glGetAttachedShaders(program, 2, &count, shaders);
+    for (i = 0; i < count; i++) {
+        GLint type = 0;
+        glGetShaderiv(shaders[i], GL_SHADER_TYPE, &type);
+        if ((GLenum)type == wanted)
+            glGetShaderSource(shaders[i], SOURCE, &length, text);
+    }
+    return length > 0;
+}
+
+static void set_samplers(GLuint program)
+{
+    static const char *const names[6] = { "material_a", "material_b", "material_c", "cover_b",
+                                          "cover_c", "clouds" };
+    int i;
+    glUseProgram(program);
+    for (i = 0; i < 6; i++)
+        glUniform1i(glGetUniformLocation(program, names[i]), i + 1);
+}
+
+/* The program's own shaders go on doing all that they did; where they looked the lightmap up they
+   ask for the ground, and what they paint lies under the clouds. So a change of how positions are
+   made, or alpha, needs no change here. */
+static int dress(gl_program *program)
+{
+    char vertex[SOURCE], fragment[SOURCE];
+    gl_program dressed;
+    if (!read_source(program->id, GL_VERTEX_SHADER, vertex)
+        || !read_source(program->id, GL_FRAGMENT_SHADER, fragment)
+        || !insert_head(vertex, vertex_head)
+        || !replace(vertex, "void main() {", "void main() {\n    place = position.xz;")
+        || !insert_head(fragment, fragment_head)
+        || !replace(fragment, "void main() {", "void paint() {")
+        || !append(fragment, "void main() { paint(); colour.rgb = under_clouds(colour.rgb); }\n"))
+        return 0;
+    replace(fragment, "texture(lightmap, uv).rgb", "ground(texture(lightmap, uv).rgb, uv)");
+    dressed = gl_program_make(vertex, fragment);
+    if (!dressed.id)
+        return 0;
+    set_samplers(dressed.id);
+    glDeleteProgram(program->id);
+    *program = dressed;
+    return 1;
+}
+
+static void set_field(const gl_terrain *g, const gl_program *p)
+{
+    glUseProgram(p->id);
+    glUniform4fv(p->field, 1, g->field);
+}
+
+int shading_dress(gl_terrain *g)
+{
+    if (!dress(&g->ground) || !dress(&g->fading) || !dress(&g->impostor))
+        return 0;
+    if (g->morphing.id && !dress(&g->morphing))
+        return 0;
+    set_field(g, &g->ground);
+    set_field(g, &g->fading);
+    if (g->morphing.id)
+        set_field(g, &g->morphing);
+    return 1;
+}
+
+/* ---- Textures ----------------------------------------------------------- */
+
+/* Uniform in 0..1 from a lattice point. */
+static float lattice(uint32_t x, uint32_t z, uint32_t seed)
+{
+    uint32_t h = x * 0x9e3779b1u ^ z * 0x85ebca77u ^ seed * 0xc2b2ae3du;
+    h = (h ^ h >> 15) * 0x27d4eb2fu;
+    h = (h ^ h >> 13) * 0x165667b1u;
+    return (float)((h ^ h >> 16) >> 8) * (1.0f / 16777216.0f);
+}
+
+/* Value noise over DETAIL texels with so many cells along a side; it repeats without a seam. */
+static float noise(uint32_t x, uint32_t z, uint32_t cells, uint32_t seed)
+{
+    float u = (float)(x * cells % DETAIL) / DETAIL, v = (float)(z * cells % DETAIL) / DETAIL;
+    uint32_t i = x * cells / DETAIL, j = z * cells / DETAIL;
+    uint32_t right = (i + 1) % cells, below = (j + 1) % cells;
+    float a, b;
+    u = u * u * (3.0f - 2.0f * u);
+    v = v * v * (3.0f - 2.0f * v);
+    a = lattice(i, j, seed) * (1.0f - u) + lattice(right, j, seed) * u;
+    b = lattice(i, below, seed) * (1.0f - u) + lattice(right, below, seed) * u;
+    return a * (1.0f - v) + b * v;
+}
+
+/* Octaves from so many cells up, each half as strong; 0..1 about 0.5. */
+static float fractal(uint32_t x, uint32_t z, uint32_t cells, uint32_t seed)
+{
+    float sum = 0.0f, strength = 0.5f;
+    for (; cells < DETAIL; cells *= 2) {
+        sum += strength * noise(x, z, cells, seed + cells);
+        strength *= 0.5f;
+    }
+    return sum;
+}
+
+static GLuint make_texture(GLint wrap)
+{
+    GLuint texture;
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, wrap);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, wrap);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    return texture;
+}
+
+/* Grey noise, tinted; half bright on average, since the shader doubles it. */
+static GLuint make_material(uint32_t index, uint8_t *texels)
+{
+    static const float tints[SHADING_MATERIALS][3] = { { 0.98f, 1.04f, 0.94f },
+                                                       { 1.03f, 1.00f, 0.97f },
+                                                       { 0.97f, 0.99f, 1.05f } };
+    GLuint texture = make_texture(GL_REPEAT);
+    uint32_t i, channel;
+    for (i = 0; i < DETAIL * DETAIL; i++) {
+        float grey = 0.25f + 0.5f * fractal(i % DETAIL, i / DETAIL, 4u << index, 7 * index);
+        for (channel = 0; channel < 3; channel++)
+            texels[i * 3 + channel] = (uint8_t)(grey * tints[index][channel] * 255.0f + 0.5f);
+    }
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, DETAIL, DETAIL, 0, GL_RGB, GL_UNSIGNED_BYTE, texels);
+    glGenerateMipmap(GL_TEXTURE_2D);
+    return texture;
+}
+
+/* How much of the sun's light clouds take: 0 in the open, at most 0.55. */
+static GLuint make_clouds(uint8_t *texels)
+{
+    GLuint texture = make_texture(GL_REPEAT);
+    uint32_t i;
+    for (i = 0; i < DETAIL * DETAIL; i++) {
+        float shade = (fractal(i % DETAIL, i / DETAIL, 4, 99) - 0.45f) * 5.0f;
+        shade = shade < 0.0f ? 0.0f : shade > 1.0f ? 1.0f : shade;
+        texels[i] = (uint8_t)(shade * 0.55f * 255.0f + 0.5f);
+    }
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, DETAIL, DETAIL, 0, GL_RED, GL_UNSIGNED_BYTE, texels);
+    glGenerateMipmap(GL_TEXTURE_2D);
+    return texture;
+}
+
+/* Where a material lies: the second on steep ground, the third in patches. */
+static float cover_of(const terrimp_heightfield *field, int which, uint32_t x, uint32_t z)
+{
+    float normal[3] = { 0.0f, 1.0f, 0.0f }, patches;
+    if (which == 0) {
+        terrimp_heightfield_normal(field, field->origin_x + (float)x * field->spacing_x,
+                                   field->origin_z + (float)z * field->spacing_z, normal);
+        return (0.9f - normal[1]) * 4.0f;
+    }
+    patches = fractal(x % DETAIL, z % DETAIL, 4, 55);
+    return (patches - 0.5f) * 6.0f;
+}
+
+static GLuint make_cover(const terrimp_heightfield *field, const uint8_t *lightmap, int which,
+                         uint8_t *texels)
+{
+    GLuint texture = make_texture(GL_CLAMP_TO_EDGE);
+    uint32_t x, z;
+    uint8_t *out = texels;
+    for (z = 0; z < field->depth; z++)
+        for (x = 0; x < field->width; x++, out += 4, lightmap += 3) {
+            float cover = cover_of(field, which, x, z);
+            memcpy(out, lightmap, 3);
+            out[3] = (uint8_t)(cover < 0.0f ? 0.0f : cover > 1.0f ? 255.0f : cover * 255.0f);
+        }
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, (GLsizei)field->width, (GLsizei)field->depth, 0,
+                 GL_RGBA, GL_UNSIGNED_BYTE, texels);
+    glGenerateMipmap(GL_TEXTURE_2D);
+    return texture;
+}
+
+const char *shading_open(shading *s, const terrimp_heightfield *field, const uint8_t *lightmap)
+{
+    terrimp_heightfield resolved;
+    size_t largest;
+    uint8_t *texels;
+    uint32_t i;
+    memset(s, 0, sizeof *s);
+    if (terrimp_heightfield_resolve(field, &resolved) != TERRIMP_OK)
+        return "the heightfield is wrong";
+    largest = (size_t)field->width * field->depth * 4;
+    texels = malloc(largest > DETAIL * DETAIL * 3 ? largest : DETAIL * DETAIL * 3);
+    if (!texels)
+        return "no memory for the materials";
+    for (i = 0; i < SHADING_MATERIALS; i++)
+        s->materials[i] = make_material(i, texels);
+    for (i = 0; i + 1 < SHADING_MATERIALS; i++)
+        s->covers[i] = make_cover(&resolved, lightmap, (int)i, texels);
+    s->clouds = make_clouds(texels);
+    s->spacing = resolved.spacing_x;
+    free(texels);
+    return NULL;
+}
+
+void shading_close(shading *s)
+{
+    glDeleteTextures(SHADING_MATERIALS, s->materials);
+    glDeleteTextures(SHADING_MATERIALS - 1, s->covers);
+    glDeleteTextures(1, &s->clouds);
+    memset(s, 0, sizeof *s);
+}
+
+/* ---- A frame ------------------------------------------------------------ */
+
+/* Strength: 0 none, 1 as they are. */
+static void set_clouds(const shading *s, const gl_program *program, float strength)
+{
+    glUseProgram(program->id);
+    glUniform4f(glGetUniformLocation(program->id, "repeats"),
+                1.0f / (MATERIAL_REPEAT * s->spacing), 1.0f / (CLOUD_REPEAT * s->spacing),
+                s->drift[0], s->drift[1]);
+    glUniform1f(glGetUniformLocation(program->id, "cloudiness"), strength);
+}
+
+void shading_begin(shading *s, const gl_terrain *g, float seconds)
+{
+    GLuint textures[6];
+    GLenum i;
+    memcpy(textures, s->materials, sizeof s->materials);
+    memcpy(textures + SHADING_MATERIALS, s->covers, sizeof s->covers);
+    textures[5] = s->clouds;
+    for (i = 0; i < 6; i++) {
+        glActiveTexture(GL_TEXTURE1 + i);
+        glBindTexture(GL_TEXTURE_2D, textures[i]);
+    }
+    glActiveTexture(GL_TEXTURE0);
+    s->drift[0] = fmodf(seconds * CLOUD_SPEED, 1.0f);
+    s->drift[1] = fmodf(seconds * CLOUD_SPEED * 0.6f, 1.0f);
+    set_clouds(s, &g->ground, 1.0f);
+    set_clouds(s, &g->fading, 1.0f);
+    set_clouds(s, &g->impostor, 1.0f);
+    if (g->morphing.id)
+        set_clouds(s, &g->morphing, 1.0f);
+}
+
+static void begin_capture(void *user, const terrimp_capture_command *command)
+{
+    shading *s = user;
+    s->inner.begin_capture(s->inner.user, command);
+    set_clouds(s, &s->gl->ground, 0.0f);
+}
+
+static void end_capture(void *user, const terrimp_capture_command *command)
+{
+    shading *s = user;
+    s->inner.end_capture(s->inner.user, command);
+    set_clouds(s, &s->gl->ground, 1.0f);
+}
+
+static void draw_impostor(void *user, const terrimp_impostor_command *command)
+{
+    shading *s = user;
+    s->inner.draw_impostor(s->inner.user, command);
+}
+
+static void draw_ground(void *user, const terrimp_ground_command *command)
+{
+    shading *s = user;
+    s->inner.draw_ground(s->inner.user, command);
+}
+
+static void draw_floor(void *user, const terrimp_floor_command *command)
+{
+    shading *s = user;
+    s->inner.draw_floor(s->inner.user, command);
+}
+
+terrimp_callbacks shading_callbacks(shading *s, const gl_terrain *g, terrimp_callbacks inner)
+{
+    terrimp_callbacks callbacks;
+    s->gl = g;
+    s->inner = inner;
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.user = s;
+    callbacks.begin_capture = begin_capture;
+    callbacks.end_capture = end_capture;
+    callbacks.draw_impostor = draw_impostor;
+    callbacks.draw_ground = draw_ground;
+    callbacks.draw_floor = draw_floor;
+    return callbacks;
+}

@@ -1,0 +1,193 @@
+/* Shows a host without any GPU: 320 x 240 pixels of RGB565, a depth buffer and an atlas, all in
+   RAM, and the span rasteriser of host/raster.c. To lift it into an engine take host/raster.[ch]
+   and the four callbacks; the lines after them make the terrain and check the pictures.
+   Build:  make software
+   Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
+           software.png. Exit code 1 when one has holes or is too far from the full mesh. */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+#include "host/image.h"
+#include "host/raster.h"
+#include "host/scene.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+enum { WIDTH = 320, HEIGHT = 240, ATLAS = 512, LOG2_ATLAS = 9 };
+enum { LOG2_SIDE = 9, GRID = (SCENE_QUADS + 1) * (SCENE_QUADS + 1), SKY = 0xae9d };
+
+typedef struct host {
+    const terrimp_terrain *terrain;
+    uint16_t screen[WIDTH * HEIGHT], atlas[ATLAS * ATLAS];
+    uint16_t depth[ATLAS * ATLAS]; /* first of each capture, then of the screen */
+    uint16_t *indices, *mesh_indices;
+    float *mesh_xyz, ground_xyz[GRID * 3];
+    uint16_t lightmap_texels[SCENE_SIDE * SCENE_SIDE * 4 / 3];
+    raster_texture lightmap, atlas_texture;
+    const float *lightmap_matrix;
+    raster r;
+    int on_screen, capturing;
+    float view[16], projection[16];
+    terrimp_camera camera;
+} host;
+
+/* ---- What a host has to do ---------------------------------------------- */
+
+static void begin_capture(void *user, const terrimp_capture_command *c)
+{
+    host *h = (host *)user;
+    const terrimp_rect *slot = &c->slot;
+    raster_begin(&h->r, h->atlas + slot->y * ATLAS + slot->x, h->depth, ATLAS,
+                 (int)slot->width, (int)slot->height, 0, c->view, c->projection, c->eye);
+    if (c->clear)
+        raster_clear(&h->r, RASTER_KEY);
+    raster_clear_depth(&h->r);
+    h->on_screen = 0;
+    h->capturing = 1;
+}
+
+static void end_capture(void *user, const terrimp_capture_command *c)
+{
+    (void)c;
+    ((host *)user)->capturing = 0;
+}
+
+/* The commands for the screen come after all captures: the depth buffer serves both. */
+static void turn_to_screen(host *h)
+{
+    if (h->on_screen)
+        return;
+    h->on_screen = 1;
+    raster_begin(&h->r, h->screen, h->depth, WIDTH, WIDTH, HEIGHT, 1, h->view, h->projection,
+                 h->camera.eye);
+    raster_clear(&h->r, SKY);
+    raster_clear_depth(&h->r);
+}
+
+static void draw_impostor(void *user, const terrimp_impostor_command *c)
+{
+    host *h = (host *)user;
+    raster_style style = { 0 };
+    turn_to_screen(h);
+    style.texture = &h->atlas_texture;
+    style.texture_matrix = c->texture_matrix;
+    style.depth_bias = c->depth_bias;
+    style.alpha = RASTER_OPAQUE;
+    style.within_depth = c->part_count > 1;
+    raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
+                h->mesh_indices + c->first_index, c->index_count);
+}
+
+static void draw_floor(void *user, const terrimp_floor_command *c)
+{
+    host *h = (host *)user;
+    raster_style style = { 0 };
+    turn_to_screen(h);
+    style.texture = &h->lightmap;
+    style.texture_matrix = h->lightmap_matrix;
+    style.depth_bias = c->depth_bias;
+    style.alpha = RASTER_OPAQUE;
+    raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
+                h->mesh_indices + c->first_index, c->index_count);
+}
+
+/* Vertices are read from the samples for each draw: no memory for vertex buffers. */
+static void draw_ground(void *user, const terrimp_ground_command *c)
+{
+    host *h = (host *)user;
+    raster_style style = { 0 };
+    if (!h->capturing)
+        turn_to_screen(h);
+    style.texture = &h->lightmap;
+    style.texture_matrix = h->lightmap_matrix;
+    style.depth_bias = c->depth_bias;
+    style.alpha = (int)(c->alpha * RASTER_OPAQUE + 0.5f);
+    if (terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3) == TERRIMP_OK)
+        raster_draw(&h->r, &style, h->ground_xyz, h->indices + c->first_index, c->index_count);
+}
+
+/* ---- A terrain and a flight --------------------------------------------- */
+
+static uint8_t ours[WIDTH * HEIGHT * 3], full[WIDTH * HEIGHT * 3];
+
+static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
+{
+    terrimp_terrain_info info;
+    terrimp_terrain_get_info(terrain, &info);
+    h->terrain = terrain;
+    h->indices = malloc(info.ground_index_count * sizeof *h->indices);
+    h->mesh_indices = malloc(info.mesh_index_count * sizeof *h->mesh_indices);
+    h->mesh_xyz = malloc(info.mesh_vertex_count * 3 * sizeof *h->mesh_xyz);
+    if (!h->indices || !h->mesh_indices || !h->mesh_xyz
+        || terrimp_terrain_fill_indices(terrain, h->indices, info.ground_index_count)
+        || terrimp_terrain_fill_meshes(terrain, h->mesh_xyz, info.mesh_vertex_count * 3,
+                                       h->mesh_indices, info.mesh_index_count))
+        return 0;
+    raster_make_texture(&h->lightmap, h->lightmap_texels, s->lightmap, LOG2_SIDE);
+    h->lightmap_matrix = s->lightmap_matrix;
+    h->atlas_texture.levels[0] = h->atlas;
+    h->atlas_texture.level_count = 1;
+    h->atlas_texture.log2_side = LOG2_ATLAS;
+    return 1;
+}
+
+static int draw_frame(host *h, terrimp_view *view, int frame, uint8_t *rgb)
+{
+    terrimp_callbacks callbacks = { 0 };
+    callbacks.user = h;
+    callbacks.begin_capture = begin_capture, callbacks.end_capture = end_capture;
+    callbacks.draw_impostor = draw_impostor, callbacks.draw_ground = draw_ground;
+    callbacks.draw_floor = draw_floor;
+    h->on_screen = 0;
+    h->camera = scene_camera(frame, WIDTH, HEIGHT);
+    if (terrimp_camera_matrices(&h->camera, h->view, h->projection) != TERRIMP_OK
+        || terrimp_view_update(view, &h->camera) != TERRIMP_OK
+        || terrimp_view_render(view, &callbacks) != TERRIMP_OK)
+        return 0;
+    turn_to_screen(h); /* also when there is nothing to draw */
+    raster_read(&h->r, rgb);
+    return 1;
+}
+
+int main(void)
+{
+    static host h;
+    scene s;
+    terrimp_view_desc settings = { 0 }, yardstick = { 0 };
+    terrimp_terrain *terrain = NULL;
+    terrimp_view *view = NULL, *full_view = NULL;
+    terrimp_stats stats;
+    clock_t clocks = 0, full_clocks = 0, first = 0;
+    int i, ok = 1;
+
+    settings.texels_per_px = 1.0f; /* the nearest texel is taken: more would only flicker */
+    settings.atlas_size = ATLAS;
+    yardstick.mode = TERRIMP_MODE_FULL;
+    if (scene_open(&s) || terrimp_terrain_create(&s.desc, NULL, &terrain) != TERRIMP_OK
+        || terrimp_view_create(terrain, &settings, NULL, &view) != TERRIMP_OK
+        || terrimp_view_create(terrain, &yardstick, NULL, &full_view) != TERRIMP_OK
+        || !prepare(&h, terrain, &s))
+        return 2;
+    for (i = 0; ok && i < SCENE_FRAMES; i++) {
+        clock_t start = clock();
+        ok = draw_frame(&h, view, i, ours) && terrimp_view_get_stats(view, &stats) == TERRIMP_OK;
+        clocks += clock() - start;
+        if (i == 0)
+            first = clocks; /* takes most of the pictures */
+        if (!scene_judges(i))
+            continue;
+        start = clock();
+        ok = ok && draw_frame(&h, full_view, i, full);
+        full_clocks += clock() - start;
+        scene_judge(&s, i, &stats, ours, full, WIDTH, HEIGHT);
+    }
+    printf("first frame %.1f ms, then %.1f ms a frame; full mesh %.1f ms\n",
+           (double)first * 1000.0 / CLOCKS_PER_SEC,
+           (double)(clocks - first) * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES - 1),
+           (double)full_clocks * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES / 10));
+    ok = ok && scene_accepts(&s, 30.0) && !image_write_png("software.png", ours, WIDTH, HEIGHT);
+    terrimp_view_destroy(full_view), terrimp_view_destroy(view), terrimp_terrain_destroy(terrain);
+    free(h.indices), free(h.mesh_indices), free(h.mesh_xyz), scene_close(&s);
+    return !ok;
+}

@@ -1,0 +1,715 @@
+/* Measures frames: flies over each scene, draws every frame in several ways in turn, and prints
+   what each costs, how near it comes to the full mesh, and how it changes from frame to frame.
+
+   Build:  make bench_frames
+   Use:    build/bench_frames         (in the project's directory)
+   Leaves: build/bench/frames.md (what it prints), frames.tsv (all figures, a line a scene and way),
+           frame_times.tsv (every frame), *.svg (plots), *.png (of each way the worst frame: full
+           mesh, the way, their difference), *_pop.png (around its worst pop: the full mesh before
+           and after, the way before and after)
+
+   BENCH_FRAMES=n   frames of a flight [each scene's own, 60 to 120]; the thesis has 10000
+   BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
+   BENCH_ONLY=text  only scenes with this in their key (the names of the files)
+   TERRIMP_DATA     where real tiles and flight paths are [../shared/data]
+
+   All ways take turns in one process, frame by frame, so that a busy machine harms all alike: trust
+   the ratios. Ways that do not depend on the frames before are drawn in every few frames only. */
+#define _POSIX_C_SOURCE 200112L /* mkdir */
+#define TERRIMP_IMPLEMENTATION
+#include "terrimp.h"
+
+#include "bench_gl.h"
+#include "bench_peers.h"
+#include "bench_plot.h"
+#include "bench_way.h"
+
+#include "examples/host/image.h"
+
+#include <stdarg.h>
+#include <sys/stat.h>
+
+/* ---- What is measured --------------------------------------------------- */
+
+#define FULL { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL }
+#define AUTO(tolerance_)                                                                  \
+    { .name = "auto " #tolerance_ " px", .family = "auto", .mode = TERRIMP_MODE_AUTO,     \
+      .tolerance_px = (float)tolerance_ }
+#define IMPOSTOR(tolerance_)                                                              \
+    { .name = "impostor " #tolerance_ " px", .family = "impostor",                        \
+      .mode = TERRIMP_MODE_IMPOSTOR, .tolerance_px = (float)tolerance_ }
+#define GEOMIP(tolerance_)                                                                \
+    { .name = "geomip " #tolerance_ " px", .family = "geomip", .mode = TERRIMP_MODE_GEOMIP, \
+      .tolerance_px = (float)tolerance_ }
+#define BOUND(tolerance_)                                                                 \
+    { .name = "geomip bound " #tolerance_ " px", .family = "geomip bound",                \
+      .mode = TERRIMP_MODE_GEOMIP, .rule = TERRIMP_GEOMIP_BOUND,                          \
+      .tolerance_px = (float)tolerance_ }
+#define MORPHING(tolerance_)                                                              \
+    { .name = "geomip " #tolerance_ " px, morphing", .family = "geomip morphing",         \
+      .mode = TERRIMP_MODE_GEOMIP, .tolerance_px = (float)tolerance_, .morph_ratio = 1.5f }
+/* As in the thesis but for the atlas; foreground and chunk width as in its tables: "200, 64". */
+#define HESS(foreground_, chunk_)                                                         \
+    { .name = "Hess " #foreground_ ", " #chunk_, .family = "Hess " #chunk_,               \
+      .mode = TERRIMP_MODE_IMPOSTOR, .chunk_quads = chunk_, .foreground = foreground_,    \
+      .angle_alone = 1 }
+
+static const way path_ways[] = {
+    FULL, AUTO(0.5), AUTO(1), AUTO(2), AUTO(4), AUTO(8),
+    { .name = "Hess, foreground 2 chunks", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR,
+      .angle_alone = 1 },
+    IMPOSTOR(1),
+    GEOMIP(0.25), GEOMIP(0.5), GEOMIP(1), GEOMIP(2), GEOMIP(4), GEOMIP(8),
+    BOUND(1), BOUND(2), BOUND(4), BOUND(8), MORPHING(1)
+};
+
+static const way look_ways[] = {
+    FULL, AUTO(1), AUTO(2), AUTO(4), IMPOSTOR(1),
+    GEOMIP(0.5), GEOMIP(1), GEOMIP(4), BOUND(2), BOUND(4)
+};
+
+static const way tile_ways[] = { FULL, AUTO(1), AUTO(2), IMPOSTOR(1), GEOMIP(1), BOUND(2) };
+
+static const way thesis_ways[] = {
+    FULL, AUTO(1), GEOMIP(1), HESS(400, 64), HESS(400, 128),
+    /* only with BENCH_ALL, or on the terrain of 2049: */
+    HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128)
+};
+
+enum { WAYS_MAX = 32 }; /* in a run */
+
+/* One flight of one list of ways. */
+typedef struct run {
+    scene_desc scene;
+    int look;
+    const way *ways;
+    size_t way_count, all_way_count; /* by default, and with BENCH_ALL */
+    size_t frames;
+    size_t stride;      /* one frame of so many is compared */
+    int curve;          /* quality against speed: print the summary and write the plots */
+    int only_all;       /* with BENCH_ALL only */
+} run;
+
+#define WAYS(list) list, sizeof list / sizeof *list, sizeof list / sizeof *list
+
+#define PYRENEES .file = "N42E001.hgt", .crop = 1025, .spacing = 79.6f,        \
+                 .path = "paths/pyrenees.path"
+#define ROUGH .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f, \
+              .path = "paths/rough.path"
+
+static const run runs[] = {
+    { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", PYRENEES },
+      LOOK_LIGHTMAP, WAYS(path_ways), 120, 8, 1, 0 },
+    { { .name = "rough 2049 x 2049, straight flight", .key = "rough", ROUGH },
+      LOOK_LIGHTMAP, WAYS(path_ways), 120, 8, 1, 0 },
+    { { .name = "rough, three materials and moving clouds", .key = "materials", ROUGH },
+      LOOK_MATERIALS, WAYS(look_ways), 60, 10, 1, 0 },
+    { { .name = "rough, with trees", .key = "trees", ROUGH },
+      LOOK_TREES, WAYS(look_ways), 60, 10, 1, 0 },
+    { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
+    { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
+    { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 0 },
+    { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
+      LOOK_LIGHTMAP, thesis_ways, 9, 9, 60, 10, 0, 0 },
+    { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 1 },
+    { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 0 }
+};
+
+/* ---- Output ------------------------------------------------------------- */
+
+static const char work[] = "build/bench";
+static FILE *report, *figures, *times;
+
+static FILE *open_output(const char *name)
+{
+    char path[256];
+    FILE *file;
+    snprintf(path, sizeof path, "%s/%s", work, name);
+    file = fopen(path, "w");
+    if (!file)
+        scene_stop(path, "cannot be written");
+    return file;
+}
+
+/* To the terminal and to the report. */
+static void say(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vprintf(format, arguments);
+    va_end(arguments);
+    va_start(arguments, format);
+    vfprintf(report, format, arguments);
+    va_end(arguments);
+    fflush(stdout);
+}
+
+static void say_machine(void)
+{
+    char line[256] = "", load[64] = "";
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    while (file && fgets(line, sizeof line, file) && strncmp(line, "model name", 10) != 0)
+        ;
+    if (file)
+        fclose(file);
+    file = fopen("/proc/loadavg", "r");
+    if (file && fscanf(file, "%63s", load) != 1)
+        load[0] = 0;
+    if (file)
+        fclose(file);
+    line[strcspn(line, "\n")] = 0;
+    say("Machine: %s; load at the start %s\nRenderer: %s\n",
+        strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
+    say("Pictures of %d x %d, 60 degrees. Times but the first are in multiples of the full mesh's "
+        "median. The first sixth of\na flight, 20 frames at most, is its start, when all pictures "
+        "are made: it has a column, and no other figure has it in.\nPSNR [dB] is over terrain "
+        "unless it says picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
+}
+
+/* ---- Quality ------------------------------------------------------------ */
+
+/* The smallest of a list; 0 when it is empty. */
+static double smallest(const stats *s)
+{
+    double least = s->count ? s->values[0] : 0.0;
+    size_t i;
+    for (i = 1; i < s->count; i++)
+        least = s->values[i] < least ? s->values[i] : least;
+    return least;
+}
+
+static double mean(const stats *s)
+{
+    return stats_summarise(s).mean;
+}
+
+static double psnr_of(const uint8_t *a, const uint8_t *b, const uint8_t *sky)
+{
+    return image_psnr(image_mean_square(a, b, SCENE_PIXELS, sky));
+}
+
+static void keep_worst(contender *c, const contender *full, size_t frame)
+{
+    double now = c->psnr_terrain.values[c->psnr_terrain.count - 1];
+    size_t i;
+    for (i = 0; i + 1 < c->psnr_terrain.count; i++)
+        if (c->psnr_terrain.values[i] <= now)
+            return;
+    if (!c->worst) {
+        c->worst = need_memory((size_t)SCENE_PIXELS * 3);
+        c->worst_truth = need_memory((size_t)SCENE_PIXELS * 3);
+    }
+    memcpy(c->worst, c->picture, (size_t)SCENE_PIXELS * 3);
+    memcpy(c->worst_truth, full->picture, (size_t)SCENE_PIXELS * 3);
+    c->worst_frame = frame;
+}
+
+static void compare(contender *c, const contender *full, size_t frame, int with_ssim)
+{
+    size_t low = 0, holes;
+    stats_add(&c->psnr, psnr_of(c->picture, full->picture, NULL));
+    stats_add(&c->psnr_terrain, psnr_of(c->picture, full->picture, scene_sky));
+    holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky, &low);
+    if (holes == SIZE_MAX)
+        scene_stop("holes", "out of memory");
+    if ((double)holes > c->holes)
+        c->holes = (double)holes;
+    c->low_pixels += (double)low;
+    if (with_ssim)
+        stats_add(&c->ssim, quality_ssim(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT,
+                                         scene_sky));
+    keep_worst(c, full, frame);
+}
+
+static void compare_fine(contender *c, const fine *f)
+{
+    stats_add(&c->fine_psnr, psnr_of(c->picture, f->picture, scene_sky));
+    stats_add(&c->fine_ssim, quality_ssim(c->picture, f->picture, SCENE_WIDTH, SCENE_HEIGHT,
+                                          scene_sky));
+}
+
+enum { CROP = 160 }; /* pixels along a side */
+
+/* Keeps what is around a pop: the full mesh before and after it, then the way. */
+static void keep_pop(contender *c, const contender *full)
+{
+    const uint8_t *pictures[4];
+    int i, y, left = c->pop.block_x - (CROP - QUALITY_BLOCK) / 2;
+    int top = c->pop.block_y - (CROP - QUALITY_BLOCK) / 2;
+    left = left < 0 ? 0 : left > SCENE_WIDTH - CROP ? SCENE_WIDTH - CROP : left;
+    top = top < 0 ? 0 : top > SCENE_HEIGHT - CROP ? SCENE_HEIGHT - CROP : top;
+    pictures[0] = full->before;
+    pictures[1] = full->picture;
+    pictures[2] = c->before;
+    pictures[3] = c->picture;
+    for (i = 0; i < 4; i++) {
+        if (!c->pop_crops[i])
+            c->pop_crops[i] = need_memory((size_t)CROP * CROP * 3);
+        for (y = 0; y < CROP; y++)
+            memcpy(c->pop_crops[i] + (size_t)y * CROP * 3,
+                   pictures[i] + ((size_t)(top + y) * SCENE_WIDTH + (size_t)left) * 3,
+                   (size_t)CROP * 3);
+    }
+}
+
+static void compare_change(contender *c, const contender *full, size_t frame)
+{
+    quality_change change = quality_compare_change(c->before, c->picture, full->before,
+                                                   full->picture, SCENE_WIDTH, SCENE_HEIGHT);
+    stats_add(&c->shimmer, change.mean);
+    stats_add(&c->pop_pixel, change.largest);
+    stats_add(&c->pop_block, change.block);
+    if (change.block > c->pop.block) {
+        c->pop = change;
+        c->pop_frame = frame;
+        keep_pop(c, full);
+    }
+}
+
+/* ---- A flight ----------------------------------------------------------- */
+
+/* What is done with a frame. At the start only what has a memory is drawn. */
+typedef struct frame_plan {
+    int start;
+    int look;   /* compare with the full mesh */
+    int change; /* and with the frame before */
+    int ssim, fine;
+} frame_plan;
+
+static size_t start_of(size_t frames)
+{
+    return frames / 6 < 20 ? frames / 6 : 20;
+}
+
+/* SSIM is dear: every other look has it. The supersampled reference is dearer: three looks do. */
+static frame_plan plan_frame(const run *r, size_t frame, size_t frames, size_t stride)
+{
+    size_t start = start_of(frames), looks = (frames - start + stride - 1) / stride, index;
+    frame_plan plan = { 1, 0, 0, 0, 0 };
+    if (frame < start)
+        return plan;
+    frame -= start;
+    index = frame / stride;
+    plan.start = 0;
+    plan.look = frame % stride == 0;
+    plan.change = stride == 1 ? frame > 0 : frame % stride == 1;
+    plan.ssim = plan.look && index % 2 == 0;
+    plan.fine = r->curve && plan.look && index % ((looks + 2) / 3) == 0;
+    return plan;
+}
+
+static void note_time(const scene *s, const contender *c, size_t frame, int at_start)
+{
+    const stats *ms = at_start ? &c->start_ms : &c->ms;
+    fprintf(times, "%s\t%s\t%zu\t%d\t%.3f\t%u\t%u\t%u\t%u\n", s->desc->key, c->way->name, frame,
+            at_start, ms->values[ms->count - 1], c->now.triangles, c->now.draws, c->now.captures,
+            c->now.captured_texels);
+}
+
+static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
+                       frame_plan plan)
+{
+    terrimp_camera camera = scene_camera(s, frame);
+    size_t i;
+    for (i = 0; i < count; i++) {
+        contender *c = &ways[i];
+        if (!plan.look && !plan.change && !way_has_memory(c->way))
+            continue;
+        contender_draw(c, camera, plan.start);
+        if (plan.look || plan.change)
+            contender_read(c, s->context, frame);
+        note_time(s, c, frame, plan.start);
+    }
+}
+
+static void fly(const run *r, contender *ways, size_t count, const scene *s, quad *q, fine *f,
+                size_t stride)
+{
+    look *l = ways[0].look;
+    size_t frame, i;
+    for (frame = 0; frame < s->flight.count; frame++) {
+        frame_plan plan = plan_frame(r, frame, s->flight.count, stride);
+        l->seconds = (float)frame / SCENE_FPS;
+        draw_frame(ways, count, s, frame, plan);
+        if (plan.look)
+            quad_draw(q, s->context, ways[0].gl->lightmap);
+        if (plan.fine)
+            fine_draw(f, l, ways[0].gl, ways[0].view, scene_camera(s, frame));
+        for (i = 0; i < count; i++) {
+            if (plan.look)
+                compare(&ways[i], &ways[0], frame, plan.ssim);
+            if (plan.fine)
+                compare_fine(&ways[i], f);
+            if (plan.change)
+                compare_change(&ways[i], &ways[0], frame);
+        }
+    }
+}
+
+/* ---- Tables ------------------------------------------------------------- */
+
+static void print_times(const contender *ways, size_t count, double quad_ms)
+{
+    double unit = stats_summarise(&ways[0].ms).median;
+    double cpu = mean(&ways[0].cpu_ms);
+    size_t i;
+    say("\n| way | ms | ratio | mean | sd | 95 %% | 99 %% | worst | start | CPU ratio | quads | "
+        "triangles | draws | captures | ktexels | reuse |\n"
+        "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+    for (i = 0; i < count; i++) {
+        const contender *c = &ways[i];
+        stats_summary ms = stats_summarise(&c->ms);
+        double n = c->frames;
+        say("| %s | %.1f | %.3f | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f | %.3f | %.1f | %.0f | "
+            "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, ms.median / unit,
+            ms.mean / unit, ms.deviation / unit, ms.p95 / unit, ms.p99 / unit, ms.worst / unit,
+            mean(&c->start_ms) / unit, mean(&c->cpu_ms) / cpu, ms.median / quad_ms,
+            c->triangles / n, c->draws / n, c->captures / n, c->captured_texels / n / 1e3,
+            (double)c->now.reuse);
+    }
+    say("\nA textured quad over the whole picture: %.1f ms.\n", quad_ms);
+}
+
+static void print_quality(const contender *ways, size_t count)
+{
+    size_t i;
+    say("\n| way | PSNR mean | worst | picture | SSIM | PSNR, 4 x 4 | SSIM, 4 x 4 | shimmer | "
+        "pop | pixel | holes | low |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+    for (i = 0; i < count; i++) {
+        const contender *c = &ways[i];
+        say("| %s | %.2f | %.2f | %.2f | %.4f | ", c->way->name, mean(&c->psnr_terrain),
+            smallest(&c->psnr_terrain), mean(&c->psnr), mean(&c->ssim));
+        if (c->fine_psnr.count)
+            say("%.2f | %.4f | ", mean(&c->fine_psnr), mean(&c->fine_ssim));
+        else
+            say("| | ");
+        say("%.2f | %.1f | %.0f | %.0f | %.1f |\n", mean(&c->shimmer),
+            stats_summarise(&c->pop_block).worst, stats_summarise(&c->pop_pixel).worst, c->holes,
+            c->low_pixels / (double)c->psnr.count);
+    }
+}
+
+static void write_figures(const run *r, const contender *ways, size_t count, double quad_ms)
+{
+    double unit = stats_summarise(&ways[0].ms).median;
+    double cpu = mean(&ways[0].cpu_ms);
+    size_t i;
+    for (i = 0; i < count; i++) {
+        const contender *c = &ways[i];
+        stats_summary ms = stats_summarise(&c->ms);
+        double n = c->frames;
+        fprintf(figures, "%s\t%s\t%s\t%zu\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t"
+                "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
+                ms.median / unit, ms.mean / unit, ms.deviation / unit, ms.p95 / unit,
+                ms.p99 / unit, ms.worst / unit, mean(&c->start_ms) / unit,
+                mean(&c->cpu_ms) / cpu, quad_ms);
+        fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t%.2f\t", c->triangles / n, c->draws / n,
+                c->captures / n, c->captured_texels / n, (double)c->now.reuse, c->waiting / n);
+        fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
+                mean(&c->psnr_terrain), smallest(&c->psnr_terrain), mean(&c->psnr),
+                mean(&c->ssim), mean(&c->fine_psnr), mean(&c->fine_ssim), mean(&c->shimmer),
+                stats_summarise(&c->pop_block).worst, stats_summarise(&c->pop_pixel).worst,
+                c->holes, c->low_pixels / (double)c->psnr.count);
+    }
+}
+
+static void write_headings(void)
+{
+    fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio\tmean\tdeviation\tp95\tp99\t"
+            "worst\tstart\tcpu_ratio\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+            "reuse\twaiting\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\t"
+            "ssim_4x4\tshimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
+    fprintf(times, "scene\tway\tframe\tstart\tms\ttriangles\tdraws\tcaptures\t"
+            "captured_texels\n");
+}
+
+/* ---- Quality against speed ---------------------------------------------- */
+
+static int begins_with(const char *text, const char *start)
+{
+    return strncmp(text, start, strlen(start)) == 0;
+}
+
+/* What a way costs beside the full mesh: by means, so that the pictures that it makes now and then
+   are paid for. Of the clock, or of the processor. */
+static double cost_of(const contender *c, const contender *full, int processor)
+{
+    return processor ? mean(&c->cpu_ms) / mean(&full->cpu_ms) : mean(&c->ms) / mean(&full->ms);
+}
+
+static double quality_of(const contender *c, int similarity)
+{
+    return mean(similarity ? &c->ssim : &c->psnr_terrain);
+}
+
+static size_t geomip_points(const contender *ways, size_t count, int processor, int similarity,
+                            stats_point *points)
+{
+    size_t found = 0, i;
+    for (i = 0; i < count; i++)
+        if (begins_with(ways[i].way->family, "geomip")) {
+            points[found].cost = cost_of(&ways[i], &ways[0], processor);
+            points[found++].quality = quality_of(&ways[i], similarity);
+        }
+    return found;
+}
+
+static size_t peer_points(const char *key, stats_point *points)
+{
+    size_t found = 0, i;
+    for (i = 0; i < PEER_COUNT; i++)
+        if (strcmp(peers[i].scene, key) == 0) {
+            points[found].cost = peers[i].ratio;
+            points[found++].quality = peers[i].psnr;
+        }
+    return found;
+}
+
+static void say_against(const stats_point *points, size_t count, double cost, double quality)
+{
+    double theirs;
+    if (!count)
+        say(" |");
+    else if (stats_cost_at(points, count, quality, &theirs))
+        say(" %.2f |", theirs / cost);
+    else
+        say(" never as good |");
+}
+
+/* Every way with pictures against the best that does without, at the quality it has. */
+static void print_speed_up(const run *r, const contender *ways, size_t count)
+{
+    stats_point points[WAYS_MAX + PEER_COUNT];
+    size_t i, found;
+    int kind;
+    say("\nHow many times as fast at equal quality, interpolated; costs are mean times:\n\n"
+        "| way | ratio | PSNR | than our geomip | the same, CPU | at equal SSIM | "
+        "than peers, quoted |\n|---|--:|--:|--:|--:|--:|--:|\n");
+    for (i = 1; i < count; i++) {
+        if (!way_has_memory(ways[i].way) || begins_with(ways[i].way->family, "geomip"))
+            continue;
+        say("| %s | %.3f | %.2f |", ways[i].way->name, cost_of(&ways[i], &ways[0], 0),
+            mean(&ways[i].psnr_terrain));
+        for (kind = 0; kind < 3; kind++) { /* clock and PSNR, processor and PSNR, clock and SSIM */
+            found = geomip_points(ways, count, kind == 1, kind == 2, points);
+            say_against(points, found, cost_of(&ways[i], &ways[0], kind == 1),
+                        quality_of(&ways[i], kind == 2));
+        }
+        found = peer_points(r->scene.key, points);
+        say_against(points, found, cost_of(&ways[i], &ways[0], 0), mean(&ways[i].psnr_terrain));
+        say("\n");
+    }
+}
+
+static void print_peers(const char *key)
+{
+    size_t i, found = 0;
+    for (i = 0; i < PEER_COUNT; i++) {
+        if (strcmp(peers[i].scene, key) != 0)
+            continue;
+        if (!found++)
+            say("\nQuoted, measured elsewhere with the same rasteriser:\n\n"
+                "| engine | ratio | PSNR | triangles | draws |\n|---|--:|--:|--:|--:|\n");
+        say("| %s | %.3f | %.1f | %.0f | %.0f |\n", peers[i].name, peers[i].ratio, peers[i].psnr,
+            peers[i].triangles, peers[i].draws);
+    }
+}
+
+static void plot_peers(plot *p, const char *key)
+{
+    size_t i;
+    for (i = 0; i < PEER_COUNT; i++)
+        if (strcmp(peers[i].scene, key) == 0) {
+            const char *name = begins_with(peers[i].name, "OGRE") ? "OGRE (quoted)"
+                               : begins_with(peers[i].name, "Irrlicht") ? "Irrlicht (quoted)"
+                                                                        : "OSG impostors (quoted)";
+            plot_series *s = plot_find_series(p, name);
+            if (s)
+                s->hollow = 1;
+            plot_add(p, name, peers[i].ratio, peers[i].psnr);
+        }
+}
+
+static void write_plot(const plot *p, const char *key, const char *kind)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s_%s.svg", work, key, kind);
+    if (!plot_write(p, path))
+        scene_stop(path, "cannot be written");
+    say("\nPlot: %s\n", path);
+}
+
+static void plot_curves(const run *r, const contender *ways, size_t count)
+{
+    static plot psnr, ssim;
+    size_t i;
+    psnr.title = ssim.title = r->scene.name;
+    psnr.x_label = ssim.x_label = "mean frame time / full mesh";
+    psnr.y_label = "PSNR over terrain [dB]";
+    ssim.y_label = "SSIM over terrain";
+    psnr.log_x = ssim.log_x = 1;
+    psnr.count = ssim.count = 0;
+    for (i = 1; i < count; i++) {
+        double ratio = cost_of(&ways[i], &ways[0], 0);
+        plot_add(&psnr, ways[i].way->family, ratio, mean(&ways[i].psnr_terrain));
+        plot_add(&ssim, ways[i].way->family, ratio, mean(&ways[i].ssim));
+    }
+    plot_peers(&psnr, r->scene.key);
+    write_plot(&psnr, r->scene.key, "psnr");
+    write_plot(&ssim, r->scene.key, "ssim");
+}
+
+/* Frame time against terrain size, over all the flights of the thesis. */
+static plot sizes = { .title = "Frame time against terrain size, circle as Hess",
+                      .x_label = "samples along a side", .y_label = "mean frame time [ms]",
+                      .log_x = 1, .log_y = 1 };
+
+static void note_size(const run *r, const contender *ways, size_t count)
+{
+    size_t i;
+    for (i = 0; i < count; i++)
+        plot_add(&sizes, ways[i].way->name, (double)r->scene.size, mean(&ways[i].ms));
+}
+
+/* ---- Pictures of the worst frames --------------------------------------- */
+
+/* Writes count pictures of width x height side by side, each pixel as a square of factor^2. */
+static void write_side_by_side(const run *r, const contender *c, const char *suffix,
+                               const uint8_t *const *pictures, int count, int width, int height,
+                               int factor)
+{
+    int wide = count * width * factor, high = height * factor, x, y;
+    uint8_t *out = need_memory((size_t)wide * (size_t)high * 3), *to = out;
+    char path[256], *letter;
+    const char *trouble;
+    for (y = 0; y < high; y++)
+        for (x = 0; x < wide; x++, to += 3) {
+            int column = x / factor;
+            memcpy(to, pictures[column / width]
+                       + ((size_t)(y / factor * width) + (size_t)(column % width)) * 3, 3);
+        }
+    snprintf(path, sizeof path, "%s/%s_%s%s.png", work, r->scene.key, c->way->name, suffix);
+    for (letter = path; *letter; letter++)
+        if (*letter == ' ' || *letter == ',')
+            *letter = '_';
+    trouble = image_write_png(path, out, wide, high);
+    if (trouble)
+        scene_stop(path, trouble);
+    free(out);
+}
+
+static void write_pictures(const run *r, const contender *c)
+{
+    const uint8_t *pictures[3];
+    uint8_t *difference = need_memory((size_t)SCENE_PIXELS * 3);
+    const uint8_t *const crops[4] = { c->pop_crops[0], c->pop_crops[1], c->pop_crops[2],
+                                      c->pop_crops[3] };
+    image_difference(c->worst, c->worst_truth, SCENE_PIXELS, 1, difference);
+    pictures[0] = c->worst_truth;
+    pictures[1] = c->worst;
+    pictures[2] = difference;
+    write_side_by_side(r, c, "", pictures, 3, SCENE_WIDTH, SCENE_HEIGHT, 1);
+    if (crops[0])
+        write_side_by_side(r, c, "_pop", crops, 4, CROP, CROP, 3);
+    free(difference);
+}
+
+/* ---- All of it ---------------------------------------------------------- */
+
+static int whole_protocol(void)
+{
+    const char *all = getenv("BENCH_ALL");
+    return all && *all && *all != '0';
+}
+
+static size_t frames_of(const run *r)
+{
+    const char *frames = getenv("BENCH_FRAMES");
+    long count = frames ? strtol(frames, NULL, 10) : 0;
+    return count > 0 ? (size_t)count : r->frames;
+}
+
+static void measure(const run *r, const context *frame)
+{
+    size_t count = whole_protocol() ? r->all_way_count : r->way_count, i;
+    contender *ways = need_memory(count * sizeof *ways);
+    double quad_ms;
+    scene s;
+    quad q;
+    fine f;
+    look l;
+    scene_open(&s, &r->scene, frame, frames_of(r));
+    look_open(&l, r->look, &s);
+    for (i = 0; i < count; i++)
+        contender_open(&ways[i], &r->ways[i], &s, &l);
+    quad_open(&q);
+    fine_open(&f, frame);
+    say("\n## %s, %zu frames\n", r->scene.name, s.flight.count);
+    fly(r, ways, count, &s, &q, &f, whole_protocol() ? 1 : r->stride);
+    quad_ms = stats_summarise(&q.ms).median;
+    print_times(ways, count, quad_ms);
+    print_quality(ways, count);
+    write_figures(r, ways, count, quad_ms);
+    if (r->curve) {
+        print_peers(r->scene.key);
+        print_speed_up(r, ways, count);
+        plot_curves(r, ways, count);
+    }
+    if (r->scene.size)
+        note_size(r, ways, count);
+    for (i = 1; i < count; i++)
+        write_pictures(r, &ways[i]);
+    fine_close(&f);
+    quad_close(&q);
+    for (i = 0; i < count; i++)
+        contender_close(&ways[i]);
+    free(ways);
+    look_close(&l);
+    scene_close(&s);
+}
+
+static int is_wanted(const run *r)
+{
+    const char *only = getenv("BENCH_ONLY");
+    if (only && *only)
+        return strstr(r->scene.key, only) != NULL;
+    return whole_protocol() || !r->only_all;
+}
+
+int main(void)
+{
+    context frame;
+    const char *trouble = context_open(&frame, SCENE_WIDTH, SCENE_HEIGHT);
+    double start = clock_ms();
+    size_t i;
+    if (trouble)
+        scene_stop("OpenGL", trouble);
+    mkdir("build", 0777);
+    mkdir(work, 0777);
+    report = open_output("frames.md");
+    figures = open_output("frames.tsv");
+    times = open_output("frame_times.tsv");
+    say_machine();
+    write_headings();
+    for (i = 0; i < sizeof runs / sizeof *runs; i++) {
+        if (!is_wanted(&runs[i]))
+            continue;
+        if (scene_file_is_there(runs[i].scene.file) && scene_file_is_there(runs[i].scene.path))
+            measure(&runs[i], &frame);
+        else
+            say("\n## %s: its files are not here\n", runs[i].scene.name);
+    }
+    if (sizes.count && sizes.series[0].count > 1)
+        write_plot(&sizes, "frames", "sizes");
+    say("\nAll of it took %.0f s.\n", (clock_ms() - start) * 1e-3);
+    fclose(times);
+    fclose(figures);
+    fclose(report);
+    context_close(&frame);
+    return 0;
+}

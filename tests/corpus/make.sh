@@ -1,0 +1,57 @@
+#!/bin/sh
+# Makes the seeds of the fuzzers anew: tests/corpus/NAME/seed-* for tests/fuzz_NAME.c. Files in there
+# of other names are inputs that fuzzers found; they stay. The same seeds come out on every machine.
+
+cd "$(dirname "$0")" || exit 1
+rm -f ./*/seed-*
+
+# n bytes from a generator of random numbers (Lehmer's), as escapes for printf
+noise() # seed, n
+{
+    awk -v x="$1" -v n="$2" 'BEGIN {
+        for (x = x * 7919 + 1; n > 0; n--) {
+            x = x * 16807 % 2147483647
+            printf "\\%03o", int(x / 65536) % 256
+        }
+    }'
+}
+
+seed() # directory, name, escapes
+{
+    mkdir -p "$1"
+    printf "$3" > "$1/seed-$2"
+}
+
+# Calls and descriptors read their choices from the bytes: most bytes mean something ordinary.
+for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24; do
+    seed functions $i "$(noise $i 400)"
+    seed terrain $i "$(noise $((100 + i)) 240)"
+done
+# Each call of tests/fuzz_functions.c again and again, after a field, a camera and a box.
+call=0
+while [ $call -lt 17 ]; do
+    one=$(printf '\\%03o' $call)
+    seed functions call-$call "$(noise $((200 + call)) 45)\003$(noise $call 30)\004$(noise \
+        $((300 + call)) 12)$one$(noise $((400 + call)) 60)$one$(noise $((500 + call)) 60)"
+    call=$((call + 1))
+done
+
+# Elevation files behind six bytes: name (0 .hgt, 3 .pgm, 4 raw), raw format, width, depth, crop.
+hgt='\000\000\000\000\000'
+pgm='\003\000\000\000\000'
+seed dem hgt-3 "$hgt$(noise 1 18)"
+seed dem hgt-5-voids "$hgt$(noise 2 20)\200\000\200\000$(noise 3 26)"
+seed dem hgt-odd "$hgt$(noise 4 17)"
+seed dem hgt-empty "$hgt"
+seed dem hgt-crop "\001\000\000\000\003\014\014\014\014$(noise 5 128)"
+seed dem pgm-u8 "${pgm}P5 4 3 255\\n$(noise 6 12)"
+seed dem pgm-u16 "${pgm}P5\\n# a comment\\n3 3\\n65535\\n$(noise 7 18)"
+seed dem pgm-short "${pgm}P5 40 30 255\\n$(noise 8 12)"
+seed dem pgm-huge "${pgm}P5 4294967297 4294967297 255\\n$(noise 9 12)"
+seed dem pgm-zero "${pgm}P5 0 3 255\\n"
+seed dem pgm-depth "${pgm}P5 2 2 70000\\n$(noise 10 8)"
+seed dem pgm-cut "${pgm}P5 4"
+for format in 1 2 3 4; do
+    seed dem raw-$format "\004\00$format\017\017\000$(noise $format 900)"
+done
+seed dem raw-nan "\004\004\014\014\000\000\000\300\177\000\000\300\177\000\000\200\077\000\000\000\000"

@@ -1,0 +1,60 @@
+#!/bin/sh
+# Fuzzers. Without arguments: replays the corpus under sanitizers, as a test. With a number of
+# seconds: lets clang's libFuzzer look for new input, so long for each of tests/fuzz_*.c (or those
+# named after the number, like `terrain`); what it keeps goes to build/fuzz/NAME/, what breaks the
+# library to build/fuzz/NAME.crash-*, to be copied to tests/corpus/NAME/ once it is understood.
+
+cd "$(dirname "$0")/.." || exit 1
+. tests/check.sh
+seconds=${1:-0}
+[ $# -eq 0 ] || shift
+names=${*:-$(ls tests/fuzz_*.c | sed 's/.*fuzz_//; s/[.]c$//')}
+work=build/fuzz
+mkdir -p $work
+flags="-std=c99 -g -O1 -Wall -Wextra -Wno-unused-function -I."
+sanitize="-fsanitize=address,undefined -fno-sanitize-recover=all"
+CC=${CC:-cc}
+
+sanitizers_work()
+{
+    echo 'int main(void) { return 0; }' > $work/probe.c
+    $CC $sanitize $work/probe.c -o $work/probe > /dev/null 2>&1 && $work/probe > /dev/null 2>&1
+}
+
+replays() # name
+{
+    $CC $flags $sanitize tests/fuzz_$1.c -lm -o $work/replay_$1 &&
+        $work/replay_$1 tests/corpus/$1/* > $work/replay_$1.txt 2>&1 && return
+    # Once more, to say which file it was.
+    FUZZ_VERBOSE=1 $work/replay_$1 tests/corpus/$1/* 2>&1 | tail -n 30
+    false
+}
+
+# The last line says how many inputs it tried and how much of the code they reached.
+fuzz() # name
+{
+    mkdir -p $work/$1
+    clang $flags -DFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
+        tests/fuzz_$1.c -lm -o $work/fuzz_$1 || return
+    $work/fuzz_$1 -max_total_time=$seconds -max_len=1024 -len_control=20 -timeout=20 \
+        -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=$work/$1. \
+        $work/$1 tests/corpus/$1 > $work/fuzz_$1.txt 2>&1
+    code=$?
+    [ $code -eq 0 ] || grep -vE '^#[0-9]|NEW_FUNC' $work/fuzz_$1.txt | tail -n 40
+    echo "$1: $(sed -n 's/^stat::number_of_executed_units: //p' $work/fuzz_$1.txt) executions," \
+        "$(grep -oE 'cov: [0-9]+ ft: [0-9]+ corp: [^ ]+' $work/fuzz_$1.txt | tail -n 1)"
+    return $code
+}
+
+for name in $names; do
+    if [ "$seconds" -eq 0 ]; then
+        sanitizers_work || { sanitize=; echo "($CC has no sanitizers: the files are replayed bare)"; }
+        check "fuzz_$name: the corpus breaks no promise" replays "$name"
+    elif echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' > $work/probe.c &&
+            clang -fsanitize=fuzzer $work/probe.c -o $work/probe > /dev/null 2>&1; then
+        check "fuzz_$name: nothing found in $seconds s" fuzz "$name"
+    else
+        skip "fuzz_$name: clang's libFuzzer is not here; make deps-portable installs it"
+    fi
+done
+check_report
