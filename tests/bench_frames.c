@@ -8,9 +8,10 @@
            mesh, the way, their difference), *_pop.png (around its worst pop: the full mesh before
            and after, the way before and after)
 
-   BENCH_FRAMES=n   frames of a flight [each scene's own, 60 to 120]; the thesis has 10000
+   BENCH_FRAMES=n   frames of a flight [each scene's own, 48 to 96]; the thesis has 10000
    BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
    BENCH_ONLY=text  only scenes with this in their key (the names of the files)
+   BENCH_WAYS=text  only ways with this in their name, and the full mesh
    TERRIMP_DATA     where real tiles and flight paths are [../shared/data]
 
    All ways take turns in one process, frame by frame, so that a busy machine harms all alike: trust
@@ -99,13 +100,13 @@ typedef struct run {
 
 static const run runs[] = {
     { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", PYRENEES },
-      LOOK_LIGHTMAP, WAYS(path_ways), 120, 8, 1, 0 },
+      LOOK_LIGHTMAP, WAYS(path_ways), 96, 10, 1, 0 },
     { { .name = "rough 2049 x 2049, straight flight", .key = "rough", ROUGH },
-      LOOK_LIGHTMAP, WAYS(path_ways), 120, 8, 1, 0 },
+      LOOK_LIGHTMAP, WAYS(path_ways), 96, 10, 1, 0 },
     { { .name = "rough, three materials and moving clouds", .key = "materials", ROUGH },
-      LOOK_MATERIALS, WAYS(look_ways), 60, 10, 1, 0 },
+      LOOK_MATERIALS, WAYS(look_ways), 48, 10, 1, 0 },
     { { .name = "rough, with trees", .key = "trees", ROUGH },
-      LOOK_TREES, WAYS(look_ways), 60, 10, 1, 0 },
+      LOOK_TREES, WAYS(look_ways), 48, 10, 1, 0 },
     { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
       LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
     { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
@@ -634,10 +635,21 @@ static size_t frames_of(const run *r)
     return count > 0 ? (size_t)count : r->frames;
 }
 
+/* Opens the ways that are wanted, the full mesh first; returns how many. */
+static size_t open_ways(const run *r, contender *ways, scene *s, look *l)
+{
+    size_t offered = whole_protocol() ? r->all_way_count : r->way_count, count = 0, i;
+    const char *wanted = getenv("BENCH_WAYS");
+    for (i = 0; i < offered; i++)
+        if (i == 0 || !wanted || strstr(r->ways[i].name, wanted))
+            contender_open(&ways[count++], &r->ways[i], s, l);
+    return count;
+}
+
 static void measure(const run *r, const context *frame)
 {
-    size_t count = whole_protocol() ? r->all_way_count : r->way_count, i;
-    contender *ways = need_memory(count * sizeof *ways);
+    contender *ways = need_memory(WAYS_MAX * sizeof *ways);
+    size_t count, i;
     double quad_ms;
     scene s;
     quad q;
@@ -645,8 +657,7 @@ static void measure(const run *r, const context *frame)
     look l;
     scene_open(&s, &r->scene, frame, frames_of(r));
     look_open(&l, r->look, &s);
-    for (i = 0; i < count; i++)
-        contender_open(&ways[i], &r->ways[i], &s, &l);
+    count = open_ways(r, ways, &s, &l);
     quad_open(&q);
     fine_open(&f, frame);
     say("\n## %s, %zu frames\n", r->scene.name, s.flight.count);
