@@ -82,8 +82,8 @@ enum { COVER_GROUND = 1, COVER_OPAQUE = 2, COVER_IMPOSTOR = 4 };
 typedef struct flight_item {
     uint32_t node;
     int is_impostor;
-    int is_distant; /* for sure: drawn before the floor */
-    int is_close;   /* for sure: drawn after it */
+    int is_distant; /* for sure: of the background */
+    int is_close;   /* for sure: not */
     terrimp_ground_command ground;
     terrimp_impostor_command impostor;
 } flight_item;
@@ -106,7 +106,8 @@ typedef struct flight {
     uint32_t item_capacity, item_count, ground_count, impostor_count;
     uint32_t capture_count, begun_count, captured_cells, captured_triangles, captured_texels;
     uint32_t triangles, part_count, wanted_parts;
-    int in_capture, screen_started, floor_drawn, close_ground_started;
+    int in_capture, screen_started, floor_drawn;
+    int stage; /* of the screen: opaque ground, background, floor, fading ground */
     flight_picture *capturing; /* while in_capture */
     terrimp_rect *slots;                 /* [node_count][part] captured in this frame */
     uint32_t *slot_atlas;
@@ -180,7 +181,7 @@ static void flight_clear(flight *f)
     f->item_count = f->ground_count = f->impostor_count = f->triangles = 0;
     f->capture_count = f->begun_count = f->captured_cells = 0;
     f->captured_triangles = f->captured_texels = f->part_count = f->wanted_parts = 0;
-    f->in_capture = f->screen_started = f->floor_drawn = f->close_ground_started = 0;
+    f->in_capture = f->screen_started = f->floor_drawn = f->stage = 0;
 }
 
 /* ---- what the callbacks check by themselves: captures ---- */
@@ -437,6 +438,7 @@ static void flight_draw_ground(void *user, const terrimp_ground_command *command
     flight *f = (flight *)user;
     flight_item *item;
     float closest;
+    int stage;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
     CHECK(command->node < f->l->info.node_count);
     CHECK(command->level == f->places[command->node].level);
@@ -451,8 +453,11 @@ static void flight_draw_ground(void *user, const terrimp_ground_command *command
     item = add_item(f, command->node);
     item->ground = *command;
     item->is_distant = command->depth_bias > 0.0f;
-    item->is_close = f->floor_drawn || closest < f->desc.fade_end;
-    f->close_ground_started |= closest < f->desc.fade_end;
+    item->is_close = closest < f->desc.fade_end;
+    CHECK(command->alpha >= 1.0f || item->is_close);
+    stage = command->alpha < 1.0f ? 3 : item->is_distant || f->stage == 1 ? 1 : 0;
+    CHECK(stage >= f->stage && (stage != 1 || !item->is_close));
+    f->stage = stage;
     CHECK(!item->is_distant || !item->is_close);
     /* Ground nodes do not overlap. */
     CHECK(!(cover_chunks(f, command->node,
@@ -507,7 +512,8 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     uint32_t i;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
     f->screen_started = 1;
-    CHECK(!f->in_capture && !f->floor_drawn && !f->close_ground_started);
+    CHECK(!f->in_capture && f->stage <= 1);
+    f->stage = 1;
     CHECK(command->node < f->l->info.node_count && command->atlas < f->desc.atlas_count);
     CHECK(command->level == f->places[command->node].level);
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
@@ -539,12 +545,13 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     f->total_high += command->level > 0;
 }
 
-/* The floor comes once, after all that is distant and before all that is close. */
+/* The floor comes once, after all that is distant and before what fades. */
 static void flight_draw_floor(void *user, const terrimp_floor_command *command)
 {
     flight *f = (flight *)user;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
-    CHECK(!f->in_capture && !f->floor_drawn && !f->close_ground_started);
+    CHECK(!f->in_capture && f->stage == 1);
+    f->stage = 2;
     CHECK(f->impostor_count > 0);
     CHECK(command->base_vertex == f->l->info.node_count * f->l->info.mesh_vertex_stride);
     CHECK(command->first_index == f->l->info.node_count * f->l->info.mesh_index_stride);
@@ -683,21 +690,27 @@ static void check_nothing_is_drawn_twice(const flight *f)
         }
 }
 
-/* The distant part and the close part of a frame each come from front to back: there is a place
-   between the two where the order may be broken. */
+/* Opaque ground, the background and fading ground each come from front to back: before the fading
+   ground there is a place where the order may be broken. */
 static void check_front_to_back(const flight *f)
 {
-    uint32_t first = 0, last = f->item_count, i, k; /* where the close part can begin */
-    for (i = 0; i < f->item_count; i++) {
-        if (f->items[i].is_distant)
-            first = i + 1u;
+    uint32_t first = 0, last = 0, opaque = 0, i, k; /* where the background can begin */
+    while (opaque < f->item_count &&
+           (f->items[opaque].is_impostor || f->items[opaque].ground.alpha >= 1.0f))
+        opaque++;
+    last = opaque;
+    for (i = 0; i < opaque; i++) {
         if (f->items[i].is_close)
+            first = i + 1u;
+        if (f->items[i].is_distant)
             last = smaller_u32(last, i);
     }
     for (i = 0; i < f->item_count; i++)
         for (k = i + 1u; k < f->item_count; k++)
-            if (stands_in_front(&f->places[f->items[k].node].box,
+            if ((i < opaque) == (k < opaque) &&
+                stands_in_front(&f->places[f->items[k].node].box,
                                 &f->places[f->items[i].node].box, f->camera.eye)) {
+                CHECK(i < opaque);
                 first = first > i ? first : i + 1u;
                 last = smaller_u32(last, k);
             }
