@@ -131,6 +131,7 @@ $(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread
 
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
 $(BUILD)/bench_%: LIBS = $(BENCH_LIBS) -pthread
+$(BUILD)/parallel_build: LIBS = -lpthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 

@@ -46,6 +46,7 @@
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
        >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
        >>terrain      the quadtree, building, what the host's buffers hold
+       >>bake         what was built as one block: for a file, for read-only memory
        >>view         the per-frame decision, the schedule, the draw commands
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
@@ -180,7 +181,9 @@ extern "C" {
     X(TERRIMP_E_INSIDE, 9, "the eye is inside the box: draw it as ground")                        \
     X(TERRIMP_E_BEHIND, 10, "the box crosses the plane of the eye: draw it as ground")            \
     X(TERRIMP_E_STATE, 11, "called too early: build or update first")                             \
-    X(TERRIMP_E_MISS, 12, "the ray or the point does not meet the terrain")
+    X(TERRIMP_E_MISS, 12, "the ray or the point does not meet the terrain")                       \
+    X(TERRIMP_E_BAKE, 13, "the block is damaged, or no bake of this version and heightfield")     \
+    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: convert it")
 
 typedef enum terrimp_result {
 #define TERRIMPI_X(name, value, text) name = value,
@@ -560,6 +563,8 @@ typedef struct terrimp_geomip {
 TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
                                                uint32_t chunk_quads, terrimp_geomip *tree);
 
+#ifndef TERRIMP_NO_BUILD
+
 /* Finds heights, error and rms of one node, from the samples alone: different nodes may be built at
    the same time by threads with scratch arrays of their own.
 
@@ -575,6 +580,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tre
 /* Builds all nodes and finishes. Errors: those of build_node.
    Cost: O(samples * levels); about 1.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch);
+
+#endif /* TERRIMP_NO_BUILD */
 
 /* The box of a node. Errors: E_NULL; E_RANGE. */
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
@@ -724,6 +731,8 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
    quads of real terrain, 4, 5, 6 and 7 of them gave max errors of 13.7, 12.7, 12.8 and 12.8 %, and
    rms 2.75, 2.71, 2.71 and 2.74 %; numbers driven by each border's own error gained nothing. */
 #define TERRIMP_BORDER_POINTS 5u
+
+#ifndef TERRIMP_NO_BUILD
 
 /* A kept point of a border polyline. */
 typedef struct terrimp_border_point {
@@ -911,6 +920,8 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
    Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
                                               float *work);
+
+#endif /* TERRIMP_NO_BUILD */
 
 /* ==== Impostor =========================================================== >>impostor */
 
@@ -1315,7 +1326,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
               E_STATE before build_begin; E_VOID, E_NOT_FINITE for such a sample
    Cost       1.4 ms for 64 x 64 quads at level 0; at every level that, and the visits to all of the
               node's samples, 25 ns for each
-   Source     Hess 2010, section 6.5, asks for meshes of several chunks; de Boer: the tree */
+   Source     Hess 2010, section 6.5, asks for meshes of several chunks */
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
@@ -1327,7 +1338,39 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
 TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void *scratch,
                                                  size_t bytes);
 
+/* Builds anew, after the host has changed samples, the nodes of all levels that these belong to,
+   and finishes. The result is that of building everything anew, bit for bit, with the same range of
+   heights: name one in the descriptor, so that it does not hang on what the samples once were. No
+   view may update meanwhile, and the pictures of the nodes are old; terrimp_terrain_touched lists
+   whose vertices are.
+
+   samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
+              it begins inside the field]; what reaches over the last column and row is cut
+   scratch    [bytes] at least terrimp_terrain_scratch_bytes
+   Errors     E_NULL; E_MEMORY; E_ALIGN; E_RANGE for a rectangle outside of the limits or a height
+              outside of the range; E_VOID, E_NOT_FINITE for such a sample; E_STATE before
+              build_finish and for a terrain that uses a bake. Nothing has changed then
+   Cost       that of build_node for each such node: the root has every sample. A host that cannot
+              wait calls build_node itself, a few nodes a frame, from the finest level up */
+TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, void *scratch,
+                                                   size_t bytes);
+
 #endif /* TERRIMP_NO_BUILD */
+
+/* Lists the nodes whose vertices have to be filled anew after some samples have changed: ground and
+   coarse meshes; the floor, too, may have changed.
+
+   samples    as in terrimp_terrain_rebuild
+   morph      nonzero: also the nodes beside them whose morph data has changed
+   nodes      [capacity] out, rising; NULL: only counted
+   count      out: how many there are, also when they are more than capacity
+   Errors     E_NULL; E_RANGE; E_STATE; E_CAPACITY: nodes is untouched
+   Cost       O(count) */
+TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, int morph,
+                                                   uint32_t *nodes, uint32_t capacity,
+                                                   uint32_t *count);
 
 /* Sizes and extents. Before terrimp_terrain_build_finish: E_STATE. */
 TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terrain,
@@ -1428,6 +1471,84 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain);
 
 #endif /* TERRIMP_NO_MALLOC */
+
+/* ==== Bake =============================================================== >>bake */
+
+/* What building a terrain results in, as one block: for a file, for read-only memory, for a memory
+   map. It holds no pointer and is used where it lies, on machines of the byte order that it was
+   made on; convert turns that round. Floats are IEEE 754 of 32 bits. The samples stay apart. */
+
+#define TERRIMP_BAKE_VERSION 1u
+
+/* What a bake says about itself. */
+typedef struct terrimp_bake_info {
+    size_t bytes;                /* of the block; what follows it is left alone */
+    uint32_t width, depth;       /* of the heightfield that it was made of */
+    int format;                  /* the same: terrimp_format */
+    float height_scale, height_offset; /* [wu] the same; spacing and origin are free */
+    uint32_t chunk_quads, triangle_budget;
+    uint32_t level_count, node_count;
+} terrimp_bake_info;
+
+#ifndef TERRIMP_NO_BUILD
+
+/* The bytes of a terrain's bake; 0 when the terrain is NULL or not built, or for 4 GiB and more. */
+TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
+
+/* Writes the bake of a terrain. The same terrain gives the same bytes.
+
+   out        [bytes] aligned to 8 bytes
+   bytes      at least terrimp_bake_bytes
+   Errors     E_NULL; E_STATE before build_finish; E_OVERFLOW; E_CAPACITY; E_ALIGN
+   Cost       O(nodes + samples): a checksum of all samples is taken */
+TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
+                                              size_t bytes);
+
+#endif /* TERRIMP_NO_BUILD */
+
+/* Looks at a bake: sizes, checksum, and every number in it, so that whatever block passes can be
+   drawn without harm, also one that somebody made to do harm.
+
+   block      [bytes] aligned to 8 bytes
+   info       out; NULL: not wanted
+   Errors     E_NULL; E_ALIGN; E_BAKE; E_ORDER when it has to be converted first
+   Cost       O(nodes), about 1 us for each */
+TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
+                                              terrimp_bake_info *info);
+
+/* Turns the byte order of a bake round: from the other one to this machine's, or from this one to
+   the other, for a host that bakes for another machine.
+
+   block      [bytes] aligned to 8 bytes
+   out        [capacity] aligned to 8 bytes; may be block, else apart from it
+   Errors     E_NULL; E_ALIGN; E_CAPACITY; E_BAKE: out, if it is not block, may have changed */
+TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
+                                                size_t capacity);
+
+/* Whether a heightfield still has the very samples that a bake was made of: open compares only its
+   size, format, scale and offset.
+
+   Errors     those of check and of terrimp_heightfield_resolve; E_BAKE when it is another field
+   Cost       O(width * depth) */
+TERRIMP_API terrimp_result terrimp_bake_matches(const void *block, size_t bytes,
+                                                const terrimp_heightfield *field);
+
+/* The bytes of memory that a terrain needs which uses a bake where it lies. */
+TERRIMP_API size_t terrimp_terrain_open_bytes(void);
+
+/* Makes a terrain of a bake, without copying it: it can be drawn at once. Settings, such as
+   chunk_quads and skirts, are those that it was built with.
+
+   field          as in terrimp_terrain_desc
+   block          [bytes] aligned to 8 bytes; outlives the terrain and does not change; read only
+   memory         [memory_bytes] aligned to 8 bytes, at least terrimp_terrain_open_bytes
+   terrain        out: lies in memory
+   Errors         those of check and of terrimp_heightfield_resolve; E_BAKE for a field of another
+                  size, format, scale or offset; E_MEMORY
+   Cost           that of check */
+TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field,
+                                                const void *block, size_t bytes, void *memory,
+                                                size_t memory_bytes, terrimp_terrain **terrain);
 
 /* ==== View =============================================================== >>view */
 
@@ -3495,6 +3616,8 @@ static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, in
     return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
 }
 
+#ifndef TERRIMP_NO_BUILD
+
 /* ---- errors ---- */
 
 /* What the samples of a node are found to miss. */
@@ -3691,6 +3814,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, floa
     }
     return terrimp_geomip_build_finish(tree);
 }
+
+#endif /* TERRIMP_NO_BUILD */
 
 /* ---- distances ---- */
 
@@ -4345,6 +4470,28 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
    plane over a set of samples follows from ten sums over that set, and the sums over a triangle are
    those left of its edges, added and subtracted. An edge costs one step a row, thanks to running
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
+
+/* Writes the triangles of a wall along a loop of n vertices, whose rim is the vertices from
+   `rim` on. */
+static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwards)
+{
+    uint32_t i;
+    for (i = 0; i < n; i++, t += 6) {
+        uint16_t p = (uint16_t)i, q = (uint16_t)((i + 1) % n);
+        uint16_t p_rim = (uint16_t)(rim + p);
+        uint16_t q_rim = (uint16_t)(rim + q);
+        /* outwards, rim below: seen from outside the loop runs from left to right; inwards, rim
+           above: seen from inside it runs from right to left. The same order serves both. */
+        t[0] = inwards ? q : p;
+        t[1] = inwards ? p : p_rim;
+        t[2] = inwards ? p_rim : q_rim;
+        t[3] = inwards ? q : p;
+        t[4] = inwards ? p_rim : q_rim;
+        t[5] = inwards ? q_rim : q;
+    }
+}
+
+#ifndef TERRIMP_NO_BUILD
 
 /* Heights are worked with in steps, -TERRIMPI_STEPS to +TERRIMPI_STEPS over the tile's range: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
@@ -6064,26 +6211,6 @@ static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
     return TERRIMP_OK;
 }
 
-/* Writes the triangles of a wall along a loop of n vertices, whose rim is the vertices from
-   `rim` on. */
-static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwards)
-{
-    uint32_t i;
-    for (i = 0; i < n; i++, t += 6) {
-        uint16_t p = (uint16_t)i, q = (uint16_t)((i + 1) % n);
-        uint16_t p_rim = (uint16_t)(rim + p);
-        uint16_t q_rim = (uint16_t)(rim + q);
-        /* outwards, rim below: seen from outside the loop runs from left to right; inwards, rim
-           above: seen from inside it runs from right to left. The same order serves both. */
-        t[0] = inwards ? q : p;
-        t[1] = inwards ? p : p_rim;
-        t[2] = inwards ? p_rim : q_rim;
-        t[3] = inwards ? q : p;
-        t[4] = inwards ? p_rim : q_rim;
-        t[5] = inwards ? q_rim : q;
-    }
-}
-
 /* Appends a wall along the loop. Its free rim is a loop of new vertices, which are in place. */
 static void terrimpi_add_wall(terrimp_mesh *mesh, int inwards)
 {
@@ -6399,6 +6526,8 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
     end_raise[1] = raise[1];
     return TERRIMP_OK;
 }
+
+#endif /* TERRIMP_NO_BUILD */
 
 /* ==== Impostor =========================================================== >>impl-impostor */
 /* Based on: Hess 2010, sections 3.3 to 3.5 and 6.2. */
@@ -8478,6 +8607,127 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
     return TERRIMP_OK;
 }
 
+/* ---- edits ---- */
+
+/* The nodes of a level that some samples belong to: columns and rows, first and last. */
+typedef struct terrimpi_touched {
+    uint32_t x0, z0, x1, z1;
+} terrimpi_touched;
+
+/* The nodes of a level that have one of `count` samples from `first` on, or one that is not more
+   than `margin` beside them, along one axis of `samples` samples and `nodes` nodes. */
+static void terrimpi_touched_along(uint32_t first, uint32_t count, uint32_t margin, uint32_t side,
+                                   uint32_t samples, uint32_t nodes, uint32_t *from, uint32_t *to)
+{
+    uint32_t last = count > samples - first ? samples - 1u : first + count - 1u;
+    first = first > margin ? first - margin : 0u;
+    last = last < samples - 1u - terrimpi_min_u32(margin, samples - 1u) ? last + margin
+                                                                        : samples - 1u;
+    *from = first > 0 ? (first - 1u) / side : 0u; /* a border belongs to both of its nodes */
+    *to = terrimpi_min_u32(last / side, nodes - 1u);
+}
+
+static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const terrimp_rect *rect,
+                                               uint32_t level, uint32_t margin)
+{
+    uint32_t side = t->desc.chunk_quads << level;
+    terrimpi_touched out;
+    terrimpi_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
+                           t->tree.level_x[level], &out.x0, &out.x1);
+    terrimpi_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
+                           t->tree.level_z[level], &out.z0, &out.z1);
+    return out;
+}
+
+static terrimp_result terrimpi_check_touched(const terrimp_terrain *t, const terrimp_rect *rect)
+{
+    if (!t || !rect)
+        return TERRIMP_E_NULL;
+    if (!t->built)
+        return TERRIMP_E_STATE;
+    if (rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
+        rect->y >= t->desc.field.depth)
+        return TERRIMP_E_RANGE;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, int morph,
+                                                   uint32_t *nodes, uint32_t capacity,
+                                                   uint32_t *count)
+{
+    terrimp_result result = terrimpi_check_touched(terrain, samples);
+    uint32_t level, x, z, all = 0;
+    int pass;
+    if (!count)
+        return TERRIMP_E_NULL;
+    if (result != TERRIMP_OK)
+        return result;
+    for (pass = 0; pass < 2; pass++) {
+        for (level = 0; level < terrain->tree.level_count; level++) {
+            /* what vertices move by hangs on the triangles of two levels above */
+            terrimpi_touched in =
+                terrimpi_touched_nodes(terrain, samples, level, morph ? 4u << level : 0u);
+            if (pass == 0)
+                all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
+            else
+                for (z = in.z0; z <= in.z1; z++)
+                    for (x = in.x0; x <= in.x1; x++)
+                        *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
+        }
+        *count = all;
+        if (!nodes)
+            return TERRIMP_OK;
+        if (all > capacity)
+            return TERRIMP_E_CAPACITY;
+    }
+    return TERRIMP_OK;
+}
+
+#ifndef TERRIMP_NO_BUILD
+
+TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
+                                                   const terrimp_rect *samples, void *scratch,
+                                                   size_t bytes)
+{
+    terrimp_result result = terrimpi_check_touched(terrain, samples);
+    const terrimp_heightfield *f;
+    terrimpi_build build;
+    terrimpi_scan scan;
+    uint32_t level, x, z;
+    if (result == TERRIMP_OK && terrain->baked)
+        result = TERRIMP_E_STATE;
+    if (result == TERRIMP_OK)
+        result = terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build));
+    if (result != TERRIMP_OK)
+        return result;
+    f = &terrain->desc.field;
+    scan.skip_voids = 0;
+    result = terrimpi_scan_tile(f, samples->x, samples->y,
+                                terrimpi_min_u32(samples->width, f->width - samples->x),
+                                terrimpi_min_u32(samples->height, f->depth - samples->y), 1,
+                                &scan);
+    if (result != TERRIMP_OK)
+        return result;
+    if (terrimpi_world_height(f, scan.low) < terrain->sample_low ||
+        terrimpi_world_height(f, scan.high) > terrain->sample_high)
+        return TERRIMP_E_RANGE;
+    for (level = 0; level < terrain->tree.level_count; level++) {
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, 0);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++) {
+                uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
+                result = terrimp_terrain_build_node(terrain, node, scratch, bytes);
+                if (result != TERRIMP_OK)
+                    return result;
+            }
+    }
+    return terrimp_terrain_build_finish(terrain);
+}
+
+#endif /* TERRIMP_NO_BUILD */
+
 /* ---- the shared index buffer: geomip patterns, then rectangles of quads for captures ---- */
 
 typedef struct terrimpi_pattern {
@@ -8808,6 +9058,8 @@ static int terrimpi_pick_allocator(const terrimp_allocator *wanted, terrimp_allo
     return 1;
 }
 
+#ifndef TERRIMP_NO_BUILD
+
 TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *desc,
                                                   const terrimp_allocator *allocator,
                                                   terrimp_terrain **terrain)
@@ -8846,6 +9098,8 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
     return TERRIMP_OK;
 }
 
+#endif /* TERRIMP_NO_BUILD */
+
 TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 {
     if (terrain && terrain->allocator.release) {
@@ -8855,6 +9109,486 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 }
 
 #endif /* TERRIMP_NO_MALLOC */
+
+/* ==== Bake =============================================================== >>impl-bake */
+/* A header of 32-bit words, then the four arrays of the terrain's block as they are. Where they
+   stand follows from the header's sizes: there is no offset to be false. */
+
+#define TERRIMPI_BAKE_MAGIC 0x54494d50u /* reads otherwise in the other byte order */
+#define TERRIMPI_BAKE_MAGIC_TURNED 0x504d4954u
+
+enum {
+    TERRIMPI_BAKE_NO_LOWER_SKIRTS = 1 << 0,
+    TERRIMPI_BAKE_NO_UPPER_SKIRTS = 1 << 1,
+    TERRIMPI_BAKE_NOT_PROUD = 1 << 2
+};
+
+typedef struct terrimpi_bake {
+    uint32_t magic, version;
+    uint32_t bytes;         /* in all */
+    uint32_t checksum;      /* of everything behind it */
+    uint32_t width, depth, format;
+    uint32_t chunk_quads, triangle_budget, flags;
+    uint32_t node_count, vertex_limit, index_limit, mesh_triangle_count;
+    uint32_t samples;       /* checksum of the heightfield's samples */
+    float height_scale, height_offset;
+    float height_low, height_high, sample_low, sample_high;
+    float range_low, range_step, proud;
+} terrimpi_bake;
+
+/* Fowler, Noll and Vo's hash, a word at a time: no changed word goes unseen, nor two that are
+   exchanged. */
+static uint32_t terrimpi_hash(uint32_t hash, uint32_t word)
+{
+    return (hash ^ word) * 16777619u;
+}
+
+static uint32_t terrimpi_float_bits(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+/* Copied, since a float may not be looked at as an integer where it lies. */
+static uint32_t terrimpi_hash_words(uint32_t hash, const void *words, size_t count)
+{
+    const unsigned char *at = (const unsigned char *)words;
+    uint32_t word;
+    for (; count > 0; count--, at += sizeof word) {
+        memcpy(&word, at, sizeof word);
+        hash = terrimpi_hash(hash, word);
+    }
+    return hash;
+}
+
+/* The checksum of a bake's header and arrays, the same in either byte order. */
+static uint32_t terrimpi_bake_hash(const terrimpi_bake *bake, const terrimp_terrain *t)
+{
+    const size_t before = offsetof(terrimpi_bake, width); /* magic to checksum */
+    uint32_t hash = 2166136261u;
+    size_t i, count = t->tree.node_count;
+    hash = terrimpi_hash_words(hash, (const unsigned char *)bake + before,
+                               (sizeof *bake - before) / 4u);
+    hash = terrimpi_hash_words(hash, t->tree.nodes, count * sizeof *t->tree.nodes / 4u);
+    for (i = 0; i < count; i++) {
+        const terrimpi_mesh *mesh = &t->meshes[i];
+        hash = terrimpi_hash_words(hash, mesh, 5u);
+        hash = terrimpi_hash(hash, (uint32_t)mesh->triangle_count << 16 |
+                                       (uint32_t)mesh->border_count << 8 | mesh->vertex_count);
+    }
+    for (i = 0; i < count * t->vertex_limit; i++)
+        hash = terrimpi_hash(hash, (uint32_t)t->points[i].height << 16 |
+                                       (uint32_t)t->points[i].z << 8 | t->points[i].x);
+    for (i = 0; i < count * t->index_limit; i += 4u) { /* a multiple of 4 */
+        const uint8_t *c = t->corners + i;
+        hash = terrimpi_hash(hash, (uint32_t)c[0] | (uint32_t)c[1] << 8 | (uint32_t)c[2] << 16 |
+                                       (uint32_t)c[3] << 24);
+    }
+    return hash;
+}
+
+/* The checksum of a heightfield's samples, whatever their byte order and the length of rows. */
+static uint32_t terrimpi_samples_hash(const terrimp_heightfield *field)
+{
+    uint32_t hash = 2166136261u, x, z;
+    for (z = 0; z < field->depth; z++)
+        for (x = 0; x < field->width; x++)
+            hash = terrimpi_hash(hash, terrimpi_float_bits(terrimpi_raw(field, x, z)));
+    return hash;
+}
+
+#ifndef TERRIMP_NO_BUILD
+
+/* The bytes of the arrays, 0 when they and the header pass what 32 bits can count. */
+static size_t terrimpi_bake_arrays(const terrimp_terrain *t)
+{
+    terrimp_terrain counted = *t;
+    size_t bytes = terrimpi_terrain_layout(&counted, NULL);
+    return bytes > UINT32_MAX - sizeof(terrimpi_bake) ? 0 : bytes;
+}
+
+TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
+{
+    size_t arrays = terrain && terrain->built ? terrimpi_bake_arrays(terrain) : 0;
+    return arrays ? sizeof(terrimpi_bake) + arrays : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
+                                              size_t bytes)
+{
+    const terrimp_terrain_desc *desc;
+    terrimpi_bake bake;
+    size_t arrays;
+    if (!terrain || !out)
+        return TERRIMP_E_NULL;
+    if (!terrain->built)
+        return TERRIMP_E_STATE;
+    arrays = terrimpi_bake_arrays(terrain);
+    if (arrays == 0)
+        return TERRIMP_E_OVERFLOW;
+    if (bytes < sizeof bake + arrays)
+        return TERRIMP_E_CAPACITY;
+    if ((uintptr_t)out % TERRIMPI_ALIGN != 0)
+        return TERRIMP_E_ALIGN;
+    desc = &terrain->desc;
+    memset(&bake, 0, sizeof bake);
+    bake.magic = TERRIMPI_BAKE_MAGIC;
+    bake.version = TERRIMP_BAKE_VERSION;
+    bake.bytes = (uint32_t)(sizeof bake + arrays);
+    bake.width = desc->field.width;
+    bake.depth = desc->field.depth;
+    bake.format = (uint32_t)desc->field.format;
+    bake.chunk_quads = desc->chunk_quads;
+    bake.triangle_budget = desc->triangle_budget;
+    bake.flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
+                 (desc->no_upper_skirts ? (uint32_t)TERRIMPI_BAKE_NO_UPPER_SKIRTS : 0u) |
+                 (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
+    bake.node_count = terrain->tree.node_count;
+    bake.vertex_limit = terrain->vertex_limit;
+    bake.index_limit = terrain->index_limit;
+    bake.mesh_triangle_count = terrain->mesh_triangle_count;
+    bake.samples = terrimpi_samples_hash(&desc->field);
+    bake.height_scale = desc->field.height_scale;
+    bake.height_offset = desc->field.height_offset;
+    bake.height_low = desc->height_low;
+    bake.height_high = desc->height_high;
+    bake.sample_low = terrain->sample_low;
+    bake.sample_high = terrain->sample_high;
+    bake.range_low = terrain->range_low;
+    bake.range_step = terrain->range_step;
+    bake.proud = desc->proud;
+    bake.checksum = terrimpi_bake_hash(&bake, terrain);
+    memcpy(out, &bake, sizeof bake);
+    memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    return TERRIMP_OK;
+}
+
+#endif /* TERRIMP_NO_BUILD */
+
+/* ---- validation: nothing of a block is used before it has been looked at ---- */
+
+static int terrimpi_within(float value, float low, float high)
+{
+    return terrimpi_finite(value) && value >= low && value <= high;
+}
+
+/* Fills in a terrain from a header in this machine's byte order: all but the arrays and the field's
+   samples. Returns 0 when the header is wrong or speaks of more bytes than there are. */
+static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp_terrain *t)
+{
+    static const float any = 0.0f; /* stands for the samples: they are not looked at */
+    terrimp_terrain_desc desc;
+    size_t arrays;
+    memset(t, 0, sizeof *t);
+    memset(&desc, 0, sizeof desc);
+    if (bake->version != TERRIMP_BAKE_VERSION || bake->format == 0 ||
+        bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
+        bake->triangle_budget == 0 || bake->flags > 7u)
+        return 0;
+    desc.field.samples = &any;
+    desc.field.width = bake->width;
+    desc.field.depth = bake->depth;
+    desc.field.format = (int)bake->format;
+    desc.field.height_scale = bake->height_scale;
+    desc.field.height_offset = bake->height_offset;
+    desc.chunk_quads = bake->chunk_quads;
+    desc.triangle_budget = bake->triangle_budget;
+    desc.proud = bake->proud;
+    desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
+    desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
+    desc.no_upper_skirts = (bake->flags & TERRIMPI_BAKE_NO_UPPER_SKIRTS) != 0;
+    desc.height_low = bake->height_low;
+    desc.height_high = bake->height_high;
+    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK)
+        return 0;
+    arrays = terrimpi_terrain_layout(t, NULL);
+    if (arrays == 0 || bytes < sizeof *bake || arrays != (size_t)bake->bytes - sizeof *bake ||
+        bake->bytes < sizeof *bake || bake->bytes > bytes)
+        return 0;
+    t->mesh_triangle_count = bake->mesh_triangle_count;
+    t->sample_low = bake->sample_low;
+    t->sample_high = bake->sample_high;
+    t->range_low = bake->range_low;
+    t->range_step = bake->range_step;
+    return bake->node_count == t->tree.node_count && bake->vertex_limit == t->vertex_limit &&
+           bake->index_limit == t->index_limit && terrimpi_finite(t->sample_low) &&
+           terrimpi_finite(t->sample_high) && terrimpi_finite(t->range_low) &&
+           terrimpi_within(t->range_step, 0.0f, TERRIMPI_FLOAT_MAX) &&
+           terrimpi_finite(terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
+}
+
+/* Sets the arrays of a terrain to those of a bake. Only reading functions touch them then. */
+static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
+{
+    terrimpi_terrain_layout(t, (unsigned char *)(uintptr_t)block + sizeof(terrimpi_bake));
+}
+
+/* Whether the loop runs once round the tile, counter-clockwise seen from above, from (0, 0). */
+static int terrimpi_loop_ok(const terrimpi_point *points, uint32_t count, uint32_t last_x,
+                            uint32_t last_z)
+{
+    uint32_t i;
+    if (points[0].x != 0 || points[0].z != 0)
+        return 0;
+    for (i = 0; i < count; i++) {
+        const terrimpi_point *p = points + i, *q = points + (i + 1u < count ? i + 1u : 0);
+        int ok = (p->x == 0 && q->x == 0 && q->z > p->z) ||
+                 (p->z == last_z && q->z == last_z && q->x > p->x) ||
+                 (p->x == last_x && q->x == last_x && q->z < p->z) ||
+                 (p->z == 0 && q->z == 0 && q->x < p->x);
+        if (!ok || (i > 0 && p->x == 0 && p->z == 0))
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether the triangles of a surface face up, have corners that exist, and cover its node. */
+static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const terrimpi_patch *p)
+{
+    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
+    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
+    int64_t area, all = 0;
+    uint32_t i, k;
+    for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
+        int64_t x[3], z[3];
+        for (k = 0; k < 3u; k++) {
+            if (corners[k] >= mesh->vertex_count)
+                return 0;
+            x[k] = terrimpi_min_u32((uint32_t)points[corners[k]].x << p->level, p->span_x);
+            z[k] = terrimpi_min_u32((uint32_t)points[corners[k]].z << p->level, p->span_z);
+        }
+        area = (z[1] - z[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (z[2] - z[0]);
+        if (area <= 0)
+            return 0;
+        all += area;
+    }
+    return all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
+}
+
+/* Whether all numbers of one node are what building could have made. */
+static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
+{
+    const terrimp_geomip_node *ground = &t->tree.nodes[node];
+    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
+    const float most = TERRIMPI_FLOAT_MAX, slack = t->range_step; /* other machines round */
+    terrimpi_patch p = terrimpi_patch_of(t, node);
+    uint32_t i;
+    if (!terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
+        !terrimpi_within(ground->low, mesh->low, mesh->high) ||
+        !terrimpi_within(ground->high, ground->low, mesh->high) ||
+        !terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
+        !terrimpi_within(mesh->error, 0.0f, most) ||
+        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
+        !terrimpi_within(mesh->upper_skirt, 0.0f, t->desc.no_upper_skirts ? 0.0f : most))
+        return 0;
+    if (mesh->border_count < 4u || mesh->border_count > t->border_limit ||
+        mesh->vertex_count < mesh->border_count || mesh->vertex_count > t->vertex_limit ||
+        mesh->triangle_count < 2u || mesh->triangle_count > t->desc.triangle_budget)
+        return 0;
+    for (i = 0; i < mesh->vertex_count; i++) {
+        float height = terrimpi_mesh_height(t, points[i].height);
+        if (points[i].x >= p.cols || points[i].z >= p.rows ||
+            height + slack < mesh->low ||
+            height - slack + (i < mesh->border_count ? mesh->upper_skirt : 0.0f) > mesh->high)
+            return 0;
+    }
+    return terrimpi_loop_ok(points, mesh->border_count, p.cols - 1u, p.rows - 1u) &&
+           terrimpi_corners_ok(t, node, &p);
+}
+
+/* Whether every node is held by its parent. */
+static int terrimpi_hierarchy_ok(const terrimp_terrain *t)
+{
+    uint32_t level, x, z;
+    for (level = 1; level < t->tree.level_count; level++)
+        for (z = 0; z < t->tree.level_z[level - 1u]; z++)
+            for (x = 0; x < t->tree.level_x[level - 1u]; x++) {
+                uint32_t child = terrimpi_mip_number(&t->tree, level - 1u, x, z);
+                uint32_t parent = terrimpi_mip_number(&t->tree, level, x / 2u, z / 2u);
+                const terrimp_geomip_node *c = &t->tree.nodes[child], *p = &t->tree.nodes[parent];
+                if (c->low < p->low || c->high > p->high || c->error > p->error ||
+                    t->meshes[child].low < t->meshes[parent].low ||
+                    t->meshes[child].high > t->meshes[parent].high)
+                    return 0;
+            }
+    return 1;
+}
+
+/* Checks a whole block and fills in a terrain from it, all but the field. */
+static terrimp_result terrimpi_bake_read(const void *block, size_t bytes, terrimp_terrain *t)
+{
+    terrimpi_bake bake;
+    uint32_t node, triangles = 0;
+    if (!block)
+        return TERRIMP_E_NULL;
+    if ((uintptr_t)block % TERRIMPI_ALIGN != 0)
+        return TERRIMP_E_ALIGN;
+    if (bytes < sizeof bake)
+        return TERRIMP_E_BAKE;
+    memcpy(&bake, block, sizeof bake);
+    if (bake.magic == TERRIMPI_BAKE_MAGIC_TURNED)
+        return TERRIMP_E_ORDER;
+    if (bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, t))
+        return TERRIMP_E_BAKE;
+    terrimpi_bake_arrays_at(t, block);
+    if (terrimpi_bake_hash(&bake, t) != bake.checksum)
+        return TERRIMP_E_BAKE;
+    for (node = 0; node < t->tree.node_count; node++) {
+        if (!terrimpi_node_ok(t, node))
+            return TERRIMP_E_BAKE;
+        triangles += t->meshes[node].triangle_count;
+    }
+    return terrimpi_hierarchy_ok(t) && triangles == t->mesh_triangle_count ? TERRIMP_OK
+                                                                           : TERRIMP_E_BAKE;
+}
+
+TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
+                                              terrimp_bake_info *info)
+{
+    terrimp_terrain t;
+    terrimp_result result = terrimpi_bake_read(block, bytes, &t);
+    if (result != TERRIMP_OK || !info)
+        return result;
+    info->bytes = sizeof(terrimpi_bake) + terrimpi_terrain_layout(&t, NULL);
+    info->width = t.desc.field.width;
+    info->depth = t.desc.field.depth;
+    info->format = t.desc.field.format;
+    info->height_scale = t.desc.field.height_scale;
+    info->height_offset = t.desc.field.height_offset;
+    info->chunk_quads = t.desc.chunk_quads;
+    info->triangle_budget = t.desc.triangle_budget;
+    info->level_count = t.tree.level_count;
+    info->node_count = t.tree.node_count;
+    return TERRIMP_OK;
+}
+
+/* ---- byte order ---- */
+
+static void terrimpi_turn_words(void *words, size_t count)
+{
+    unsigned char *at = (unsigned char *)words, swap;
+    for (; count > 0; count--, at += 4) {
+        swap = at[0];
+        at[0] = at[3];
+        at[3] = swap;
+        swap = at[1];
+        at[1] = at[2];
+        at[2] = swap;
+    }
+}
+
+static uint16_t terrimpi_turned(uint16_t value)
+{
+    return (uint16_t)(value >> 8 | value << 8);
+}
+
+/* Turns the arrays of a terrain round. */
+static void terrimpi_turn_arrays(terrimp_terrain *t)
+{
+    size_t i, count = t->tree.node_count;
+    terrimpi_turn_words(t->tree.nodes, count * sizeof *t->tree.nodes / 4u);
+    for (i = 0; i < count; i++) {
+        terrimpi_turn_words(&t->meshes[i], 5u);
+        t->meshes[i].triangle_count = terrimpi_turned(t->meshes[i].triangle_count);
+    }
+    for (i = 0; i < count * t->vertex_limit; i++)
+        t->points[i].height = terrimpi_turned(t->points[i].height);
+}
+
+TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
+                                                size_t capacity)
+{
+    terrimp_terrain t;
+    terrimpi_bake bake;
+    terrimp_result result;
+    if (!block || !out)
+        return TERRIMP_E_NULL;
+    if ((uintptr_t)out % TERRIMPI_ALIGN != 0)
+        return TERRIMP_E_ALIGN;
+    result = terrimpi_bake_read(block, bytes, &t);
+    if (result != TERRIMP_OK && result != TERRIMP_E_ORDER)
+        return result;
+    memcpy(&bake, block, sizeof bake);
+    if (result == TERRIMP_E_ORDER) {
+        terrimpi_turn_words(&bake, sizeof bake / 4u);
+        if (!terrimpi_bake_header(&bake, bytes, &t))
+            return TERRIMP_E_BAKE;
+    }
+    if (capacity < bake.bytes)
+        return TERRIMP_E_CAPACITY;
+    memmove(out, block, bake.bytes);
+    terrimpi_turn_words(out, sizeof bake / 4u);
+    terrimpi_bake_arrays_at(&t, out);
+    terrimpi_turn_arrays(&t);
+    if (result == TERRIMP_OK)
+        return TERRIMP_OK;
+    result = terrimpi_bake_read(out, bake.bytes, &t);
+    if (result != TERRIMP_OK && out == block) { /* back: a false block stays as it was */
+        terrimpi_turn_words(out, sizeof bake / 4u);
+        terrimpi_turn_arrays(&t);
+    }
+    return result;
+}
+
+/* ---- opening ---- */
+
+/* Whether a resolved field could be the one that a bake was made of. */
+static int terrimpi_bake_fits(const terrimp_terrain *t, const terrimp_heightfield *field)
+{
+    const terrimp_heightfield *f = &t->desc.field;
+    return field->width == f->width && field->depth == f->depth && field->format == f->format &&
+           field->height_scale == f->height_scale && field->height_offset == f->height_offset;
+}
+
+TERRIMP_API terrimp_result terrimp_bake_matches(const void *block, size_t bytes,
+                                                const terrimp_heightfield *field)
+{
+    terrimp_terrain t;
+    terrimp_heightfield resolved;
+    terrimpi_bake bake;
+    terrimp_result result = terrimp_heightfield_resolve(field, &resolved);
+    if (result == TERRIMP_OK)
+        result = terrimpi_bake_read(block, bytes, &t);
+    if (result != TERRIMP_OK)
+        return result;
+    memcpy(&bake, block, sizeof bake);
+    return terrimpi_bake_fits(&t, &resolved) && terrimpi_samples_hash(&resolved) == bake.samples
+               ? TERRIMP_OK
+               : TERRIMP_E_BAKE;
+}
+
+TERRIMP_API size_t terrimp_terrain_open_bytes(void)
+{
+    return sizeof(terrimp_terrain);
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field,
+                                                const void *block, size_t bytes, void *memory,
+                                                size_t memory_bytes, terrimp_terrain **terrain)
+{
+    terrimp_terrain t;
+    terrimp_heightfield resolved;
+    terrimp_result result;
+    if (!terrain)
+        return TERRIMP_E_NULL;
+    result = terrimp_heightfield_resolve(field, &resolved);
+    if (result == TERRIMP_OK)
+        result = terrimpi_check_block(memory, memory_bytes, sizeof t);
+    if (result == TERRIMP_OK)
+        result = terrimpi_bake_read(block, bytes, &t);
+    if (result != TERRIMP_OK)
+        return result;
+    if (!terrimpi_bake_fits(&t, &resolved))
+        return TERRIMP_E_BAKE;
+    t.desc.field = t.tree.field = resolved;
+    t.begun = t.built = t.baked = 1;
+    *(terrimp_terrain *)memory = t;
+    *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
 
 /* ==== View =============================================================== >>impl-view */
 /* Based on: Hess 2010, chapters 3, 4 and 6; de Boer 2000, section 2.2; DESIGN of this header: one
@@ -8997,11 +9731,6 @@ static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
 {
     if (*value == 0)
         *value = otherwise;
-}
-
-static int terrimpi_within(float value, float low, float high)
-{
-    return value >= low && value <= high;
 }
 
 static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)

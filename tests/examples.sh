@@ -53,6 +53,38 @@ check "minimal captures in its first frame and hardly any later" minimal_capture
 check "minimal draws something in each of its 8 frames" minimal_draws_all
 check "minimal prints the same again" minimal_repeats
 
+# ---- parallel_build: the same bytes with any number of threads
+
+parallel_repeats() # threads
+{
+    build/parallel_build "$1" 300 > $work/parallel.txt && cat $work/parallel.txt &&
+        grep -q "the same bytes" $work/parallel.txt
+}
+
+# ---- bake: a picture file as a DEM, to a file and to C source that holds the same bytes
+
+bakes()
+{
+    { printf 'P5 150 90 255\n'; head -c 13500 terrimp.h; } > $work/small.pgm
+    build/bake $work/small.pgm $work/small.bake --chunk 16 | grep "it opens" &&
+        build/bake $work/small.pgm $work/small.h --chunk 16 --c small > /dev/null
+}
+
+bake_source_holds_the_bake()
+{
+    printf '%s\n' '#include <stdio.h>' '#include "small.h"' 'int main(void) {' \
+        'return fwrite(small, sizeof small, 1, stdout) != 1; }' > $work/small.c
+    $CC $work/small.c -o $work/small && $work/small > $work/small.out &&
+        head -c "$(wc -c < $work/small.bake)" $work/small.out | cmp - $work/small.bake
+}
+
+bake_refuses()
+{
+    : > $work/empty.pgm
+    build/bake $work/empty.pgm $work/none 2> $work/err.txt
+    [ $? -eq 2 ] && [ "$(wc -l < $work/err.txt)" -eq 1 ] && [ ! -e $work/none ]
+}
+
 # ---- geomip: runs, and leaves a picture
 
 geomip_runs()
@@ -143,6 +175,11 @@ unknown_options()
 }
 
 check "make builds every example" make -s all
+check "parallel_build makes the same bytes with 2 threads" parallel_repeats 2
+check "parallel_build makes the same bytes with 5 threads" parallel_repeats 5
+check "bake makes a bake that opens, and C source" bakes
+check "bake writes C source that holds the bake" bake_source_holds_the_bake
+check "bake refuses an empty file, in one line" bake_refuses
 if [ -x build/geomip ]; then
     check "geomip draws its frames and leaves a picture" geomip_runs
 fi

@@ -26,6 +26,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_atlas.h"
 #include "unit_terrain.h"
 #include "unit_view.h"
+#include "unit_bake.h"
 #include "unit_bad_input.h"
 
 int main(void)
@@ -37,6 +38,7 @@ int main(void)
     impostor_tests();
     atlas_tests();
     terrain_tests();
+    bake_tests();
     view_tests();
     bad_input_tests();
     return check_report();

@@ -3,6 +3,7 @@
 #ifndef UNIT_BAD_INPUT_H
 #define UNIT_BAD_INPUT_H
 
+#include "unit_bake.h"
 #include "unit_view.h"
 
 #include <stddef.h>
@@ -904,6 +905,60 @@ static void terrains_are_not_read_before_they_are_built(void)
     REFUSES(TERRIMP_E_CAPACITY, xyz, terrimp_terrain_fill_meshes(terrain, xyz, 75, indices, 0));
 }
 
+static void bakes_are_refused(void)
+{
+    static double memory[8192], other[8192];
+    unsigned char *bytes = (unsigned char *)memory, *odd = (unsigned char *)other + 1;
+    terrimp_terrain_desc desc;
+    terrimp_terrain *terrain = NULL, *opened;
+    terrimp_bake_info info;
+    size_t size;
+    memset(&desc, 0, sizeof desc);
+    good_field(&desc.field);
+    CHECK(terrimp_bake_bytes(NULL) == 0);
+    GIVES(TERRIMP_OK, terrimp_terrain_init(&desc, memory, sizeof memory, &terrain));
+    CHECK(terrimp_bake_bytes(terrain) == 0);
+    GIVES(TERRIMP_E_STATE, terrimp_bake_write(terrain, other, sizeof other));
+    GIVES(TERRIMP_OK, terrimp_terrain_create(&desc, NULL, &terrain));
+    size = terrimp_bake_bytes(terrain);
+    CHECK(size > 0 && size < sizeof memory);
+    GIVES(TERRIMP_E_NULL, terrimp_bake_write(NULL, other, sizeof other));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_write(terrain, NULL, sizeof other));
+    REFUSES(TERRIMP_E_CAPACITY, other, terrimp_bake_write(terrain, other, size - 1u));
+    REFUSES(TERRIMP_E_ALIGN, other, terrimp_bake_write(terrain, odd, size));
+    GIVES(TERRIMP_OK, terrimp_bake_write(terrain, memory, size));
+
+    REFUSES(TERRIMP_E_NULL, info, terrimp_bake_check(NULL, size, &info));
+    REFUSES(TERRIMP_E_ALIGN, info, terrimp_bake_check(bytes + 1, size, &info));
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, 0, &info));
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, size - 1u, &info));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_convert(NULL, size, other, size));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_convert(memory, size, NULL, size));
+    REFUSES(TERRIMP_E_ALIGN, other, terrimp_bake_convert(memory, size, odd, size));
+    REFUSES(TERRIMP_E_CAPACITY, other, terrimp_bake_convert(memory, size, other, size - 1u));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_matches(memory, size, NULL));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_matches(NULL, size, &desc.field));
+    REFUSES(TERRIMP_E_NULL, opened, terrimp_terrain_open(NULL, memory, size, other, 8192, &opened));
+    REFUSES(TERRIMP_E_NULL, opened,
+            terrimp_terrain_open(&desc.field, NULL, size, other, 8192, &opened));
+    REFUSES(TERRIMP_E_NULL, opened,
+            terrimp_terrain_open(&desc.field, memory, size, NULL, 8192, &opened));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_open(&desc.field, memory, size, other, 8192, NULL));
+    REFUSES(TERRIMP_E_ALIGN, opened,
+            terrimp_terrain_open(&desc.field, memory, size, odd, 8192, &opened));
+    REFUSES(TERRIMP_E_MEMORY, opened,
+            terrimp_terrain_open(&desc.field, memory, size, other,
+                                 terrimp_terrain_open_bytes() - 1u, &opened));
+    bytes[20]++;
+    REFUSES(TERRIMP_E_BAKE, opened,
+            terrimp_terrain_open(&desc.field, memory, size, other, 8192, &opened));
+    bytes[20]--;
+    GIVES(TERRIMP_OK, terrimp_bake_convert(memory, size, memory, size));
+    REFUSES(TERRIMP_E_ORDER, opened,
+            terrimp_terrain_open(&desc.field, memory, size, other, 8192, &opened));
+    terrimp_terrain_destroy(terrain);
+}
+
 /* ---- views ---- */
 
 static void count_call(void *user)
@@ -1172,6 +1227,7 @@ static void bad_input_tests(void)
     RUN(terrain_descriptors_are_refused);
     RUN(terrains_of_bad_samples_are_refused);
     RUN(terrains_are_not_read_before_they_are_built);
+    RUN(bakes_are_refused);
     RUN(view_descriptors_are_refused);
     RUN(views_refuse);
     RUN(every_result_has_been_provoked);

@@ -649,7 +649,43 @@ static void proud_meshes_stand_above_the_terrain(void)
         l.desc.not_proud = !proud;
         if (land_build(&l)) {
             double part = samples_standing_out(&l);
-            CHECK(proud ? part < 0.03 : part > 0.3 && part < 0.7); /* of all levels */
+            CHECK(proud ? part < 0.012 : part > 0.3 && part < 0.7);
+        }
+        land_free(&l);
+    }
+}
+
+/* The corners of every node are its samples but for the step of heights that they are rounded to, up
+   where meshes stand proud: so four nodes of a level agree on them. */
+static void corners_stand_on_their_samples(void)
+{
+    int proud;
+    for (proud = 0; proud < 2; proud++) {
+        land l;
+        uint32_t node, i;
+        land_prepare(&l, 70, 59, TERRIMP_FORMAT_F32, LAND_NOISE);
+        l.desc.chunk_quads = 8;
+        l.desc.not_proud = !proud;
+        if (!land_build(&l))
+            l.info.node_count = 0;
+        for (node = 0; node < l.info.node_count; node++) {
+            uint32_t first[2], last[2], corners = 0;
+            terrimp_mesh_info mesh;
+            float step = 3.0f * 250.0f / 65535.0f * 1.01f;
+            CHECK(terrimp_terrain_get_mesh(l.terrain, node, &mesh) == TERRIMP_OK);
+            land_span(&l, node, first, last);
+            for (i = 0; i < l.terrain->meshes[node].border_count; i++) {
+                const float *p = l.xyz + (size_t)(mesh.base_vertex + i) * 3u;
+                uint32_t x = (uint32_t)p[0], z = (uint32_t)p[2];
+                float over;
+                if ((x != first[0] && x != last[0]) || (z != first[1] && z != last[1]))
+                    continue;
+                corners++;
+                over = p[1] - land_sample(&l, x, z);
+                CHECK(over >= (proud ? -1e-4f : -0.51f * step));
+                CHECK(over <= (proud ? step : 0.51f * step));
+            }
+            CHECK(corners == 4);
         }
         land_free(&l);
     }
@@ -883,6 +919,7 @@ static void terrain_tests(void)
     RUN(terrains_of_every_format_and_shape_keep_their_laws);
     RUN(terrains_of_every_budget_build);
     RUN(proud_meshes_stand_above_the_terrain);
+    RUN(corners_stand_on_their_samples);
     RUN(build_order_and_memory_make_no_difference);
     RUN(patterns_are_those_of_the_geomipmap);
     RUN(strips_cover_exactly_their_quads);

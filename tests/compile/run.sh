@@ -35,6 +35,8 @@ ways()
     check "$1: after macros like windows.h" builds_and_runs "$2" windows.c
     check "$1: without malloc"              builds_and_runs "$2" no_malloc.c
     check "$1: as without a system"         builds_and_runs "$2 -ffreestanding" bare.c
+    check "$1: without building, from a bake" \
+        builds_and_runs "$2 -Wno-unused-function" no_build.c bake_maker.c
     check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c
     check "$1: private to each of two files" \
         builds_and_runs "$2 -Wno-unused-function" static_a.c static_b.c
