@@ -11,7 +11,7 @@ seconds=${1:-0}
 names=${*:-$(ls tests/fuzz_*.c | sed 's/.*fuzz_//; s/[.]c$//')}
 work=build/fuzz
 mkdir -p $work
-flags="-std=c99 -g -O1 -Wall -Wextra -Wno-unused-function -I."
+flags="-std=c99 -g -O2 -Wall -Wextra -Wno-unused-function -I."
 sanitize="-fsanitize=address,undefined -fno-sanitize-recover=all"
 CC=${CC:-cc}
 

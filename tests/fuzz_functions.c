@@ -241,7 +241,7 @@ static void use_patterns(void)
     terrimp_pattern found;
     (void)terrimp_pattern_find(quads, form, fuzz_size(16), &found);
     count = terrimp_pattern_index_count(quads, form);
-    if (count > 0 && quads <= 32) {
+    if (count > 0 && quads <= 16) {
         uint16_t *indices = (uint16_t *)fuzz_take(count * sizeof *indices);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count - 1u) == TERRIMP_E_CAPACITY);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count) == TERRIMP_OK);
@@ -509,7 +509,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     memset(&camera, 0, sizeof camera);
     memset(&box, 0, sizeof box);
     change_field();
-    for (steps = 0; steps < 40 && fuzz_left > 0; steps++)
+    for (steps = 0; steps < 16 && fuzz_left > 0; steps++)
         calls[fuzz_below(sizeof calls / sizeof *calls)]();
     free(samples);
     samples = NULL;
