@@ -10,7 +10,7 @@
 
 static const uint32_t mip_quads[] = {4, 6, 8, 16, 32, 64};
 
-/* The vertex of the grid at whose place a vertex stands: itself, but for those of coarse borders. */
+/* The vertex of the grid at whose place a vertex stands: itself, but for coarse borders. */
 static uint32_t mip_grid(uint32_t quads, uint32_t v)
 {
     uint32_t row = quads + 1u, border = quads / 2u - 1u, along;

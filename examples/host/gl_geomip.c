@@ -142,7 +142,8 @@ static terrimp_result fill_weights(gl_geomip *g)
 
 static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t chunk_quads)
 {
-    terrimp_result result = terrimp_geomip_init(field, chunk_quads, &g->tree);
+    terrimp_result result =
+        terrimp_geomip_init(field, chunk_quads ? chunk_quads : 32, &g->tree);
     if (result == TERRIMP_OK && !allocate(g))
         result = TERRIMP_E_MEMORY;
     if (result == TERRIMP_OK)
