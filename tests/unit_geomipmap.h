@@ -831,6 +831,79 @@ static void no_sample_in_view_is_further_off_than_predicted(void)
     CHECK(close > 5u); /* the bound is worth something */
 }
 
+/* The real tile, voids levelled with the sample before them; 0 when there is no file. */
+static int mip_load_tile(mip_scene *s, uint32_t quads)
+{
+    enum { SIDE = 1201 };
+    const char *folder = getenv("TERRIMP_DATA");
+    char path[1024];
+    unsigned char *raw = (unsigned char *)malloc(2u * SIDE * SIDE);
+    FILE *file;
+    int all;
+    uint32_t i;
+    snprintf(path, sizeof path, "%s/N42E001.hgt", folder ? folder : "../shared/data");
+    file = fopen(path, "rb");
+    all = file && fread(raw, 2, (size_t)SIDE * SIDE, file) == (size_t)SIDE * SIDE;
+    if (file)
+        fclose(file);
+    if (all) {
+        mip_make(s, TERRIMP_FORM_FITTED, SIDE, SIDE, quads);
+        for (i = 0; i < (uint32_t)SIDE * SIDE; i++) {
+            int32_t height = raw[2u * i] * 256 + raw[2u * i + 1u];
+            height -= height >= 32768 ? 65536 : 0;
+            s->heights[i] = height == -32768 ? i ? s->heights[i - 1u] : 0.0f : (float)height;
+        }
+        s->tree.field.spacing_x = 68.0f; /* metres at 42.5 degrees north */
+        s->tree.field.spacing_z = 92.6f;
+        s->tree.field.origin_x = 0.0f;
+        CHECK(terrimp_geomip_build(&s->tree, s->scratch) == TERRIMP_OK);
+    }
+    free(raw);
+    return all;
+}
+
+/* TERRIMP_LONG=1: a proof of some minutes, over every sample in view of 1000 poses. */
+static void a_real_tile_keeps_within_a_pixel(void)
+{
+    mip_scene s;
+    uint16_t *indices;
+    uint32_t pose, poses = 1000;
+    float worst = 0.0f;
+    double mean = 0.0;
+    if (!getenv("TERRIMP_LONG") || !mip_load_tile(&s, 32)) {
+        SKIP("TERRIMP_LONG is not set, or there is no N42E001.hgt");
+        return;
+    }
+    indices = mip_filled(32, TERRIMP_FORM_FITTED);
+    s.view.rule = TERRIMP_GEOMIP_BOUND;
+    for (pose = 0; pose < poses; pose++) {
+        terrimp_camera camera;
+        float height = 0.0f, found, share;
+        memset(&camera, 0, sizeof camera);
+        camera.eye[0] = random_float(0.0f, 1200.0f * 68.0f);
+        camera.eye[2] = random_float(0.0f, 1200.0f * 92.6f);
+        terrimp_heightfield_height(&s.tree.field, camera.eye[0], camera.eye[2], &height);
+        camera.eye[1] = height + powf(10.0f, random_float(0.5f, 4.0f));
+        camera.forward[0] = random_float(-1.0f, 1.0f);
+        camera.forward[1] = random_float(-0.8f, 0.2f);
+        camera.forward[2] = random_float(-1.0f, 1.0f);
+        camera.fov_y_rad = 1.0471976f;
+        camera.width_px = 1280;
+        camera.height_px = 1024;
+        camera.z_near = 1.0f;
+        camera.z_far = 200000.0f;
+        CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+        mip_measure_screen(&s, &camera, indices, &found, &share);
+        CHECK(found <= 1.0f);
+        worst = found > worst ? found : worst;
+        mean += (double)found / poses;
+    }
+    printf("  %u poses on N42E001 at 1 px: the worst sample is %.4f px off, %.3f a pose\n", poses,
+           (double)worst, mean);
+    mip_free(&s);
+    free(indices);
+}
+
 /* Chunks that two frames draw at different levels. */
 static uint32_t mip_changes(const mip_scene *s, const uint8_t *before, const uint8_t *after)
 {
@@ -1135,9 +1208,9 @@ static void nodes_have_ceased_to_morph_when_they_split(void)
 }
 
 /* The drawn surface at every sample; NaN where nothing is drawn. */
-static void mip_surface(mip_scene *s, const uint16_t *stitched, float *surface)
+static void mip_surface(mip_scene *s, const uint16_t *indices, float *surface)
 {
-    static float heights[65 * 65];
+    static float heights[65 * 65 + 4 * 31];
     uint32_t i;
     memset(surface, 255, s->tree.field.width * s->tree.field.depth * sizeof *surface);
     for (i = 0; i < s->view.draw_count; i++) {
@@ -1149,14 +1222,14 @@ static void mip_surface(mip_scene *s, const uint16_t *stitched, float *surface)
         d.sample = mip_store;
         d.surface = surface;
         mip_heights(s, d.draw, heights);
-        mip_triangles(stitched, s->tree.chunk_quads, TERRIMP_FORM_STITCHED, d.draw->pattern,
-                      mip_draw_triangle, &d);
+        mip_triangles(indices, s->tree.chunk_quads, s->form, d.draw->pattern, mip_draw_triangle,
+                      &d);
     }
 }
 
 /* The largest change of a height from frame to frame on a way of `steps` steps. */
 static float mip_largest_step(mip_scene *s, const terrimp_camera *from, const float way[3],
-                              uint32_t steps, const uint16_t *stitched)
+                              uint32_t steps, const uint16_t *indices)
 {
     uint32_t samples = s->tree.field.width * s->tree.field.depth, frame, i;
     float *before = (float *)malloc(samples * sizeof *before), largest = 0.0f;
@@ -1166,7 +1239,7 @@ static float mip_largest_step(mip_scene *s, const terrimp_camera *from, const fl
         for (i = 0; i < 3u; i++)
             camera.eye[i] += way[i] * (float)frame / (float)steps;
         CHECK(terrimp_geomip_select(&s->tree, &s->view, &camera) == TERRIMP_OK);
-        mip_surface(s, stitched, after);
+        mip_surface(s, indices, after);
         for (i = 0; frame > 0 && i < samples; i++)
             if (fabsf(after[i] - before[i]) > largest) /* never for NaN */
                 largest = fabsf(after[i] - before[i]);
@@ -1179,31 +1252,60 @@ static float mip_largest_step(mip_scene *s, const terrimp_camera *from, const fl
     return largest;
 }
 
-static void heights_change_with_the_camera_s_step(void)
+/* The largest change of a height in a frame, on some random ways in steps and in small steps. */
+static void mip_step_changes(int form, float morph_ratio, float coarse[8], float fine[8])
 {
-    uint16_t *stitched = mip_filled(4, TERRIMP_FORM_STITCHED);
+    uint16_t *indices = mip_filled(4, form);
     uint32_t way;
     for (way = 0; way < 8u; way++) {
         mip_scene s;
         terrimp_camera camera;
-        float along[3], coarse, fine;
-        mip_make(&s, 0, 65, 65, 4);
+        float along[3];
+        mip_make(&s, form, 65, 65, 4);
         mip_random_camera(&s, &camera);
         camera.eye[1] = random_float(5.0f, 80.0f);
         camera.forward[1] -= 0.5f;
         camera.fov_y_rad = 2.0f;
         s.view.rule = (int)(way % TERRIMP_GEOMIP_RULE_COUNT);
         s.view.tolerance_px = random_float(4.0f, 12.0f);
-        s.view.morph_ratio = 1.5f;
+        s.view.morph_ratio = morph_ratio;
         along[0] = random_float(-40.0f, 40.0f);
         along[1] = random_float(-3.0f, 3.0f);
         along[2] = random_float(-40.0f, 40.0f);
-        coarse = mip_largest_step(&s, &camera, along, 16, stitched);
-        fine = mip_largest_step(&s, &camera, along, 256, stitched);
-        CHECK(fine <= coarse / 8.0f + 1e-4f);
+        coarse[way] = mip_largest_step(&s, &camera, along, 16, indices);
+        fine[way] = mip_largest_step(&s, &camera, along, 256, indices);
         mip_free(&s);
     }
-    free(stitched);
+    free(indices);
+}
+
+static void heights_change_with_the_camera_s_step(void)
+{
+    float coarse[8], fine[8];
+    uint32_t way;
+    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, coarse, fine);
+    for (way = 0; way < 8u; way++)
+        CHECK(fine[way] <= coarse[way] / 8.0f + 1e-4f);
+}
+
+/* Where a border vertex is left out, the diagonal beside it turns: what remains of popping. */
+static void fitted_borders_pop_less_than_nodes_that_do_not_morph(void)
+{
+    float coarse[8], fine[8], morphed = 0.0f, popped = 0.0f;
+    uint32_t round, way;
+    for (round = 0; round < 2u; round++) {
+        uint32_t kept = check_state; /* the same ways twice */
+        mip_step_changes(TERRIMP_FORM_FITTED, 1.5f, coarse, fine);
+        for (way = 0; way < 8u; way++)
+            morphed += fine[way];
+        check_state = kept;
+        mip_step_changes(TERRIMP_FORM_FITTED, 1.0f, coarse, fine);
+        for (way = 0; way < 8u; way++)
+            popped += fine[way];
+    }
+    printf("  largest step of a height in a frame, mean of 16 ways: %.3f morphing, %.3f not\n",
+           (double)morphed / 16.0, (double)popped / 16.0);
+    CHECK(morphed < 0.5f * popped);
 }
 
 static void geomipmap_tests(void)
@@ -1218,12 +1320,14 @@ static void geomipmap_tests(void)
     RUN(fits_bring_the_surface_closer);
     RUN(selections_tile_the_view_and_neighbours_fit);
     RUN(no_sample_in_view_is_further_off_than_predicted);
+    RUN(a_real_tile_keeps_within_a_pixel);
     RUN(a_jittering_camera_does_not_flicker);
     RUN(the_same_frame_is_selected_twice_alike);
     RUN(nodes_meet_exactly_at_any_fraction);
     RUN(children_begin_in_the_shape_of_their_parent);
     RUN(nodes_have_ceased_to_morph_when_they_split);
     RUN(heights_change_with_the_camera_s_step);
+    RUN(fitted_borders_pop_less_than_nodes_that_do_not_morph);
     RUN(nodes_cost_few_bytes);
     RUN(bad_geomip_input_is_refused);
 }
