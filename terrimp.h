@@ -9046,9 +9046,10 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
         return result;
     for (pass = 0; pass < 2; pass++) {
         for (level = 0; level < terrain->tree.level_count; level++) {
-            /* what vertices move by hangs on the triangles of two levels above */
-            terrimpi_touched in =
-                terrimpi_touched_nodes(terrain, samples, level, morph ? 4u << level : 0u);
+            /* what vertices move by hangs on the triangles of two levels above, how far down skirts
+               reach on what a finer neighbour draws next to the border */
+            uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
+            terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, margin);
             if (pass == 0)
                 all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
             else
@@ -9096,8 +9097,7 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
         return TERRIMP_E_RANGE;
     for (level = 0; level < terrain->tree.level_count; level++) {
         /* errors are also against what a finer neighbour draws next to the border */
-        terrimpi_touched in =
-            terrimpi_touched_nodes(terrain, samples, level, level > 0 ? 1u << (level - 1u) : 0u);
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, (1u << level) / 2u);
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++) {
                 uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
