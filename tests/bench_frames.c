@@ -166,12 +166,12 @@ static void say_machine(void)
     line[strcspn(line, "\n")] = 0;
     say("Machine: %s; load at the start %s\nRenderer: %s\n",
         strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
-    say("Pictures of %d x %d, 60 degrees. Ratio: mean time over that of the full mesh in the same "
-        "frames; CPU ratio: the same\nof the processor, over all frames. The columns from mean to "
-        "start are in multiples of the full mesh's median. The\nfirst sixth of a flight, 20 frames "
-        "at most, is its start, when pictures are new: its mean has a column, and no other\nfigure "
-        "has it in. PSNR [dB] is over terrain unless it says picture.\n", SCENE_WIDTH,
-        SCENE_HEIGHT);
+    say("Pictures of %d x %d, 60 degrees. Ratio: mean of a frame's time over that of the full mesh "
+        "at about the same moment;\nCPU ratio: mean processor time over that of the full mesh. The "
+        "columns from mean to start are in multiples of the full\nmesh's median. The first sixth "
+        "of a flight, 20 frames at most, is its start, when pictures are new: its mean has a "
+        "column,\nand no other figure has it in. PSNR [dB] is over terrain unless it says "
+        "picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
 }
 
 /* ---- Quality ------------------------------------------------------------ */
@@ -314,6 +314,18 @@ static void note_time(const scene *s, const contender *c, size_t frame, int at_s
             c->now.captured_texels);
 }
 
+static double newest_ms(const contender *c)
+{
+    return c->ms.values[c->ms.count - 1];
+}
+
+/* What a frame of the full mesh takes at the time: the mean of the two that it drew last. */
+static double full_ms(const contender *full)
+{
+    size_t n = full->ms.count;
+    return n > 1 ? 0.5 * (full->ms.values[n - 1] + full->ms.values[n - 2]) : newest_ms(full);
+}
+
 static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
                        frame_plan plan)
 {
@@ -324,10 +336,10 @@ static void draw_frame(contender *ways, size_t count, const scene *s, size_t fra
         if (!plan.look && !plan.change && !way_has_memory(c->way))
             continue;
         contender_draw(c, camera, plan.start);
-        if (plan.look || plan.change) {
-            stats_add(&c->shared_ms, c->ms.values[c->ms.count - 1]);
+        if (!plan.start)
+            stats_add(&c->ratio, newest_ms(c) / full_ms(&ways[0]));
+        if (plan.look || plan.change)
             contender_read(c, s->context, frame);
-        }
         note_time(s, c, frame, plan.start);
     }
 }
@@ -358,13 +370,11 @@ static void fly(const run *r, contender *ways, size_t count, const scene *s, qua
 
 /* ---- Tables ------------------------------------------------------------- */
 
-/* What a way costs beside the full mesh, by mean times, so that the pictures that it makes now and
-   then are paid for. Of the clock: over the frames that both have drawn, for other programs may
-   have slowed down others. Of the processor: over all. */
+/* What a way costs beside the full mesh, by means, so that the pictures that it makes now and then
+   are paid for: of the clock, or of the processor. */
 static double cost_of(const contender *c, const contender *full, int processor)
 {
-    return processor ? mean(&c->cpu_ms) / mean(&full->cpu_ms)
-                     : mean(&c->shared_ms) / mean(&full->shared_ms);
+    return processor ? mean(&c->cpu_ms) / mean(&full->cpu_ms) : mean(&c->ratio);
 }
 
 static void print_times(const contender *ways, size_t count, double quad_ms)
