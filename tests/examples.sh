@@ -100,6 +100,13 @@ host_runs() # name
     (cd $work && ../../$1) > $work/$1.txt && [ -s $work/$1.png ] || { cat $work/$1.txt; false; }
 }
 
+costs_are_above_0()
+{
+    build/costs > $work/costs.txt || { cat $work/costs.txt; return 1; }
+    awk '$3 == "us" { costs += $2 > 0 && $2 < 1e6 && $4 > 0 } $3 == "costs:" { frames++ }
+        END { exit costs != 5 || frames != 2 }' $work/costs.txt
+}
+
 # OpenGL functions that fixed_function calls and OpenGL 1.1 lacks. Whoever needs another old one
 # adds it to the list.
 newer_than_opengl_1_1()
@@ -181,6 +188,9 @@ if [ -x build/fixed_function ]; then
     check "fixed_function draws its frames, close to the full mesh" host_runs fixed_function
     check "fixed_function calls nothing newer than OpenGL 1.1" \
         prints_nothing newer_than_opengl_1_1
+fi
+if [ -x build/costs ]; then
+    check "costs measures five costs above 0, and views take them" costs_are_above_0
 fi
 if [ -x build/cpp_host ]; then
     check "cpp_host draws its frames, close to the full mesh" host_runs cpp_host

@@ -681,6 +681,34 @@ static void the_nearer_of_two_pixels_wins(void)
     }
 }
 
+/* Here r / q is z / 10. */
+static void a_part_of_a_picture_keeps_to_its_depth(void)
+{
+    static raster_scene s;
+    float matrix[16];
+    int round, x, y, drawn = 0;
+    memcpy(matrix, plane_matrix, sizeof matrix);
+    matrix[10] = 0.1f;
+    for (round = 0; round < 20; round++) {
+        open_raster_scene(&s, round % 2);
+        s.style.texture_matrix = matrix;
+        s.style.within_depth = 1;
+        draw_plane(&s);
+        for (y = 0; y < RASTER_HEIGHT; y++)
+            for (x = 0; x < RASTER_WIDTH; x++) {
+                int is_drawn = s.r.pixels[y * RASTER_PITCH + x] != RASTER_KEY;
+                float texel[2], z;
+                if (!meet_plane(&s, x, y, texel))
+                    continue;
+                z = texel[1] - 32.0f;
+                CHECK(fabsf(z) < 0.01f || fabsf(z - 10.0f) < 0.01f
+                      || is_drawn == (z > 0.0f && z < 10.0f));
+                drawn += is_drawn;
+            }
+    }
+    CHECK(drawn > 5000);
+}
+
 static void half_alpha_is_the_mean_of_both_colours(void)
 {
     static raster_scene s;
@@ -747,6 +775,7 @@ int main(void)
     RUN(rasterised_pixels_are_what_their_rays_meet);
     RUN(rasterised_triangles_stay_in_their_target);
     RUN(the_nearer_of_two_pixels_wins);
+    RUN(a_part_of_a_picture_keeps_to_its_depth);
     RUN(half_alpha_is_the_mean_of_both_colours);
     RUN(a_mipmap_is_the_mean_of_its_texels_and_never_the_key);
     remove(scratch_file);
