@@ -6,7 +6,7 @@
    Leaves: build/bench/frames.md (what it prints), frames.tsv (all figures, a line a scene and way),
            frame_times.tsv (every frame), *.svg (plots), *.png (of each way the worst frame: full
            mesh, the way, their difference), *_pop.png (around its worst pop: the full mesh before
-           and after, the way before and after)
+           and after, the way before and after), *_hole.png (around its first hole, if any)
 
    BENCH_FRAMES=n   frames of a flight [each scene's own, 48 to 96]; the thesis has 10000
    BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
@@ -212,17 +212,45 @@ static void keep_worst(contender *c, const contender *full, size_t frame)
     c->worst_frame = frame;
 }
 
-static void compare(contender *c, const contender *full, size_t frame, int with_ssim)
+enum { CROP = 160 }; /* pixels along a side */
+
+/* Copies what is around a pixel, as far as the picture goes; *to is allocated when it is null. */
+static void crop_around(const uint8_t *picture, int x, int y, uint8_t **to)
 {
-    size_t low = 0, holes;
-    stats_add(&c->psnr, psnr_of(c->picture, full->picture, NULL));
-    stats_add(&c->psnr_terrain, psnr_of(c->picture, full->picture, scene_sky));
-    holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky, &low);
+    int left = x - CROP / 2, top = y - CROP / 2, row;
+    left = left < 0 ? 0 : left > SCENE_WIDTH - CROP ? SCENE_WIDTH - CROP : left;
+    top = top < 0 ? 0 : top > SCENE_HEIGHT - CROP ? SCENE_HEIGHT - CROP : top;
+    if (!*to)
+        *to = need_memory((size_t)CROP * CROP * 3);
+    for (row = 0; row < CROP; row++)
+        memcpy(*to + (size_t)row * CROP * 3,
+               picture + ((size_t)(top + row) * SCENE_WIDTH + (size_t)left) * 3, (size_t)CROP * 3);
+}
+
+/* Counts the holes and keeps what is around the first that the way ever has. */
+static void compare_holes(contender *c, const contender *full, size_t frame)
+{
+    size_t low = 0, first = 0;
+    size_t holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky,
+                                 &low, &first);
     if (holes == SIZE_MAX)
         scene_stop("holes", "out of memory");
+    if (holes > 0 && c->holes <= 0.0) {
+        int x = (int)(first % SCENE_WIDTH), y = (int)(first / SCENE_WIDTH);
+        crop_around(full->picture, x, y, &c->hole_crops[0]);
+        crop_around(c->picture, x, y, &c->hole_crops[1]);
+        c->hole_frame = frame;
+    }
     if ((double)holes > c->holes)
         c->holes = (double)holes;
     c->low_pixels += (double)low;
+}
+
+static void compare(contender *c, const contender *full, size_t frame, int with_ssim)
+{
+    stats_add(&c->psnr, psnr_of(c->picture, full->picture, NULL));
+    stats_add(&c->psnr_terrain, psnr_of(c->picture, full->picture, scene_sky));
+    compare_holes(c, full, frame);
     if (with_ssim)
         stats_add(&c->ssim, quality_ssim(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT,
                                          scene_sky));
@@ -236,30 +264,6 @@ static void compare_fine(contender *c, const fine *f)
                                           scene_sky));
 }
 
-enum { CROP = 160 }; /* pixels along a side */
-
-/* Keeps what is around a pop: the full mesh before and after it, then the way. */
-static void keep_pop(contender *c, const contender *full)
-{
-    const uint8_t *pictures[4];
-    int i, y, left = c->pop.block_x - (CROP - QUALITY_BLOCK) / 2;
-    int top = c->pop.block_y - (CROP - QUALITY_BLOCK) / 2;
-    left = left < 0 ? 0 : left > SCENE_WIDTH - CROP ? SCENE_WIDTH - CROP : left;
-    top = top < 0 ? 0 : top > SCENE_HEIGHT - CROP ? SCENE_HEIGHT - CROP : top;
-    pictures[0] = full->before;
-    pictures[1] = full->picture;
-    pictures[2] = c->before;
-    pictures[3] = c->picture;
-    for (i = 0; i < 4; i++) {
-        if (!c->pop_crops[i])
-            c->pop_crops[i] = need_memory((size_t)CROP * CROP * 3);
-        for (y = 0; y < CROP; y++)
-            memcpy(c->pop_crops[i] + (size_t)y * CROP * 3,
-                   pictures[i] + ((size_t)(top + y) * SCENE_WIDTH + (size_t)left) * 3,
-                   (size_t)CROP * 3);
-    }
-}
-
 static void compare_change(contender *c, const contender *full, size_t frame)
 {
     quality_change change = quality_compare_change(c->before, c->picture, full->before,
@@ -270,7 +274,10 @@ static void compare_change(contender *c, const contender *full, size_t frame)
     if (change.block > c->pop.block) {
         c->pop = change;
         c->pop_frame = frame;
-        keep_pop(c, full);
+        crop_around(full->before, change.block_x, change.block_y, &c->pop_crops[0]);
+        crop_around(full->picture, change.block_x, change.block_y, &c->pop_crops[1]);
+        crop_around(c->before, change.block_x, change.block_y, &c->pop_crops[2]);
+        crop_around(c->picture, change.block_x, change.block_y, &c->pop_crops[3]);
     }
 }
 
@@ -622,15 +629,21 @@ static void write_pictures(const run *r, const contender *c)
 {
     const uint8_t *pictures[3];
     uint8_t *difference = need_memory((size_t)SCENE_PIXELS * 3);
-    const uint8_t *const crops[4] = { c->pop_crops[0], c->pop_crops[1], c->pop_crops[2],
-                                      c->pop_crops[3] };
+    const uint8_t *const pop[4] = { c->pop_crops[0], c->pop_crops[1], c->pop_crops[2],
+                                    c->pop_crops[3] };
+    const uint8_t *const hole[2] = { c->hole_crops[0], c->hole_crops[1] };
     image_difference(c->worst, c->worst_truth, SCENE_PIXELS, 1, difference);
     pictures[0] = c->worst_truth;
     pictures[1] = c->worst;
     pictures[2] = difference;
     write_side_by_side(r, c, "", pictures, 3, SCENE_WIDTH, SCENE_HEIGHT, 1);
-    if (crops[0])
-        write_side_by_side(r, c, "_pop", crops, 4, CROP, CROP, 3);
+    if (pop[0])
+        write_side_by_side(r, c, "_pop", pop, 4, CROP, CROP, 3);
+    if (hole[0]) {
+        write_side_by_side(r, c, "_hole", hole, 2, CROP, CROP, 4);
+        say("\n%s has its first hole in frame %zu: see the picture of it.\n", c->way->name,
+            c->hole_frame);
+    }
     free(difference);
 }
 

@@ -41,6 +41,8 @@ typedef struct contender {
     size_t picture_frame, worst_frame, pop_frame;
     quality_change pop;                   /* the worst one */
     uint8_t *pop_crops[4];                /* around it: the full mesh before and now, the way */
+    uint8_t *hole_crops[2];               /* around the first hole: the full mesh, the way */
+    size_t hole_frame;
 } contender;
 
 /* Whether a frame depends on those before: then every frame of the flight must be drawn. */
@@ -169,6 +171,8 @@ static void contender_close(contender *c)
     free(c->worst_truth);
     for (i = 0; i < 4; i++)
         free(c->pop_crops[i]);
+    for (i = 0; i < 2; i++)
+        free(c->hole_crops[i]);
 }
 
 #endif
