@@ -461,6 +461,16 @@ typedef struct terrimp_capture {
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture);
 
+/* Narrows a fitted capture to points, for instance the vertices that its picture is drawn on: its
+   sides touch their projections. The clip distances stay.
+
+   xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
+   Errors       E_NULL; E_RANGE; E_BEHIND when a point is not in front of the eye: the capture is
+                unchanged
+   Cost         O(count) */
+TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
+                                                   uint32_t count);
+
 /* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
@@ -499,6 +509,8 @@ typedef enum terrimp_form {
                               shows where these have not morphed: the one pop that morphing cannot
                               prevent otherwise. But a rasteriser was seen to leave one pixel in
                               ten million open beside such triangles; LIST leaves none */
+    TERRIMP_FORM_FITTED,   /* lists for trees with fits, morphing or not: coarse borders stand on
+                              vertices of their own, at the neighbour's heights */
     TERRIMP_FORM_COUNT
 } terrimp_form;
 
@@ -508,7 +520,12 @@ typedef struct terrimp_pattern {
     uint32_t triangle_count; /* without those of no area */
 } terrimp_pattern;
 
-/* The place of a pattern. Vertex (column i, row j) of a node has index j * (chunk_quads + 1) + i.
+/* Vertices of a node: the grid, column i of row j being vertex j * (chunk_quads + 1) + i. With
+   FORM_FITTED there follow, for each side in turn, those between its ends that a coarse border
+   consists of, chunk_quads / 2 - 1 a side. Returns 0 when an argument is outside its limits. */
+TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form);
+
+/* The place of a pattern.
 
    chunk_quads  quads along a node's side [Limits: even, 4..128]
    form         terrimp_form
@@ -537,10 +554,10 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 
 /* What is kept of a node. */
 typedef struct terrimp_geomip_node {
-    float low, high; /* [wu] of its samples */
-    float error;     /* [wu] largest vertical distance of a sample to the drawn triangles, whatever
-                        the pattern; at least that of its children. 0 at level 0, where a coarse
-                        side takes its error from the neighbour */
+    float low, high; /* [wu] of its samples, and of all that it can be drawn as */
+    float error;     /* [wu] largest vertical distance of a sample to the drawn triangles: those of
+                        the node in pattern 0, and those that a finer neighbour draws up to it; at
+                        least that of its children. 0 at level 0 */
     float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
 } terrimp_geomip_node;
 
@@ -554,19 +571,35 @@ typedef struct terrimp_geomip {
     uint32_t level_x[TERRIMP_GEOMIP_LEVELS], level_z[TERRIMP_GEOMIP_LEVELS];
     uint32_t scratch_count;     /* floats that building a node needs */
     terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
+    float *fits;                /* [fit_count] the caller's; NULL: vertices of all levels stand on
+                                   samples. Otherwise those above level 0 get the heights that fit
+                                   the samples best in the least-squares sense, which want
+                                   FORM_FITTED: pictures are 1 to 2 dB closer to the full mesh,
+                                   BOUND needs half the triangles */
+    uint32_t fit_count;         /* a third of the samples; 0: there is but one level */
+    uint32_t fit_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* private: where a level's fits begin */
 } terrimp_geomip;
 
-/* Lays the quadtree out; nodes is left NULL for the caller to set.
+/* Lays the quadtree out; nodes and fits are left NULL for the caller to set.
 
-   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64]
+   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
+                fewer triangles, for the same picture
    Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
 TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
                                                uint32_t chunk_quads, terrimp_geomip *tree);
 
 #ifndef TERRIMP_NO_BUILD
 
-/* Finds heights, error and rms of one node, from the samples alone: different nodes may be built at
-   the same time by threads with scratch arrays of their own.
+/* Fills in the fits, if there are any; before any node is built.
+
+   scratch    [scratch_count]
+   Errors     E_NULL
+   Cost       O(samples); about 0.35 s for 4097 x 4097
+   Source     the L2 projection on linear finite elements, as in any book on these */
+TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch);
+
+/* Finds heights, error and rms of one node, from samples and fits alone: different nodes may be
+   built at the same time by threads with scratch arrays of their own.
 
    scratch    [scratch_count]
    Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
@@ -577,8 +610,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
 /* Ends the building: parents hold what their children hold. Errors: E_NULL. */
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree);
 
-/* Builds all nodes and finishes. Errors: those of build_node.
-   Cost: O(samples * levels); about 1.5 s for 4097 x 4097 samples in chunks of 64 */
+/* Fits, builds all nodes and finishes. Errors: those of build_node.
+   Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch);
 
 #endif /* TERRIMP_NO_BUILD */
@@ -657,7 +690,7 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
    view       in: settings and arrays; out: draws, draw_count, triangle_count
    Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
               before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
-   Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples
+   Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
    Source     de Boer 2000, sections 2.2 and 2.3.1 */
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
                                                  terrimp_geomip_view *view,
@@ -668,8 +701,9 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
 /* A node's vertex: what it moves by when its factors are 1. */
 typedef struct terrimp_geomip_vertex {
     float height;    /* [wu] */
-    float move;      /* [wu] odd vertices: to the parent's shape; even ones on a border: from there
-                        to the shape of the parent's parent */
+    float move;      /* [wu] to the parent's shape; for even vertices on a border without fits, for
+                        corners, and for those of coarse borders: from there to the shape of the
+                        parent's parent */
     float beside[2]; /* [wu] what is added to move where the border vertices that an odd vertex
                         stands between move themselves: those of a border along x, along z */
 } terrimp_geomip_vertex;
@@ -685,33 +719,37 @@ typedef struct terrimp_geomip_weights {
     uint8_t self, unused[3];
 } terrimp_geomip_weights;
 
-/* Fills the vertices of a node of any level, row by row.
+/* Fills the vertices of a node of any level, row by row; in a tree with fits those of coarse
+   borders follow.
 
-   xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
-   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
+   xyz        [terrimp_pattern_vertex_count][3] out: unmorphed positions [wu]; NULL: not wanted;
+              (chunk_quads + 1)^2 without fits
+   vertices   [as many] out; NULL: not wanted
    Errors     E_NULL (also when both are NULL); E_RANGE */
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices);
 
-/* Fills the weights of the grid. Errors: E_NULL; E_RANGE.
+/* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
 
-   weights    [(chunk_quads + 1)^2] out */
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
+   form       terrimp_form
+   weights    [terrimp_pattern_vertex_count] out */
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
                                                        terrimp_geomip_weights *weights);
 
 /* Morphs a node's vertices on the CPU, for hosts without shaders. Vertices that neighbours share
    come out equal, bit for bit.
 
+   form       terrimp_form; FITTED exactly when the tree has fits
    draw       from select
-   vertices   [(chunk_quads + 1)^2] of that node
+   vertices   [terrimp_pattern_vertex_count] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
    Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride);
@@ -1709,7 +1747,8 @@ typedef struct terrimp_stats {
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
     uint32_t texels_used, texels_free; /* of all atlases */
-    uint32_t atlas_failures;     /* pictures that found no room, so far */
+    uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
+                                    are made */
     uint32_t evictions;          /* pictures given up for others, so far */
     float ground_tolerance_px;   /* what max_ground made of it */
     float worst_angle_rad;       /* of the impostors on the screen */
@@ -3276,6 +3315,41 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     return TERRIMP_OK;
 }
 
+TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
+                                                   uint32_t count)
+{
+    float low[2], high[2], slope = 1.0f; /* tangents; a ray's length over its depth */
+    uint32_t i, k;
+    if (!capture || !xyz)
+        return TERRIMP_E_NULL;
+    if (count == 0)
+        return TERRIMP_E_RANGE;
+    low[0] = low[1] = TERRIMPI_FLOAT_MAX;
+    high[0] = high[1] = -TERRIMPI_FLOAT_MAX;
+    for (i = 0; i < count; i++, xyz += 3) {
+        float p[3], depth, tangent[2];
+        for (k = 0; k < 3u; k++)
+            p[k] = xyz[k] - capture->eye[k];
+        depth = terrimpi_dot(p, capture->forward);
+        if (!(depth > 0.0f))
+            return TERRIMP_E_BEHIND;
+        tangent[0] = terrimpi_dot(p, capture->right) / depth;
+        tangent[1] = terrimpi_dot(p, capture->up) / depth;
+        slope = terrimpi_max(slope, terrimpi_length(p) / depth);
+        for (k = 0; k < 2u; k++) {
+            low[k] = terrimpi_min(low[k], tangent[k]);
+            high[k] = terrimpi_max(high[k], tangent[k]);
+        }
+    }
+    for (k = 0; k < 2u; k++)
+        terrimpi_widen(&low[k], &high[k], slope);
+    capture->tan_left = low[0];
+    capture->tan_right = high[0];
+    capture->tan_down = low[1];
+    capture->tan_up = high[1];
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16])
@@ -3316,6 +3390,21 @@ static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
     if (form == TERRIMP_FORM_STITCHED)
         most = TERRIMPI_MIP_STITCH_COLUMN;
     return (quads + most - 1u) / most;
+}
+
+/* Vertices that a coarse border has between its ends. */
+static uint32_t terrimpi_mip_border_vertices(uint32_t quads)
+{
+    return quads / 2u - 1u;
+}
+
+TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form)
+{
+    uint32_t grid = (chunk_quads + 1u) * (chunk_quads + 1u);
+    if (!terrimpi_mip_quads_fit(chunk_quads) || form < 0 || form >= (int)TERRIMP_FORM_COUNT)
+        return 0;
+    return form == TERRIMP_FORM_FITTED
+               ? grid + 4u * terrimpi_mip_border_vertices(chunk_quads) : grid;
 }
 
 /* First quad of a column: columns are as equally wide as can be. */
@@ -3386,22 +3475,43 @@ static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
     return (int)(w->pattern >> side & 1u);
 }
 
+/* The vertex of the coarse border on `side` that is `along` quads from its beginning, itself if it
+   is not one of those. */
+static uint16_t terrimpi_mip_border_index(const terrimpi_mip_writer *w, int side, uint32_t along,
+                                          uint32_t self)
+{
+    uint32_t border = terrimpi_mip_border_vertices(w->quads);
+    if (w->form != TERRIMP_FORM_FITTED || along == 0 || along == w->quads)
+        return (uint16_t)self;
+    along = along / 2u - 1u;
+    return (uint16_t)((w->quads + 1u) * (w->quads + 1u) + (uint32_t)side * border + along);
+}
+
 /* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
    towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
    edge. */
 static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
 {
-    if (w->form != TERRIMP_FORM_STITCHED) {
-        if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-            i += i & 1u;
-        if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-            i -= i & 1u;
-        if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-            j += j & 1u;
-        if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-            j -= j & 1u;
-    }
-    return (uint16_t)(j * (w->quads + 1u) + i);
+    uint32_t row = w->quads + 1u;
+    if (w->form == TERRIMP_FORM_STITCHED)
+        return (uint16_t)(j * row + i);
+    if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
+        i += i & 1u;
+    if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
+        i -= i & 1u;
+    if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
+        j += j & 1u;
+    if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
+        j -= j & 1u;
+    if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
+        return terrimpi_mip_border_index(w, TERRIMP_SIDE_Z0, i, j * row + i);
+    if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
+        return terrimpi_mip_border_index(w, TERRIMP_SIDE_Z1, i, j * row + i);
+    if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
+        return terrimpi_mip_border_index(w, TERRIMP_SIDE_X0, j, j * row + i);
+    if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
+        return terrimpi_mip_border_index(w, TERRIMP_SIDE_X1, j, j * row + i);
+    return (uint16_t)(j * row + i);
 }
 
 static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b, uint16_t c)
@@ -3536,7 +3646,12 @@ TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
     }
     t.level_count = level + 1u;
     t.node_count = t.level_first[t.level_count];
-    t.scratch_count = t.field.width + 2u * (t.chunk_quads + 1u);
+    t.scratch_count = 5u * t.field.width + 2u * (t.chunk_quads + 1u);
+    for (level = 1; level < t.level_count; level++)
+        t.fit_first[level + 1u] =
+            t.fit_first[level] + (((t.field.width - 1u) >> level) + 1u) *
+                                     (((t.field.depth - 1u) >> level) + 1u);
+    t.fit_count = t.fit_first[t.level_count];
     *tree = t;
     return TERRIMP_OK;
 }
@@ -3593,6 +3708,18 @@ static void terrimpi_mip_box(const terrimp_geomip *t, terrimpi_mip_place p, terr
                                 terrimpi_mip_row(t, p.level, (p.z + 1u) * quads));
 }
 
+/* The box within which a node's error holds: half a quad larger all round, for what finer
+   neighbours draw up to it. */
+static void terrimpi_mip_error_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
+{
+    float half = 0.5f * (float)(1u << p.level);
+    terrimpi_mip_box(t, p, box);
+    box->min[0] -= half * t->field.spacing_x;
+    box->max[0] += half * t->field.spacing_x;
+    box->min[2] -= half * t->field.spacing_z;
+    box->max[2] += half * t->field.spacing_z;
+}
+
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
                                               terrimp_box *box)
 {
@@ -3616,7 +3743,165 @@ static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, in
     return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
 }
 
+/* ---- fits ---- */
+
+/* What is minimised is the integral of the squared difference of two surfaces, that of the samples
+   and that of a level. Its normal equations have seven terms each: the products of a vertex's hat
+   function with its own and its six neighbours'. The right-hand sides, here called loads, are the
+   products of the hats with the surface of the samples. As every hat is a sum of hats of the next
+   finer level, so is a load of finer loads. Gauss and Seidel's method then gains a digit in two
+   sweeps.
+
+   Some vertices stay on their samples: those at the terrain's edge, beside which the sums would be
+   special, and those at the corners and half-way points of nodes. A corner is shared with a node
+   that no side is shared with, whose level a pattern does not tell: so it stands where it stands in
+   all levels that can meet there. */
+
+#define TERRIMPI_MIP_SWEEPS 4u
+
+/* Size of a level's lattice without what is off it at the far edges. */
+static uint32_t terrimpi_mip_cols(const terrimp_geomip *t, uint32_t level)
+{
+    return ((t->field.width - 1u) >> level) + 1u;
+}
+
+static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
+{
+    return ((t->field.depth - 1u) >> level) + 1u;
+}
+
+/* Height of a level's lattice at sample (x, z), which belongs to that lattice. */
+static float terrimpi_mip_stand(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
+{
+    uint32_t between = (1u << level) - 1u;
+    if (!t->fits || level == 0 || level >= t->level_count || ((x | z) & between) != 0)
+        return terrimpi_sample(&t->field, x, z); /* or at the far edges, off the lattice */
+    return t->fits[t->fit_first[level] + (z >> level) * terrimpi_mip_cols(t, level) + (x >> level)];
+}
+
+/* Height on the edge from a to b, k of n steps along it; exact at its ends. */
+static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
+{
+    return k == 0 ? a : k == n ? b : a + (b - a) * ((float)k / (float)n);
+}
+
+/* Height of the triangles of a level at a sample. */
+static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
+{
+    uint32_t i = x >> level, j = z >> level;
+    uint32_t x0 = terrimpi_mip_col(t, level, i), x1 = terrimpi_mip_col(t, level, i + 1u);
+    uint32_t z0 = terrimpi_mip_row(t, level, j), z1 = terrimpi_mip_row(t, level, j + 1u);
+    float a = terrimpi_mip_stand(t, level, x0, z0), d = terrimpi_mip_stand(t, level, x1, z1);
+    float b, c, u, v;
+    uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
+    right = x - x0;
+    down = z - z0;
+    if (wide == 0 || deep == 0 || right * deep == down * wide) /* an edge of the far sides, or the
+                                                                  diagonal */
+        return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
+                         : terrimpi_mip_between(a, d, right, wide);
+    b = terrimpi_mip_stand(t, level, x1, z0);
+    c = terrimpi_mip_stand(t, level, x0, z1);
+    if (right == 0)
+        return terrimpi_mip_between(a, c, down, deep);
+    if (down == 0)
+        return terrimpi_mip_between(a, b, right, wide);
+    u = (float)right / (float)wide;
+    v = (float)down / (float)deep;
+    return u < v ? a + v * (c - a) + u * (d - c) : a + u * (b - a) + v * (d - b);
+}
+
 #ifndef TERRIMP_NO_BUILD
+
+/* Loads of level 1, where rows are the samples two rows above to two below; in units of a twelfth
+   of a small triangle's area, as all loads. */
+static void terrimpi_mip_first_loads(const float *samples, uint32_t width, uint32_t count,
+                                     float *loads)
+{
+    const float *a = samples, *b = a + width, *c = b + width, *d = c + width, *e = d + width;
+    uint32_t i, x;
+    for (i = 1, x = 2; i + 1u < count; i++, x += 2u) {
+        float ring = b[x - 1u] + b[x] + c[x - 1u] + c[x + 1u] + d[x] + d[x + 1u];
+        float corners = a[x - 2u] + a[x] + c[x - 2u] + c[x + 2u] + e[x] + e[x + 2u];
+        float middles = a[x - 1u] + b[x - 2u] + b[x + 1u] + d[x - 1u] + d[x + 2u] + e[x + 1u];
+        loads[i] = 18.0f * c[x] + 10.0f * ring + 2.0f * middles + corners;
+    }
+}
+
+/* Loads of a level from those of the next finer one, from the row that lies on it; scaled to its
+   own triangles. */
+static void terrimpi_mip_next_loads(const float *finer, uint32_t cols, uint32_t count, float *loads)
+{
+    const float *above = finer - cols, *below = finer + cols;
+    uint32_t i, x;
+    for (i = 1, x = 2; i + 1u < count; i++, x += 2u)
+        loads[i] = 0.25f * finer[x] +
+                   0.125f * (above[x - 1u] + above[x] + finer[x - 1u] + finer[x + 1u] + below[x] +
+                             below[x + 1u]);
+}
+
+/* One sweep over the free vertices of a row, whose loads are given. */
+static void terrimpi_mip_sweep(const terrimp_geomip *t, uint32_t level, uint32_t j,
+                               const float *loads)
+{
+    uint32_t cols = terrimpi_mip_cols(t, level), half = t->chunk_quads / 2u, i, fixed;
+    float *fit = t->fits + t->fit_first[level] + j * cols;
+    const float *above = fit - cols, *below = fit + cols;
+    fixed = j % half == 0 ? half : cols;
+    for (i = 1; i + 1u < cols; i++) {
+        float round = above[i - 1u] + above[i] + fit[i - 1u] + fit[i + 1u] + below[i] +
+                      below[i + 1u];
+        if (i == fixed)
+            fixed += half;
+        else
+            fit[i] = (loads[i] - 8.0f * round) * (1.0f / 48.0f);
+    }
+}
+
+/* Turns the loads of a level, that are where its fits go, into fits. All sweeps run at once, each a
+   row behind the one before; scratch keeps the loads of the rows that they are at. */
+static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *scratch)
+{
+    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), i, j, sweep;
+    float *fit = t->fits + t->fit_first[level];
+    for (j = 0; j < rows + TERRIMPI_MIP_SWEEPS; j++) {
+        if (j < rows) {
+            memcpy(scratch + j % (TERRIMPI_MIP_SWEEPS + 1u) * cols, fit + j * cols,
+                   cols * sizeof *fit);
+            for (i = 0; i < cols; i++)
+                fit[j * cols + i] = terrimpi_sample(&t->field, i << level, j << level);
+        }
+        for (sweep = 1; sweep <= TERRIMPI_MIP_SWEEPS; sweep++)
+            if (j > sweep && j - sweep + 1u < rows)
+                terrimpi_mip_sweep(t, level, j - sweep,
+                                   scratch + (j - sweep) % (TERRIMPI_MIP_SWEEPS + 1u) * cols);
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch)
+{
+    uint32_t level, j;
+    if (!tree || !scratch)
+        return TERRIMP_E_NULL;
+    for (level = 1; tree->fits && level < tree->level_count; level++) {
+        uint32_t cols = terrimpi_mip_cols(tree, level), width = terrimpi_mip_cols(tree, level - 1u);
+        float *loads = tree->fits + tree->fit_first[level];
+        memset(loads, 0, (tree->fit_first[level + 1u] - tree->fit_first[level]) * sizeof *loads);
+        for (j = 1; j + 1u < terrimpi_mip_rows(tree, level); j++) {
+            loads += cols;
+            if (level == 1u) {
+                terrimpi_heightfield_tile(&tree->field, 0, 2u * j - 2u, width, 5, 1, scratch);
+                terrimpi_mip_first_loads(scratch, width, cols, loads);
+            } else {
+                terrimpi_mip_next_loads(tree->fits + tree->fit_first[level - 1u] + 2u * j * width,
+                                        width, cols, loads);
+            }
+        }
+    }
+    for (level = 1; tree->fits && level < tree->level_count; level++)
+        terrimpi_mip_solve(tree, level, scratch);
+    return TERRIMP_OK;
+}
 
 /* ---- errors ---- */
 
@@ -3624,6 +3909,7 @@ static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, in
 typedef struct terrimpi_mip_misses {
     float most, squares;
     float count;
+    float low, high; /* of the samples beyond borders */
 } terrimpi_mip_misses;
 
 /* Notes how far `count` samples are from a straight line. */
@@ -3664,6 +3950,20 @@ static void terrimpi_mip_row_misses(const float *upper, const float *lower, cons
     misses->count += (float)span + 1.0f;
 }
 
+/* Heights of a row of a level's lattice, from vertex (i, j) on. */
+static void terrimpi_mip_lattice_row(const terrimp_geomip *t, uint32_t level, uint32_t i,
+                                     uint32_t j, uint32_t count, float *heights)
+{
+    uint32_t z = terrimpi_mip_row(t, level, j), k;
+    if (!t->fits || level == 0) {
+        terrimpi_heightfield_tile(&t->field, terrimpi_mip_col(t, level, i), z, count, 1,
+                                  1u << level, heights);
+        return;
+    }
+    for (k = 0; k < count; k++)
+        heights[k] = terrimpi_mip_stand(t, level, terrimpi_mip_col(t, level, i + k), z);
+}
+
 /* Compares all samples of a node with its triangles in pattern 0. */
 static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_place p,
                                       float *scratch, terrimpi_mip_misses *misses)
@@ -3676,8 +3976,8 @@ static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_plac
         uint32_t z0 = terrimpi_mip_row(t, p.level, j), z1 = terrimpi_mip_row(t, p.level, j + 1u);
         if (z1 == z0)
             break;
-        terrimpi_heightfield_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
-        terrimpi_heightfield_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
+        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j, quads + 1u, upper);
+        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j + 1u, quads + 1u, lower);
         for (z = z0; z <= z1; z++) { /* lattice rows twice: which weighs next to nothing in rms */
             terrimpi_heightfield_tile(&t->field, x0, z, span + 1u, 1, 1, row);
             terrimpi_mip_row_misses(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
@@ -3686,60 +3986,95 @@ static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_plac
     }
 }
 
+/* A corner of a triangle: a sample's column and row, and the height drawn there. */
+typedef struct terrimpi_mip_corner {
+    uint32_t x, z;
+    float height;
+} terrimpi_mip_corner;
+
 /* Compares the samples in a triangle, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_geomip *t, uint32_t corner[3][2],
+static void terrimpi_mip_triangle_misses(const terrimp_geomip *t,
+                                         const terrimpi_mip_corner corner[3],
                                          terrimpi_mip_misses *misses)
 {
-    uint32_t x0 = terrimpi_min_u32(corner[0][0], terrimpi_min_u32(corner[1][0], corner[2][0]));
-    uint32_t x1 = terrimpi_max_u32(corner[0][0], terrimpi_max_u32(corner[1][0], corner[2][0]));
-    uint32_t z0 = terrimpi_min_u32(corner[0][1], terrimpi_min_u32(corner[1][1], corner[2][1]));
-    uint32_t z1 = terrimpi_max_u32(corner[0][1], terrimpi_max_u32(corner[1][1], corner[2][1]));
+    uint32_t x0 = terrimpi_min_u32(corner[0].x, terrimpi_min_u32(corner[1].x, corner[2].x));
+    uint32_t x1 = terrimpi_max_u32(corner[0].x, terrimpi_max_u32(corner[1].x, corner[2].x));
+    uint32_t z0 = terrimpi_min_u32(corner[0].z, terrimpi_min_u32(corner[1].z, corner[2].z));
+    uint32_t z1 = terrimpi_max_u32(corner[0].z, terrimpi_max_u32(corner[1].z, corner[2].z));
     uint32_t x, z, k;
-    float height[3];
-    for (k = 0; k < 3u; k++)
-        height[k] = terrimpi_sample(&t->field, corner[k][0], corner[k][1]);
     for (z = z0; z <= z1; z++)
         for (x = x0; x <= x1; x++) {
             int64_t part[3], all; /* twice the areas opposite the corners */
-            float miss;
+            float sample, miss;
             for (k = 0; k < 3u; k++) {
-                const uint32_t *a = corner[(k + 1u) % 3u], *b = corner[(k + 2u) % 3u];
-                part[k] = ((int64_t)b[1] - a[1]) * ((int64_t)x - a[0]) -
-                          ((int64_t)b[0] - a[0]) * ((int64_t)z - a[1]);
+                const terrimpi_mip_corner *a = &corner[(k + 1u) % 3u], *b = &corner[(k + 2u) % 3u];
+                part[k] = ((int64_t)b->z - a->z) * ((int64_t)x - a->x) -
+                          ((int64_t)b->x - a->x) * ((int64_t)z - a->z);
             }
             all = part[0] + part[1] + part[2];
             if (all == 0 || part[0] < 0 || part[1] < 0 || part[2] < 0)
                 continue;
-            miss = terrimpi_sample(&t->field, x, z) - height[0];
-            miss -= ((height[1] - height[0]) * (float)part[1] +
-                     (height[2] - height[0]) * (float)part[2]) / (float)all;
+            sample = terrimpi_sample(&t->field, x, z);
+            miss = sample - corner[0].height;
+            miss -= ((corner[1].height - corner[0].height) * (float)part[1] +
+                     (corner[2].height - corner[0].height) * (float)part[2]) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
+            misses->low = terrimpi_min(misses->low, sample);
+            misses->high = terrimpi_max(misses->high, sample);
         }
 }
 
-/* Compares with the triangles that stand along a border only when it is coarse. A block of 2 x 2
-   quads has two of them. */
+/* Compares with what a finer neighbour beyond a side draws up to it: three triangles in each block
+   of 2 x 1 of its quads, below in half quads of the node, the first of them at its own border. The
+   last number of a corner says that it stands on that border, at the node's heights. */
 static void terrimpi_mip_border_misses(const terrimp_geomip *t, terrimpi_mip_place p, int side,
                                        terrimpi_mip_misses *misses)
 {
-    static const uint8_t triangles[TERRIMP_SIDE_COUNT][2][3][2] = {
-        {{{0, 0}, {1, 1}, {2, 0}}, {{1, 1}, {2, 1}, {2, 0}}},
-        {{{1, 1}, {0, 2}, {2, 2}}, {{0, 1}, {0, 2}, {1, 1}}},
-        {{{0, 0}, {0, 2}, {1, 1}}, {{0, 2}, {1, 2}, {1, 1}}},
-        {{{1, 1}, {2, 2}, {2, 0}}, {{1, 0}, {1, 1}, {2, 0}}}};
-    uint32_t quads = t->chunk_quads, at, k, c, corner[3][2];
-    for (at = 0; at < quads; at += 2u) {
-        uint32_t i = side == TERRIMP_SIDE_X0 ? 0 : side == TERRIMP_SIDE_X1 ? quads - 2u : at;
-        uint32_t j = side == TERRIMP_SIDE_Z0 ? 0 : side == TERRIMP_SIDE_Z1 ? quads - 2u : at;
-        for (k = 0; k < 2u; k++) {
+    static const int8_t triangles[TERRIMP_SIDE_COUNT][3][3][3] = {
+        {{{1, -1, 0}, {0, 0, 1}, {2, 0, 1}}, {{0, -1, 0}, {0, 0, 1}, {1, -1, 0}},
+         {{1, -1, 0}, {2, 0, 1}, {2, -1, 0}}},
+        {{{0, 0, 1}, {1, 1, 0}, {2, 0, 1}}, {{0, 0, 1}, {0, 1, 0}, {1, 1, 0}},
+         {{2, 0, 1}, {1, 1, 0}, {2, 1, 0}}},
+        {{{-1, 1, 0}, {0, 2, 1}, {0, 0, 1}}, {{-1, 0, 0}, {-1, 1, 0}, {0, 0, 1}},
+         {{-1, 1, 0}, {-1, 2, 0}, {0, 2, 1}}},
+        {{{0, 0, 1}, {0, 2, 1}, {1, 1, 0}}, {{0, 2, 1}, {1, 2, 0}, {1, 1, 0}},
+         {{0, 0, 1}, {1, 1, 0}, {1, 0, 0}}}};
+    uint32_t quads = t->chunk_quads, at, k, c, fine = p.level - 1u;
+    for (at = 0; at < quads; at++) {
+        uint32_t i = p.x * quads, j = p.z * quads;
+        i += side == TERRIMP_SIDE_X0 ? 0 : side == TERRIMP_SIDE_X1 ? quads : at;
+        j += side == TERRIMP_SIDE_Z0 ? 0 : side == TERRIMP_SIDE_Z1 ? quads : at;
+        for (k = 0; k < 3u; k++) {
+            terrimpi_mip_corner corner[3];
             for (c = 0; c < 3u; c++) {
-                const uint8_t *offset = triangles[side][k][c];
-                corner[c][0] = terrimpi_mip_col(t, p.level, p.x * quads + i + offset[0]);
-                corner[c][1] = terrimpi_mip_row(t, p.level, p.z * quads + j + offset[1]);
+                const int8_t *offset = triangles[side][k][c];
+                corner[c].x = terrimpi_mip_col(t, fine, (uint32_t)((int32_t)(2u * i) + offset[0]));
+                corner[c].z = terrimpi_mip_row(t, fine, (uint32_t)((int32_t)(2u * j) + offset[1]));
+                corner[c].height = terrimpi_mip_stand(t, offset[2] ? p.level : fine, corner[c].x,
+                                                      corner[c].z);
             }
             terrimpi_mip_triangle_misses(t, corner, misses);
         }
     }
+}
+
+/* Widens a node's range by the heights at which its vertices may stand: its own, and where it
+   morphs or meets coarser neighbours those of the two levels above. */
+static void terrimpi_mip_drawn_range(const terrimp_geomip *t, terrimpi_mip_place p,
+                                     terrimp_geomip_node *node)
+{
+    uint32_t quads = t->chunk_quads, i, j, above;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++)
+            for (above = 0; above <= 2u; above++) {
+                uint32_t x = terrimpi_mip_col(t, p.level, p.x * quads + i);
+                uint32_t z = terrimpi_mip_row(t, p.level, p.z * quads + j);
+                float height = terrimpi_mip_height(t, p.level + above, x, z);
+                node->low = terrimpi_min(node->low, height);
+                node->high = terrimpi_max(node->high, height);
+                if (((i | j) & 1u) != 0)
+                    break;
+            }
 }
 
 static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_mip_place p)
@@ -3756,6 +4091,8 @@ static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_
     node->low = terrimpi_world_height(&t->field, scan.low);
     node->high = terrimpi_world_height(&t->field, scan.high);
     node->error = node->rms = 0.0f;
+    if (t->fits)
+        terrimpi_mip_drawn_range(t, p, node);
     return TERRIMP_OK;
 }
 
@@ -3774,11 +4111,18 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
         return terrimpi_mip_build_leaf(tree, p);
     memset(&misses, 0, sizeof misses);
     terrimpi_mip_inner_misses(tree, p, scratch, &misses);
+    misses.low = misses.high = terrimpi_mip_stand(
+        tree, p.level, terrimpi_mip_col(tree, p.level, p.x * tree->chunk_quads),
+        terrimpi_mip_row(tree, p.level, p.z * tree->chunk_quads));
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         if (terrimpi_mip_beyond(tree, p, side, &beyond))
             terrimpi_mip_border_misses(tree, p, side, &misses);
+    tree->nodes[node].low = misses.low;
+    tree->nodes[node].high = misses.high;
     tree->nodes[node].error = misses.most;
     tree->nodes[node].rms = TERRIMP_SQRTF(misses.squares / misses.count);
+    if (tree->fits)
+        terrimpi_mip_drawn_range(tree, p, &tree->nodes[node]);
     return TERRIMP_OK;
 }
 
@@ -3794,9 +4138,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tre
                     &tree->nodes[terrimpi_mip_number(tree, level - 1u, x, z)];
                 terrimp_geomip_node *node =
                     &tree->nodes[terrimpi_mip_number(tree, level, x / 2u, z / 2u)];
-                int first = x % 2u == 0 && z % 2u == 0;
-                node->low = first ? child->low : terrimpi_min(node->low, child->low);
-                node->high = first ? child->high : terrimpi_max(node->high, child->high);
+                node->low = terrimpi_min(node->low, child->low);
+                node->high = terrimpi_max(node->high, child->high);
                 node->error = terrimpi_max(node->error, child->error);
             }
     return TERRIMP_OK;
@@ -3805,13 +4148,11 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tre
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch)
 {
     uint32_t node;
-    if (!tree)
-        return TERRIMP_E_NULL;
-    for (node = 0; node < tree->node_count; node++) {
-        terrimp_result result = terrimp_geomip_build_node(tree, node, scratch);
-        if (result != TERRIMP_OK)
-            return result;
-    }
+    terrimp_result result = terrimp_geomip_fit(tree, scratch);
+    for (node = 0; node < (tree ? tree->node_count : 0) && result == TERRIMP_OK; node++)
+        result = terrimp_geomip_build_node(tree, node, scratch);
+    if (result != TERRIMP_OK)
+        return result;
     return terrimp_geomip_build_finish(tree);
 }
 
@@ -4000,14 +4341,21 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
     return (a * a + b) / z2 * 1.00001f; /* more than all rounding here */
 }
 
-/* Square of a node's error over the tolerance, when it is drawn as it is. */
-static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node)
+/* Square of a node's error over the tolerance, when it is drawn as it is; 0 when it is out of view.
+   *mask: planes to test against, and those that are left for its parts. */
+static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node,
+                                  int *mask)
 {
     float d2, measure, split2 = f->view->distances[node];
     terrimp_box box;
     if (!(split2 > 0.0f))
         return 0.0f;
-    terrimpi_mip_box(f->tree, p, &box);
+    terrimpi_mip_error_box(f->tree, p, &box);
+    if (*mask) {
+        *mask = terrimp_frustum_test(&f->frustum, &box, *mask);
+        if (*mask == TERRIMP_PLANES_OUTSIDE)
+            return 0.0f;
+    }
     d2 = terrimpi_mip_distance2(&box, f->eye);
     measure = f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2) : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
@@ -4033,22 +4381,32 @@ static float terrimpi_mip_marked(const terrimpi_mip_frame *f, uint32_t node)
     return mark->frame == f->view->frame ? mark->measure : 0.0f;
 }
 
+/* A node on its way through the quadtree, and the planes that it still has to be tested against. */
+typedef struct terrimpi_mip_visit {
+    terrimpi_mip_place place;
+    int mask;
+} terrimpi_mip_visit;
+
 /* Marks the nodes whose own error asks for a split, and those that are close to it. Measures never
-   grow towards the leaves, so what lies below an unsplit node asks for nothing. */
+   grow towards the leaves, so what lies below an unsplit node asks for nothing. What is out of view
+   asks for nothing either, unless nodes morph: then a border would jump when one of its nodes
+   leaves the view. */
 static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
-    terrimpi_mip_place stack[3u * TERRIMP_GEOMIP_LEVELS + 1u];
+    terrimpi_mip_visit stack[3u * TERRIMP_GEOMIP_LEVELS + 1u];
     uint32_t depth = 1, i;
     float stay = 1.0f + f->view->hysteresis;
     float worth = 1.0f / (f->view->morph_ratio * f->view->morph_ratio);
-    stack[0].level = t->level_count - 1u;
-    stack[0].x = stack[0].z = 0;
+    stack[0].place.level = t->level_count - 1u;
+    stack[0].place.x = stack[0].place.z = 0;
+    stack[0].mask = worth < 1.0f ? 0 : TERRIMP_PLANES_ALL;
     while (depth > 0) {
-        terrimpi_mip_place p = stack[--depth];
+        terrimpi_mip_visit v = stack[--depth];
+        terrimpi_mip_place p = v.place;
         uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
         const terrimp_geomip_mark *mark = &f->view->marks[node];
-        float measure = p.level == 0 ? 0.0f : terrimpi_mip_measure(f, p, node);
+        float measure = p.level == 0 ? 0.0f : terrimpi_mip_measure(f, p, node, &v.mask);
         if (mark->frame == f->view->frame - 1u && mark->measure >= 1.0f && worth >= 1.0f)
             measure *= stay * stay;
         if (measure < worth)
@@ -4056,13 +4414,12 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
         terrimpi_mip_raise(f, p.level, node, measure);
         if (measure < 1.0f || p.level == 1u)
             continue;
-        p.level--;
+        v.place.level--;
         for (i = 0; i < 4u; i++) {
-            terrimpi_mip_place child = p;
-            child.x = p.x * 2u + (i & 1u);
-            child.z = p.z * 2u + (i >> 1);
-            if (child.x < t->level_x[p.level] && child.z < t->level_z[p.level])
-                stack[depth++] = child;
+            v.place.x = p.x * 2u + (i & 1u);
+            v.place.z = p.z * 2u + (i >> 1);
+            if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
+                stack[depth++] = v;
         }
     }
 }
@@ -4136,7 +4493,7 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
 {
     terrimp_geomip_view *v = f->view;
     terrimp_geomip_draw *draw;
-    int side;
+    int side, whole = 0;
     if (v->draws_needed++ >= v->draw_capacity)
         return;
     draw = &v->draws[v->draws_needed - 1u];
@@ -4147,7 +4504,7 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
     draw->pattern = 0;
     draw->error_px = 0.0f;
     if (p.level > 0)
-        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, p, node));
+        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, p, node, &whole));
     draw->morph = terrimpi_mip_fraction(f, p);
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         terrimpi_mip_side(f, p, side, draw);
@@ -4155,14 +4512,12 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
 }
 
 /* Walks down to the nodes that are not split, children closest to the eye first, and leaves out
-   what the frustum does not meet. */
+   what the frustum does not meet. Wagner's ground rectangle of the frustum, as an early out here
+   and above, was measured and left out: 0.042 against 0.045 ms a frame, less than runs differ by. */
 static void terrimpi_mip_collect(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
-    struct {
-        terrimpi_mip_place place;
-        int mask;
-    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
+    terrimpi_mip_visit stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
     uint32_t depth = 1, i;
     f->view->draws_needed = f->view->triangle_count = 0;
     stack[0].place.level = t->level_count - 1u;
@@ -4286,44 +4641,13 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
 
 /* ---- vertices and morphing ---- */
 
-/* Height on the edge from a to b, k of n steps along it; exact at its ends. */
-static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
-{
-    return k == 0 ? a : k == n ? b : a + (b - a) * ((float)k / (float)n);
-}
-
-/* Height of the triangles of a level at a sample. */
-static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
-{
-    const terrimp_heightfield *f = &t->field;
-    uint32_t i = x >> level, j = z >> level;
-    uint32_t x0 = terrimpi_mip_col(t, level, i), x1 = terrimpi_mip_col(t, level, i + 1u);
-    uint32_t z0 = terrimpi_mip_row(t, level, j), z1 = terrimpi_mip_row(t, level, j + 1u);
-    float a = terrimpi_sample(f, x0, z0), d = terrimpi_sample(f, x1, z1), b, c, u, v;
-    uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
-    right = x - x0;
-    down = z - z0;
-    if (wide == 0 || deep == 0 || right * deep == down * wide) /* an edge of the far sides, or the
-                                                                  diagonal */
-        return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
-                         : terrimpi_mip_between(a, d, right, wide);
-    b = terrimpi_sample(f, x1, z0);
-    c = terrimpi_sample(f, x0, z1);
-    if (right == 0)
-        return terrimpi_mip_between(a, c, down, deep);
-    if (down == 0)
-        return terrimpi_mip_between(a, b, right, wide);
-    u = (float)right / (float)wide;
-    v = (float)down / (float)deep;
-    return u < v ? a + v * (c - a) + u * (d - c) : a + u * (b - a) + v * (d - b);
-}
-
-/* How far a vertex of a level's lattice is below the triangles of `above` levels up. */
+/* How far a vertex of a level's lattice moves between the levels `from` and `from` + 1 above. */
 static float terrimpi_mip_move(const terrimp_geomip *t, uint32_t level, uint32_t i, uint32_t j,
-                               uint32_t above)
+                               uint32_t from)
 {
     uint32_t x = terrimpi_mip_col(t, level, i), z = terrimpi_mip_row(t, level, j);
-    return terrimpi_mip_height(t, level + above, x, z) - terrimpi_sample(&t->field, x, z);
+    return terrimpi_mip_height(t, level + from + 1u, x, z) -
+           terrimpi_mip_height(t, level + from, x, z);
 }
 
 /* The moves of a node's vertex (i, j); (i0, j0) is the node's first one on the lattice. */
@@ -4331,26 +4655,73 @@ static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_
                                 uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
 {
     uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
-    int odd = (i | j) & 1u, border = i == 0 || j == 0 || i == last + 1u || j == last + 1u;
-    vertex->height = terrimpi_sample(&t->field, terrimpi_mip_col(t, level, i0 + i),
-                                     terrimpi_mip_row(t, level, j0 + j));
+    int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
+    vertex->height = terrimpi_mip_stand(t, level, terrimpi_mip_col(t, level, i0 + i),
+                                        terrimpi_mip_row(t, level, j0 + j));
     vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
-    if (odd || border)
-        vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, odd ? 1u : 2u);
+    if ((along_x && along_z) || (!odd && !t->fits && (along_x || along_z)))
+        vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 1);
+    else if (odd || t->fits)
+        vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 0);
+    if (!odd)
+        return;
     if (j == 1u)
-        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i - both, j0, 2);
+        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i - both, j0, 1);
     if (j == last)
-        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i + both, j0 + last + 1u, 2);
+        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i + both, j0 + last + 1u, 1);
     if (i == 1u)
-        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0, j0 + j - both, 2);
+        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0, j0 + j - both, 1);
     if (i == last)
-        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0 + last + 1u, j0 + j + both, 2);
-    if (odd && (j == 0 || j == last + 1u)) /* between two border vertices: one of them moves */
-        vertex->beside[0] = 0.5f * (terrimpi_mip_move(t, level, i0 + i - 1u, j0 + j, 2) +
-                                    terrimpi_mip_move(t, level, i0 + i + 1u, j0 + j, 2));
-    if (odd && (i == 0 || i == last + 1u))
-        vertex->beside[1] = 0.5f * (terrimpi_mip_move(t, level, i0 + i, j0 + j - 1u, 2) +
-                                    terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 2));
+        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0 + last + 1u, j0 + j + both, 1);
+    if (along_x) /* between two border vertices: one of them moves */
+        vertex->beside[0] = 0.5f * (terrimpi_mip_move(t, level, i0 + i - 1u, j0 + j, 1) +
+                                    terrimpi_mip_move(t, level, i0 + i + 1u, j0 + j, 1));
+    if (along_z)
+        vertex->beside[1] = 0.5f * (terrimpi_mip_move(t, level, i0 + i, j0 + j - 1u, 1) +
+                                    terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
+}
+
+/* Place on the grid of the k-th vertex of a coarse border. */
+static void terrimpi_mip_border_vertex(uint32_t quads, int side, uint32_t k, uint32_t at[2])
+{
+    int along_z = side == TERRIMP_SIDE_X0 || side == TERRIMP_SIDE_X1;
+    at[along_z] = 2u * (k + 1u);
+    at[!along_z] = side == TERRIMP_SIDE_Z1 || side == TERRIMP_SIDE_X1 ? quads : 0;
+}
+
+/* Writes one position, and moves on to the next. */
+static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z,
+                                  float **xyz)
+{
+    if (!*xyz)
+        return;
+    (*xyz)[0] = terrimpi_line(t->field.origin_x, t->field.spacing_x, x);
+    (*xyz)[1] = terrimpi_mip_stand(t, level, x, z);
+    (*xyz)[2] = terrimpi_line(t->field.origin_z, t->field.spacing_z, z);
+    *xyz += 3;
+}
+
+/* The vertices of coarse borders: they stand as the neighbour's do, a level further up. */
+static void terrimpi_mip_fill_borders(const terrimp_geomip *t, terrimpi_mip_place p, float *xyz,
+                                      terrimp_geomip_vertex *vertices)
+{
+    uint32_t quads = t->chunk_quads, k, at[2];
+    int side;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        for (k = 0; k < terrimpi_mip_border_vertices(quads); k++) {
+            uint32_t x, z;
+            terrimpi_mip_border_vertex(quads, side, k, at);
+            x = terrimpi_mip_col(t, p.level, p.x * quads + at[0]);
+            z = terrimpi_mip_row(t, p.level, p.z * quads + at[1]);
+            terrimpi_mip_position(t, p.level + 1u, x, z, &xyz);
+            if (!vertices)
+                continue;
+            vertices->height = terrimpi_mip_stand(t, p.level + 1u, x, z);
+            vertices->move =
+                terrimpi_mip_move(t, p.level, p.x * quads + at[0], p.z * quads + at[1], 1);
+            vertices->beside[0] = vertices->beside[1] = 0.0f;
+            vertices++;
+        }
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
@@ -4368,22 +4739,21 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tr
     j0 = p.z * tree->chunk_quads;
     for (j = 0; j <= tree->chunk_quads; j++)
         for (i = 0; i <= tree->chunk_quads; i++) {
-            uint32_t x = terrimpi_mip_col(tree, p.level, i0 + i);
-            uint32_t z = terrimpi_mip_row(tree, p.level, j0 + j);
-            if (xyz) {
-                *xyz++ = terrimpi_line(tree->field.origin_x, tree->field.spacing_x, x);
-                *xyz++ = terrimpi_sample(&tree->field, x, z);
-                *xyz++ = terrimpi_line(tree->field.origin_z, tree->field.spacing_z, z);
-            }
+            terrimpi_mip_position(tree, p.level, terrimpi_mip_col(tree, p.level, i0 + i),
+                                  terrimpi_mip_row(tree, p.level, j0 + j), &xyz);
             if (vertices)
                 terrimpi_mip_vertex(tree, p.level, i0, j0, i, j, vertices++);
         }
+    if (tree->fits)
+        terrimpi_mip_fill_borders(tree, p, xyz, vertices);
     return TERRIMP_OK;
 }
 
-static void terrimpi_mip_weights(uint32_t quads, uint32_t i, uint32_t j, terrimp_geomip_weights *w)
+/* With fits every vertex moves to the parent's shape, without them only odd ones do. */
+static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t i, uint32_t j,
+                                 terrimp_geomip_weights *w)
 {
-    int odd = (i | j) & 1u;
+    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED, corner;
     uint8_t on[TERRIMP_SIDE_COUNT];
     int side;
     memset(w, 0, sizeof *w);
@@ -4391,7 +4761,8 @@ static void terrimpi_mip_weights(uint32_t quads, uint32_t i, uint32_t j, terrimp
     on[TERRIMP_SIDE_Z1] = j == quads;
     on[TERRIMP_SIDE_X0] = i == 0;
     on[TERRIMP_SIDE_X1] = i == quads;
-    w->self = odd != 0;
+    corner = (j == 0 || j == quads) && (i == 0 || i == quads);
+    w->self = odd != 0 || fitted;
     w->beside[TERRIMP_SIDE_Z0] = j == 1u;
     w->beside[TERRIMP_SIDE_Z1] = j == quads - 1u;
     w->beside[TERRIMP_SIDE_X0] = i == 1u;
@@ -4399,23 +4770,34 @@ static void terrimpi_mip_weights(uint32_t quads, uint32_t i, uint32_t j, terrimp
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         if (!on[side])
             continue;
-        (odd ? w->odd : w->even)[side] = 1;
+        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
         w->beside[side] = odd != 0;
         w->self = 0;
     }
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
+/* The weights of vertex k, of the grid or of a coarse border. */
+static void terrimpi_mip_weights_of(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
+{
+    uint32_t grid = (quads + 1u) * (quads + 1u);
+    if (k < grid) {
+        terrimpi_mip_weights(quads, form, k % (quads + 1u), k / (quads + 1u), w);
+        return;
+    }
+    memset(w, 0, sizeof *w);
+    w->even[(k - grid) / terrimpi_mip_border_vertices(quads)] = 1;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
                                                        terrimp_geomip_weights *weights)
 {
-    uint32_t i, j;
+    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
     if (!weights)
         return TERRIMP_E_NULL;
-    if (!terrimpi_mip_quads_fit(chunk_quads))
+    if (count == 0)
         return TERRIMP_E_RANGE;
-    for (j = 0; j <= chunk_quads; j++)
-        for (i = 0; i <= chunk_quads; i++)
-            terrimpi_mip_weights(chunk_quads, i, j, weights++);
+    for (k = 0; k < count; k++)
+        terrimpi_mip_weights_of(chunk_quads, form, k, &weights[k]);
     return TERRIMP_OK;
 }
 
@@ -4425,31 +4807,30 @@ static float terrimpi_mip_dot4(const uint8_t weight[4], const float factor[4])
            (float)weight[2] * factor[2] + (float)weight[3] * factor[3];
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride)
 {
-    uint32_t i, j;
+    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
     if (!draw || !vertices || !heights)
         return TERRIMP_E_NULL;
-    if (!terrimpi_mip_quads_fit(chunk_quads) || stride == 0)
+    if (count == 0 || stride == 0)
         return TERRIMP_E_RANGE;
-    for (j = 0; j <= chunk_quads; j++)
-        for (i = 0; i <= chunk_quads; i++, vertices++, heights += stride) {
-            const float *coarse = draw->side_coarse;
-            terrimp_geomip_weights w;
-            float factor, along_z, along_x;
-            terrimpi_mip_weights(chunk_quads, i, j, &w);
-            factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
-                     terrimpi_mip_dot4(w.even, coarse);
-            along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
-                      (float)w.beside[TERRIMP_SIDE_Z1] * coarse[TERRIMP_SIDE_Z1];
-            along_x = (float)w.beside[TERRIMP_SIDE_X0] * coarse[TERRIMP_SIDE_X0] +
-                      (float)w.beside[TERRIMP_SIDE_X1] * coarse[TERRIMP_SIDE_X1];
-            *heights = vertices->height + factor * (vertices->move + vertices->beside[0] * along_z +
-                                                    vertices->beside[1] * along_x);
-        }
+    for (k = 0; k < count; k++, vertices++, heights += stride) {
+        const float *coarse = draw->side_coarse;
+        terrimp_geomip_weights w;
+        float factor, along_z, along_x;
+        terrimpi_mip_weights_of(chunk_quads, form, k, &w);
+        factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
+                 terrimpi_mip_dot4(w.even, coarse);
+        along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
+                  (float)w.beside[TERRIMP_SIDE_Z1] * coarse[TERRIMP_SIDE_Z1];
+        along_x = (float)w.beside[TERRIMP_SIDE_X0] * coarse[TERRIMP_SIDE_X0] +
+                  (float)w.beside[TERRIMP_SIDE_X1] * coarse[TERRIMP_SIDE_X1];
+        *heights = vertices->height + factor * (vertices->move + vertices->beside[0] * along_z +
+                                                vertices->beside[1] * along_x);
+    }
     return TERRIMP_OK;
 }
 
@@ -8714,7 +9095,9 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
         terrimpi_world_height(f, scan.high) > terrain->sample_high)
         return TERRIMP_E_RANGE;
     for (level = 0; level < terrain->tree.level_count; level++) {
-        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, 0);
+        /* errors are also against what a finer neighbour draws next to the border */
+        terrimpi_touched in =
+            terrimpi_touched_nodes(terrain, samples, level, level > 0 ? 1u << (level - 1u) : 0u);
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++) {
                 uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
@@ -8922,7 +9305,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_weights(const terrimp_terrain *t
     terrimp_result result = terrimpi_check_fill(terrain, 0, weights, capacity, 1);
     if (result != TERRIMP_OK)
         return result;
-    return terrimp_geomip_fill_weights(terrain->desc.chunk_quads, weights);
+    return terrimp_geomip_fill_weights(terrain->desc.chunk_quads, TERRIMP_FORM_LIST, weights);
 }
 
 /* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
@@ -10658,13 +11041,18 @@ static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *wan
         memcpy(eye, v->camera.eye, sizeof v->camera.eye);
 }
 
-/* Size of the slot that a capture needs. Returns 0 when no frustum fits. */
-static int terrimpi_slot_size(const terrimp_view *v, const terrimp_box *box, const float eye[3],
-                              terrimp_capture *capture, uint32_t size[2])
+/* The frustum around a node's mesh, and the size of the slot that it needs. Returns 0 when none
+   fits. */
+static int terrimpi_slot_size(terrimp_view *v, const terrimpi_site *s, const terrimp_box *box,
+                              const float eye[3], terrimp_capture *capture, uint32_t size[2])
 {
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
+    terrimp_mesh_info mesh;
+    terrimpi_mesh_place(v->terrain, s->node, &mesh);
+    terrimpi_fill_mesh(v->terrain, s->node, v->mesh_xyz, v->mesh_indices);
     if (terrimp_capture_fit(box, eye, capture) != TERRIMP_OK ||
+        terrimp_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count) != TERRIMP_OK ||
         terrimp_impostor_size(capture, v->pixel_factor, v->desc.texels_per_px,
                               TERRIMPI_SMALLEST_PICTURE, largest, size, NULL) != TERRIMP_OK)
         return 0;
@@ -10710,7 +11098,8 @@ static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_j
 }
 
 /* Whether the picture of a node is better made in two parts, and where: when smears of what hides
-   behind its ridges would show before it is renewed, and a split spares most of them. */
+   behind its ridges would show before it is renewed, and a split spares most of them. The node's
+   mesh is in mesh_xyz. */
 static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
                              const terrimp_capture *capture, float *distance)
 {
@@ -10719,7 +11108,6 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
     terrimp_split split;
     if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || v->desc.max_capture_triangles)
         return 0;
-    terrimpi_fill_mesh(v->terrain, want->site.node, v->mesh_xyz, v->mesh_indices);
     terrimp_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
                           3u * mesh->triangle_count, &split);
     sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
@@ -10742,7 +11130,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
     job->site = want->site;
     terrimpi_site_box(v, &want->site, &box);
     terrimpi_capture_eye(v, want, &box, eye);
-    if (!terrimpi_slot_size(v, &box, eye, front, size))
+    if (!terrimpi_slot_size(v, &want->site, &box, eye, front, size))
         return 0;
     job->record = v->record_of[want->site.node];
     if (job->record == TERRIMPI_NO_RECORD)

@@ -31,6 +31,7 @@ typedef struct contender {
     terrimp_stats now;          /* of the newest frame */
     stats start_ms;             /* of the start of the flight, when its pictures are new */
     stats ms, cpu_ms;           /* of all frames after it, like all that follows */
+    stats shared_ms;            /* of those frames that every way has drawn */
     double frames, triangles, draws, captures, captured_texels, waiting; /* sums */
     stats psnr, psnr_terrain, ssim;       /* against the full mesh [dB, dB, 1] */
     stats fine_psnr, fine_ssim;           /* over terrain, against the full mesh supersampled */
@@ -143,7 +144,7 @@ static void contender_read(contender *c, const context *frame_buffer, size_t fra
 
 static void contender_close(contender *c)
 {
-    stats *lists[11];
+    stats *lists[12];
     int i;
     lists[0] = &c->ms;
     lists[1] = &c->cpu_ms;
@@ -156,7 +157,8 @@ static void contender_close(contender *c)
     lists[8] = &c->pop_pixel;
     lists[9] = &c->pop_block;
     lists[10] = &c->start_ms;
-    for (i = 0; i < 11; i++)
+    lists[11] = &c->shared_ms;
+    for (i = 0; i < 12; i++)
         stats_free(lists[i]);
     terrimp_view_destroy(c->view);
     if (c->gl == &c->own_gl)

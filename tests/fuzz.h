@@ -3,7 +3,7 @@
    tests/fuzz_dem.c, name it tests/fuzz_NAME.c, and let tests/corpus/make.sh make seeds for it.
 
    Build as a program: cc -std=c99 -g -fsanitize=address,undefined -I. tests/fuzz_NAME.c -lm
-   Build as a fuzzer:  clang -DFUZZER -fsanitize=fuzzer,address,undefined -I. tests/fuzz_NAME.c -lm */
+   Build as a fuzzer:  clang -DFUZZER -fsanitize=fuzzer,address,undefined -I. tests/fuzz_NAME.c */
 #ifndef FUZZ_H
 #define FUZZ_H
 
@@ -65,8 +65,8 @@ static float fuzz_from_bits(uint32_t bits)
 /* Mostly between 0 and scale, sometimes negative, extreme, or no number at all. */
 static float fuzz_float(float scale)
 {
-    static const float ends[] = { 0.0f, 1.0f, -1.0f, FLT_MAX, -FLT_MAX, FLT_MIN, FLT_EPSILON, 1e-20f,
-                                  1e20f };
+    static const float ends[] = { 0.0f, 1.0f, -1.0f, FLT_MAX, -FLT_MAX, FLT_MIN, FLT_EPSILON,
+                                  1e-20f, 1e20f };
     uint32_t kind = fuzz_u8();
     if (kind < 9)
         return ends[kind];

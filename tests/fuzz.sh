@@ -11,7 +11,7 @@ seconds=${1:-0}
 names=${*:-$(ls tests/fuzz_*.c | sed 's/.*fuzz_//; s/[.]c$//')}
 work=build/fuzz
 mkdir -p $work
-flags="-std=c99 -g -O1 -Wall -Wextra -Wno-unused-function -I."
+flags="-std=c99 -g -O2 -Wall -Wextra -Wno-unused-function -I."
 sanitize="-fsanitize=address,undefined -fno-sanitize-recover=all"
 CC=${CC:-cc}
 
@@ -48,7 +48,10 @@ fuzz() # name
 
 for name in $names; do
     if [ "$seconds" -eq 0 ]; then
-        sanitizers_work || { sanitize=; echo "($CC has no sanitizers: the files are replayed bare)"; }
+        sanitizers_work || {
+            sanitize=
+            echo "($CC has no sanitizers: the files are replayed bare)"
+        }
         check "fuzz_$name: the corpus breaks no promise" replays "$name"
     elif echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' > $work/probe.c &&
             clang -fsanitize=fuzzer $work/probe.c -o $work/probe > /dev/null 2>&1; then

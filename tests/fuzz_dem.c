@@ -1,5 +1,5 @@
-/* Fuzzes the elevation files of the examples: .hgt, PGM and raw. The first bytes choose the name, the
-   format and the crop, all others are the file. See tests/fuzz.h. */
+/* Fuzzes the elevation files of the examples: .hgt, PGM and raw. The first bytes choose the name,
+   the format and the crop, all others are the file. See tests/fuzz.h. */
 #include "fuzz.h"
 
 #define TERRIMP_IMPLEMENTATION

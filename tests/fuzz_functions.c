@@ -109,8 +109,9 @@ static void query_field(void)
         FUZZ_CHECK(fuzz_finite(&height, 1));
     if (terrimp_heightfield_height(&field, x, z, &height) == TERRIMP_OK) {
         FUZZ_CHECK(fuzz_finite(&height, 1));
-        if (sound == TERRIMP_OK && terrimp_heightfield_bounds(&field, 0, 0, field.width, field.depth,
-                                                              &low, &high) == TERRIMP_OK) {
+        if (sound == TERRIMP_OK
+            && terrimp_heightfield_bounds(&field, 0, 0, field.width, field.depth, &low, &high)
+                   == TERRIMP_OK) {
             float slack = 1e-5f * (high - low + (high < 0 ? -high : high) + (low < 0 ? -low : low));
             FUZZ_CHECK(height >= low - slack && height <= high + slack);
         }
@@ -133,8 +134,8 @@ static void read_field(void)
 
 static void fill_field(void)
 {
-    size_t bytes = terrimp_heightfield_fill_voids_scratch_bytes(field.width, field.depth), count = 0;
-    size_t given = fuzz_u8() & 15u ? bytes : bytes / 2u;
+    size_t bytes = terrimp_heightfield_fill_voids_scratch_bytes(field.width, field.depth);
+    size_t count = 0, given = fuzz_u8() & 15u ? bytes : bytes / 2u;
     void *scratch = fuzz_take(given);
     uint32_t width = fuzz_size(40), depth = fuzz_size(40);
     FUZZ_CHECK(bytes > 0);
@@ -240,7 +241,7 @@ static void use_patterns(void)
     terrimp_pattern found;
     (void)terrimp_pattern_find(quads, form, fuzz_size(16), &found);
     count = terrimp_pattern_index_count(quads, form);
-    if (count > 0 && quads <= 32) {
+    if (count > 0 && quads <= 16) {
         uint16_t *indices = (uint16_t *)fuzz_take(count * sizeof *indices);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count - 1u) == TERRIMP_E_CAPACITY);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count) == TERRIMP_OK);
@@ -310,14 +311,15 @@ static void use_geomip(void)
     free(tree.nodes);
     weights = (terrimp_geomip_weights *)fuzz_take((size_t)(tree.chunk_quads + 1u)
                                                   * (tree.chunk_quads + 1u) * sizeof *weights);
-    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, weights) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, TERRIMP_FORM_LIST, weights) == TERRIMP_OK);
     free(weights);
 }
 
 /* ---- simplifier ---- */
 
 /* The samples of one border of a tile, in their order. */
-static uint32_t border_samples(const float *tile, uint32_t cols, uint32_t rows, int side, float *out)
+static uint32_t border_samples(const float *tile, uint32_t cols, uint32_t rows, int side,
+                               float *out)
 {
     uint32_t count = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1 ? cols : rows, i;
     for (i = 0; i < count; i++)
@@ -507,7 +509,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     memset(&camera, 0, sizeof camera);
     memset(&box, 0, sizeof box);
     change_field();
-    for (steps = 0; steps < 40 && fuzz_left > 0; steps++)
+    for (steps = 0; steps < 16 && fuzz_left > 0; steps++)
         calls[fuzz_below(sizeof calls / sizeof *calls)]();
     free(samples);
     samples = NULL;

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Where the library compiles and runs, a line a check that says PASS, FAIL or SKIP: all compilers and
-# standards, other machines under an emulator, machines without an operating system. What is not
+# Where the library compiles and runs, a line a check that says PASS, FAIL or SKIP: all compilers
+# and standards, other machines under an emulator, machines without an operating system. What is not
 # installed is skipped; `make deps-portable` installs it, on Debian.
 # Arguments: which parts [all]: compilers, bare, or a machine's name as below; CHECK_FLAGS, more
 # options for the unit tests on other machines, such as -DCHECK_SEED=7.

@@ -1,5 +1,5 @@
 /* Draws terrain through OpenGL without a window and judges the pictures: no holes, close to the
-   full mesh, the same every time, nothing outside of its slot.
+   full mesh, steady from frame to frame, the same every time, nothing outside of its slot.
    Build:  make GL=osmesa render  or  make GL=egl render
    Real tiles are looked for in ../shared/data, or in the directory TERRIMP_DATA. A picture that
    breaks a law is kept in build/test/. */
@@ -201,12 +201,65 @@ static terrimp_view *open_view(const scene *s, const terrimp_view_desc *desc)
     return view;
 }
 
-static terrimp_view *open_full_view(const scene *s)
+static terrimp_view_desc settings_of(int mode)
 {
     terrimp_view_desc settings;
     memset(&settings, 0, sizeof settings);
-    settings.mode = TERRIMP_MODE_FULL;
+    settings.mode = mode;
+    return settings;
+}
+
+static terrimp_view *open_full_view(const scene *s)
+{
+    terrimp_view_desc settings = settings_of(TERRIMP_MODE_FULL);
     return open_view(s, &settings);
+}
+
+/* The ways to draw that are held against the full mesh. Eager: all pictures are made at once; and
+   AUTO makes more of them, since they are cheap. */
+typedef struct manner {
+    const char *name;
+    terrimp_view_desc settings;
+    int has_impostors;
+} manner;
+
+enum { MANNERS = 5 };
+
+static void list_manners(manner manners[MANNERS])
+{
+    int i;
+    memset(manners, 0, MANNERS * sizeof *manners);
+    manners[0].name = "impostor";
+    manners[0].settings = settings_of(TERRIMP_MODE_IMPOSTOR);
+    manners[1].name = "impostor_eager";
+    manners[1].settings = settings_of(TERRIMP_MODE_IMPOSTOR);
+    manners[2].name = "auto";
+    manners[2].settings = settings_of(TERRIMP_MODE_AUTO);
+    manners[3].name = "auto_eager";
+    manners[3].settings = settings_of(TERRIMP_MODE_AUTO);
+    manners[3].settings.costs.capture = 1.0f;
+    manners[3].settings.costs.triangle = 10.0f;
+    manners[3].settings.ground_tolerance_px = 0.25f;
+    manners[4].name = "geomip";
+    manners[4].settings = settings_of(TERRIMP_MODE_GEOMIP);
+    for (i = 1; i < 4; i += 2) {
+        manners[i].settings.no_spreading = 1;
+        manners[i].settings.max_captures = 1024;
+    }
+    for (i = 0; i < 4; i++)
+        manners[i].has_impostors = 1;
+}
+
+static manner manner_named(const char *name)
+{
+    manner manners[MANNERS];
+    int i;
+    list_manners(manners);
+    for (i = 0; i < MANNERS; i++)
+        if (strcmp(manners[i].name, name) == 0)
+            return manners[i];
+    need(name);
+    return manners[0];
 }
 
 static uint8_t *open_picture(const scene *s)
@@ -235,10 +288,9 @@ static terrimp_camera camera_at(const scene *s, const flight_pose *pose)
 }
 
 /* Its clip distances become those that an update asks for, like a host's would be. */
-static terrimp_camera tighten(const scene *s, terrimp_camera camera, const terrimp_stats *stats)
+static terrimp_camera tighten(terrimp_camera camera, const terrimp_stats *stats)
 {
-    float up = tanf(0.5f * s->fov), right = up * (float)s->width / (float)s->height;
-    camera.z_near = fmaxf(camera.z_near, stats->z_near / sqrtf(1.0f + up * up + right * right));
+    camera.z_near = fmaxf(camera.z_near, stats->z_near);
     if (stats->z_far > camera.z_near)
         camera.z_far = stats->z_far * 1.01f;
     return camera;
@@ -251,7 +303,7 @@ static terrimp_camera aim(const scene *s, terrimp_view *view, const flight_pose 
     terrimp_camera camera = camera_at(s, pose);
     need_ok(terrimp_view_update(view, &camera));
     need_ok(terrimp_view_get_stats(view, stats));
-    return tighten(s, camera, stats);
+    return tighten(camera, stats);
 }
 
 /* Stands between a view and its callbacks: notes what passes, and may hold captures back. */
@@ -493,76 +545,96 @@ static void check_full_covers(scene *s, float reach)
     terrimp_view_destroy(view);
 }
 
-/* The same with impostors. Halfway all pictures are thrown away: they are made anew then. */
-static void check_impostors_cover(scene *s, float reach, const char *what,
-                                  const terrimp_view_desc *settings)
+/* The same in other ways. Halfway all pictures are thrown away: they are made anew then. `sums`
+   receives what waited and the pictures that were made. */
+static void check_covers(scene *s, float reach, const char *what, const terrimp_view_desc *settings,
+                         terrimp_stats *sums)
 {
     terrimp_view *view = open_view(s, settings);
     uint8_t *a = open_picture(s), *b = open_picture(s);
     flight_pose poses[WILD_FRAMES];
-    uint32_t captures = 0, waiting = 0;
     size_t i, holes, all = 0, seams = 0;
     terrimp_stats stats;
+    memset(sums, 0, sizeof *sums);
     wild_flight(s, reach, poses);
     for (i = 0; i < WILD_FRAMES; i++) {
         if (i == 4)
             terrimp_view_invalidate(view);
-        holes = see_through(s, view, &poses[i], a, b, &stats, settings ? NULL : &seams);
+        holes = see_through(s, view, &poses[i], a, b, &stats, i % 3 ? NULL : &seams);
         if (holes && !all)
-            keep_picture(s, "holes", i, a);
+            keep_picture(s, what, i, a);
         all += holes;
-        captures += stats.captures;
-        waiting += stats.waiting;
+        sums->captures += stats.captures;
+        sums->impostors += stats.impostors;
+        sums->ground += stats.ground;
+        sums->waiting += stats.waiting;
+        sums->splits += stats.splits;
     }
-    printf("  %s, %s: %u pictures made, %u waited for, %u pixels are holes\n", s->name, what,
-           (unsigned)captures, (unsigned)waiting, (unsigned)all);
-    if (!settings)
-        printf("  %s: without the floor %u would be\n", s->name, (unsigned)seams);
+    printf("  %s, %s: %u ground, %u impostors, %u waited for, %u captures, %u split; holes: %u, "
+           "without the floor %u in every third\n", s->name, what, (unsigned)sums->ground,
+           (unsigned)sums->impostors, (unsigned)sums->waiting, (unsigned)sums->captures,
+           (unsigned)sums->splits, (unsigned)all, (unsigned)seams);
     CHECK(all == 0);
-    CHECK(captures > 0);
     free(a);
     free(b);
     terrimp_view_destroy(view);
 }
 
-static terrimp_view_desc fade_between(float start, float end)
+/* From manner `first` on every `step`-th one. */
+static void check_manners_cover(scene *s, float reach, int first, int step)
 {
-    terrimp_view_desc settings;
-    memset(&settings, 0, sizeof settings);
-    settings.fade_start = start;
-    settings.fade_end = end;
-    return settings;
+    manner manners[MANNERS];
+    int i;
+    list_manners(manners);
+    for (i = first; i < MANNERS; i += step) {
+        terrimp_stats sums;
+        check_covers(s, reach, manners[i].name, &manners[i].settings, &sums);
+        if (strstr(manners[i].name, "eager"))
+            CHECK(sums.impostors > 0 && sums.captures > 0);
+    }
 }
 
 static void no_hole_in_hills(void)
 {
-    terrimp_view_desc waits, wide = fade_between(50.0f, 250.0f);
+    terrimp_view_desc waits = settings_of(TERRIMP_MODE_IMPOSTOR), wide = waits, pieces;
+    terrimp_stats sums;
     scene s;
     open_hills(&s, 480, 384, 40.0f);
-    memset(&waits, 0, sizeof waits);
     waits.max_captures = 5;
+    wide.fade_start = 50.0f;
+    wide.fade_end = 250.0f;
+    pieces = manner_named("auto_eager").settings;
+    pieces.max_capture_triangles = 6000;
     check_full_covers(&s, 100.0f);
-    check_impostors_cover(&s, 100.0f, "default settings", NULL);
-    check_impostors_cover(&s, 100.0f, "5 pictures a frame", &waits);
-    check_impostors_cover(&s, 100.0f, "wide fade band", &wide);
+    check_manners_cover(&s, 100.0f, 0, 1);
+    check_covers(&s, 100.0f, "five_captures_a_frame", &waits, &sums);
+    CHECK(sums.waiting > 0);
+    check_covers(&s, 100.0f, "wide_fade_band", &wide, &sums);
+    check_covers(&s, 100.0f, "in_pieces", &pieces, &sums);
+    CHECK(sums.captures > 0);
     scene_close(&s);
 }
 
 static void no_hole_in_rough_terrain(void)
 {
-    terrimp_view_desc stale = fade_between(0.5f, 1.0f), small;
+    terrimp_view_desc stale = manner_named("auto_eager").settings, small;
+    terrimp_stats sums;
     scene s;
     open_rough(&s, 480, 384, 40.0f);
+    stale.fade_start = 0.5f;
+    stale.fade_end = 1.0f;
     stale.max_angle_rad = 0.3f;
     stale.tolerance_px = 10.0f;
-    memset(&small, 0, sizeof small);
+    small = manner_named("impostor_eager").settings;
     small.max_impostors = 100;
     check_full_covers(&s, 45.0f);
-    check_impostors_cover(&s, 45.0f, "default settings", NULL);
-    check_impostors_cover(&s, 45.0f, "stale pictures", &stale);
+    check_manners_cover(&s, 45.0f, 1, 2);
+    check_covers(&s, 45.0f, "stale_pictures", &stale, &sums);
+    stale.mode = TERRIMP_MODE_IMPOSTOR;
+    check_covers(&s, 45.0f, "stale_pictures_of_chunks", &stale, &sums);
     gl_terrain_close(&s.gl);
     scene_fill(&s, 256);
-    check_impostors_cover(&s, 45.0f, "small atlas", &small);
+    check_covers(&s, 45.0f, "small_atlas", &small, &sums);
     scene_close(&s);
 }
 
@@ -576,7 +648,7 @@ static void no_hole_in_a_real_tile(void)
     }
     scene_show(&s, 480, 384, 40.0f, ATLAS);
     check_full_covers(&s, 8000.0f);
-    check_impostors_cover(&s, 8000.0f, "default settings", NULL);
+    check_manners_cover(&s, 8000.0f, 0, 2);
     scene_close(&s);
 }
 
@@ -596,9 +668,9 @@ static void round_flight(const scene *s, flight_pose poses[ROUND_FRAMES])
 }
 
 /* Where one picture shows sky, so does the other nearby. */
-static void check_silhouettes(scene *s)
+static void check_silhouettes(scene *s, const manner *m)
 {
-    terrimp_view *view = open_view(s, NULL), *full = open_full_view(s);
+    terrimp_view *view = open_view(s, &m->settings), *full = open_full_view(s);
     uint8_t *a = open_picture(s), *b = open_picture(s);
     flight_pose poses[ROUND_FRAMES];
     size_t i, cut = 0, added = 0, sky = 0;
@@ -610,15 +682,15 @@ static void check_silhouettes(scene *s)
         cut_here = stray_sky(s, a, b, STRAY);
         added_here = stray_sky(s, b, a, STRAY);
         if (cut_here + added_here) {
-            keep_picture(s, "silhouette", i, a);
-            keep_picture(s, "silhouette_full", i, b);
+            keep_picture(s, m->name, i, a);
+            keep_picture(s, "full", i, b);
         }
         cut += cut_here;
         added += added_here;
         sky += count_colour(b, magenta, s->pixels);
     }
-    printf("  %s: sky more than %d px from where it should be: %u pixels, terrain: %u, of %u of "
-           "sky\n", s->name, STRAY, (unsigned)cut, (unsigned)added, (unsigned)sky);
+    printf("  %s, %s: sky more than %d px from where it should be: %u pixels, terrain: %u, of %u "
+           "of sky\n", s->name, m->name, STRAY, (unsigned)cut, (unsigned)added, (unsigned)sky);
     CHECK(sky > 1000);
     CHECK(cut == 0);
     CHECK(added == 0);
@@ -630,21 +702,32 @@ static void check_silhouettes(scene *s)
 
 static void silhouettes_stand_where_they_should(void)
 {
+    manner manners[MANNERS];
+    int i;
     scene s;
+    list_manners(manners);
     open_hills(&s, 640, 512, 60.0f);
-    check_silhouettes(&s);
+    for (i = 1; i < MANNERS; i++)
+        check_silhouettes(&s, &manners[i]);
     scene_close(&s);
     open_rough(&s, 640, 512, 60.0f);
-    check_silhouettes(&s);
+    for (i = 1; i < MANNERS; i += 2)
+        check_silhouettes(&s, &manners[i]);
     scene_close(&s);
 }
 
 /* ---- Likeness ----------------------------------------------------------- */
 
-/* What pictures must reach at least, [dB] of PSNR over the pixels of terrain. */
+/* What pictures must reach at least, [dB] of PSNR over the pixels of terrain: impostors of full
+   detail; ground and impostors within the default tolerances. */
 #define FIRST_DB 38.0
+#define GROUND_DB 35.0
 #define FLIGHT_DB 36.0
 #define HILLS_DB 36.0
+#define PIECES_DB 50.0
+
+/* Largest change from one frame to the next, over that of the full mesh. */
+#define MOST_CHANGE 1.25
 
 /* Draws poses with impostors and in full; returns the least PSNR. With `fresh` every picture is
    made anew for each pose. */
@@ -691,13 +774,16 @@ static void sample_poses(const scene *s, flight_pose poses[SAMPLE_POSES])
     poses[4] = pose_at(s, 0.50f, 0.95f, 3.0f * h, -90.0f, 35.0f);
 }
 
-static double flight_likeness(scene *s, float step, size_t frames, double floor_db)
+static double flight_likeness(scene *s, const manner *m, float step, size_t frames,
+                              double floor_db)
 {
     flight f;
     double worst;
+    char what[64];
     if (!flight_circle(&f, &s->field, frames, step))
         need(f.error);
-    worst = worst_likeness(s, "flight", NULL, f.poses, f.count, 0, floor_db);
+    snprintf(what, sizeof what, "flight_%s", m->name);
+    worst = worst_likeness(s, what, &m->settings, f.poses, f.count, 0, floor_db);
     flight_free(&f);
     return worst;
 }
@@ -706,6 +792,8 @@ static void a_real_tile_looks_like_the_full_mesh(void)
 {
     static const dem_desc whole; /* all zero */
     flight_pose poses[SAMPLE_POSES];
+    manner manners[MANNERS];
+    int i;
     scene s;
     if (!open_tile(&s, "N42E001.hgt", &whole)) {
         SKIP("there is no N42E001.hgt");
@@ -713,29 +801,178 @@ static void a_real_tile_looks_like_the_full_mesh(void)
     }
     scene_show(&s, 1280, 1024, 60.0f, 4096);
     sample_poses(&s, poses);
-    CHECK(worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, FIRST_DB) >= FIRST_DB);
-    CHECK(flight_likeness(&s, 500.0f, 12, FLIGHT_DB) >= FLIGHT_DB);
+    list_manners(manners);
+    for (i = 1; i < MANNERS; i++) {
+        double floor_db = i == 1 ? FIRST_DB : GROUND_DB;
+        if (i != 2)
+            CHECK(worst_likeness(&s, manners[i].name, &manners[i].settings, poses, SAMPLE_POSES, 1,
+                                 floor_db) >= floor_db);
+    }
+    for (i = 0; i <= 2; i += 2)
+        CHECK(flight_likeness(&s, &manners[i], 500.0f, 6, FLIGHT_DB) >= FLIGHT_DB);
     scene_close(&s);
 }
 
 static void hills_look_like_the_full_mesh(void)
 {
     flight_pose poses[SAMPLE_POSES];
-    terrimp_view_desc wide, coarse;
-    double sharp, blurred;
+    manner manners[MANNERS], wide, coarse;
+    double blurred;
+    int i;
     scene s;
+    list_manners(manners);
     open_hills(&s, 640, 512, 60.0f);
     sample_poses(&s, poses);
-    sharp = worst_likeness(&s, "first", NULL, poses, SAMPLE_POSES, 1, HILLS_DB);
-    CHECK(sharp >= HILLS_DB);
-    CHECK(flight_likeness(&s, 3.0f, 12, HILLS_DB) >= HILLS_DB);
-    wide = fade_between(1.0f, 3000.0f);
-    CHECK(worst_likeness(&s, "wide_fade_band", &wide, poses, SAMPLE_POSES, 1, FLIGHT_DB)
+    for (i = 1; i < MANNERS; i++)
+        CHECK(worst_likeness(&s, manners[i].name, &manners[i].settings, poses, SAMPLE_POSES, 1,
+                             HILLS_DB) >= HILLS_DB);
+    for (i = 0; i < MANNERS; i++)
+        CHECK(flight_likeness(&s, &manners[i], 3.0f, 8, HILLS_DB) >= HILLS_DB);
+    wide = manner_named("impostor_eager");
+    wide.settings.fade_start = 1.0f;
+    wide.settings.fade_end = 3000.0f;
+    CHECK(worst_likeness(&s, "wide_fade_band", &wide.settings, poses, SAMPLE_POSES, 1, FLIGHT_DB)
           >= FLIGHT_DB);
-    memset(&coarse, 0, sizeof coarse); /* the measure measures: what is bad gets less */
-    coarse.texels_per_px = 0.1f;
-    blurred = worst_likeness(&s, "a tenth of the texels", &coarse, poses, SAMPLE_POSES, 1, 0.0);
+    coarse = manner_named("impostor_eager"); /* the measure measures: what is bad gets less */
+    coarse.settings.texels_per_px = 0.1f;
+    blurred = worst_likeness(&s, "a tenth of the texels", &coarse.settings, poses, SAMPLE_POSES, 1,
+                             0.0);
     CHECK(blurred < HILLS_DB - 5.0);
+    scene_close(&s);
+}
+
+/* ---- Pieces ------------------------------------------------------------- */
+
+/* Rests until no picture is made any more. Returns how many captures the last frames had in all. */
+static uint32_t draw_at_rest(scene *s, terrimp_view *view, const flight_pose *pose, uint8_t *rgb)
+{
+    uint32_t captures = 0;
+    int frames = 0;
+    terrimp_stats stats;
+    do {
+        stats = draw_pose(s, view, pose, light_blue, rgb);
+        captures += stats.captures;
+    } while (stats.captures > 0 && ++frames < 2000);
+    CHECK(stats.captures == 0 && stats.waiting == 0);
+    return captures;
+}
+
+/* A picture that is made in pieces, back to front, over several frames, is the same as one made at
+   once: so are the frames that show it. */
+static void pictures_in_pieces_are_like_whole_ones(void)
+{
+    static const char *const names[2] = { "impostor_eager", "auto_eager" };
+    flight_pose poses[SAMPLE_POSES];
+    uint8_t *a, *b;
+    scene s;
+    int i, p;
+    open_hills(&s, 480, 384, 60.0f);
+    a = open_picture(&s);
+    b = open_picture(&s);
+    sample_poses(&s, poses);
+    for (i = 0; i < 2; i++) {
+        terrimp_view_desc whole = manner_named(names[i]).settings, pieces;
+        uint32_t whole_count = 0, piece_count = 0;
+        size_t different = 0;
+        double worst = 99.0;
+        whole.no_splits = 1; /* what is made in pieces is not split either */
+        pieces = whole;
+        pieces.max_capture_triangles = 16000;
+        for (p = 3; p < SAMPLE_POSES; p++) {
+            terrimp_view *view = open_view(&s, &whole);
+            whole_count += draw_at_rest(&s, view, &poses[p], a);
+            terrimp_view_destroy(view);
+            view = open_view(&s, &pieces);
+            piece_count += draw_at_rest(&s, view, &poses[p], b);
+            terrimp_view_destroy(view);
+            worst = fmin(worst, psnr(&s, a, b));
+            different += count_different(a, b, s.pixels);
+        }
+        printf("  %s: %u captures, or %u pieces: PSNR %.2f dB, %u pixels differ\n", names[i],
+               (unsigned)whole_count, (unsigned)piece_count, worst, (unsigned)different);
+        CHECK(piece_count > whole_count && whole_count > 0);
+        CHECK(worst >= PIECES_DB);
+    }
+    free(a);
+    free(b);
+    scene_close(&s);
+}
+
+/* ---- From frame to frame ------------------------------------------------ */
+
+enum { GLIDE_FRAMES = 24 };
+
+/* Slowly over the land, up and down, turning a little. */
+static void glide(const scene *s, flight_pose poses[GLIDE_FRAMES])
+{
+    int i;
+    for (i = 0; i < GLIDE_FRAMES; i++) {
+        float t = (float)i / (float)GLIDE_FRAMES;
+        poses[i] = pose_at(s, 0.2f + 0.05f * t, 0.3f + 0.03f * t, 0.0f, 45.0f + 6.0f * t, 12.0f);
+        poses[i].eye[1] = s->info.box.max[1] + 0.2f * s->height_range * sinf(6.28f * t);
+        poses[i].target[0] = poses[i].eye[0] + cosf((45.0f + 6.0f * t) * DEGREE);
+        poses[i].target[1] = poses[i].eye[1] - 0.3f;
+        poses[i].target[2] = poses[i].eye[2] + sinf((45.0f + 6.0f * t) * DEGREE);
+    }
+}
+
+/* Draws a glide; change receives the root of the mean square change from each frame to the next, in
+   levels of a channel. */
+static void frame_changes(scene *s, const terrimp_view_desc *settings, int rest,
+                          double change[GLIDE_FRAMES - 1])
+{
+    flight_pose poses[GLIDE_FRAMES];
+    terrimp_view *view = open_view(s, settings);
+    uint8_t *a = open_picture(s), *b = open_picture(s), *swap;
+    int i;
+    glide(s, poses);
+    if (rest)
+        draw_at_rest(s, view, &poses[0], a);
+    else
+        draw_pose(s, view, &poses[0], light_blue, a);
+    for (i = 1; i < GLIDE_FRAMES; i++) {
+        draw_pose(s, view, &poses[i], light_blue, b);
+        change[i - 1] = sqrt(image_mean_square(a, b, s->pixels, light_blue));
+        swap = a;
+        a = b;
+        b = swap;
+    }
+    free(a);
+    free(b);
+    terrimp_view_destroy(view);
+}
+
+/* What moves by itself shows: no frame differs from the last much more than those of the full mesh
+   do, whether pictures are made little by little, or renewed. */
+static void check_steady(scene *s)
+{
+    double full[GLIDE_FRAMES - 1], change[GLIDE_FRAMES - 1], most, mean;
+    terrimp_view_desc settings = settings_of(TERRIMP_MODE_FULL);
+    manner manners[MANNERS];
+    int i, k;
+    list_manners(manners);
+    frame_changes(s, &settings, 0, full);
+    for (i = 0; i < MANNERS; i++) {
+        frame_changes(s, &manners[i].settings, i & 1, change);
+        most = mean = 0.0;
+        for (k = 0; k < GLIDE_FRAMES - 1; k++) {
+            most = fmax(most, change[k] / full[k]);
+            mean += change[k] / full[k] / (GLIDE_FRAMES - 1);
+        }
+        printf("  %s, %s: change from frame to frame %.3f of the full mesh's, at most %.3f\n",
+               s->name, manners[i].name, mean, most);
+        CHECK(most <= MOST_CHANGE);
+    }
+}
+
+static void frames_change_no_more_than_those_of_the_full_mesh(void)
+{
+    scene s;
+    open_hills(&s, 480, 384, 60.0f);
+    check_steady(&s);
+    scene_close(&s);
+    open_rough(&s, 480, 384, 60.0f);
+    check_steady(&s);
     scene_close(&s);
 }
 
@@ -757,7 +994,9 @@ static terrimp_stats draw_geomip(scene *s, gl_geomip *g, const flight_pose *pose
     terrimp_camera camera = camera_at(s, pose);
     terrimp_stats stats;
     need_ok(gl_geomip_update(g, &camera, &stats));
-    camera = tighten(s, camera, &stats);
+    /* The selection measures to the closest point, wherever on the screen that is. */
+    stats.z_near *= cosf(0.5f * s->fov) * 0.7f;
+    camera = tighten(camera, &stats);
     need_ok(gl_terrain_begin(&s->gl, &camera, sky));
     need_ok(gl_geomip_draw(g));
     gl_terrain_end(&s->gl);
@@ -826,6 +1065,66 @@ static void no_hole_between_mipmapped_nodes(void)
     scene_close(&s);
 }
 
+/* Background below the topmost ground of each column: with a level camera only a hole shows it. */
+static size_t count_below_ground(const scene *s, const uint8_t *picture)
+{
+    size_t count = 0;
+    int x, y, ground;
+    for (x = 0; x < s->width; x++)
+        for (ground = 0, y = 0; y < s->height; y++) {
+            int open = same_pixel(picture + 3 * (y * s->width + x), magenta);
+            ground |= !open;
+            count += (size_t)(ground && open);
+        }
+    return count;
+}
+
+static void check_long_flight(scene *s, float morph_ratio)
+{
+    terrimp_geomip_view settings = geomip_settings(0, 2.0f, morph_ratio);
+    uint8_t *picture = open_picture(s);
+    flight way;
+    gl_geomip g;
+    size_t i, all = 0;
+    need(flight_circle(&way, &s->field, 600, 2.0f * s->field.spacing_x) ? NULL : way.error);
+    need(gl_geomip_open(&g, &s->gl, &s->field, 32, &settings));
+    for (i = 0; i < way.count; i++) {
+        size_t holes;
+        draw_geomip(s, &g, &way.poses[i], magenta, picture);
+        holes = count_below_ground(s, picture);
+        if (holes && !all)
+            keep_picture(s, "long_holes", i, picture);
+        all += holes;
+    }
+    printf("  %s, morphing %.1f: %u frames, %u pixels are holes\n", s->name, (double)morph_ratio,
+           (unsigned)way.count, (unsigned)all);
+    CHECK(all == 0);
+    gl_geomip_close(&g);
+    flight_free(&way);
+    free(picture);
+}
+
+/* TERRIMP_LONG=1: a proof of some minutes, over all real tiles. */
+static void long_flights_over_mipmapped_tiles_leave_no_hole(void)
+{
+    static const char *const files[] = { "N42E001.hgt", "N41E001.hgt", "N49E011.hgt",
+                                         "N48W125.hgt" };
+    size_t i;
+    if (!getenv("TERRIMP_LONG")) {
+        SKIP("TERRIMP_LONG is not set");
+        return;
+    }
+    for (i = 0; i < sizeof files / sizeof *files; i++) {
+        scene s;
+        if (!open_tile(&s, files[i], NULL))
+            continue;
+        scene_show(&s, 480, 384, 60.0f, ATLAS);
+        check_long_flight(&s, 1.0f);
+        check_long_flight(&s, 1.5f);
+        scene_close(&s);
+    }
+}
+
 /* What tolerance 1 must reach at least, [dB]. */
 #define PICTURE_DB 33.0
 #define BOUND_DB 40.0
@@ -877,6 +1176,7 @@ enum { REPEAT_FRAMES = 8 };
 /* Everything anew, then a flight. Notes the commands and all pictures. */
 static uint64_t fly_once(uint8_t *pictures[REPEAT_FRAMES])
 {
+    terrimp_view_desc settings = manner_named("auto_eager").settings;
     flight_pose poses[WILD_FRAMES];
     terrimp_camera camera;
     terrimp_stats stats;
@@ -885,7 +1185,7 @@ static uint64_t fly_once(uint8_t *pictures[REPEAT_FRAMES])
     tap t;
     int i;
     open_hills(&s, 320, 256, 40.0f);
-    view = open_view(&s, NULL);
+    view = open_view(&s, &settings);
     wild_flight(&s, 60.0f, poses);
     t = tap_open(&s);
     for (i = 0; i < REPEAT_FRAMES; i++) {
@@ -915,12 +1215,13 @@ static void the_same_flight_gives_the_same_commands_and_pixels(void)
 static void both_systems_draw_the_same_picture(void)
 {
     static const char path[] = "build/test/render_osmesa.png";
+    terrimp_view_desc settings = manner_named("impostor_eager").settings;
     flight_pose poses[SAMPLE_POSES];
     terrimp_view *view;
     uint8_t *picture;
     scene s;
     open_hills(&s, 640, 512, 60.0f);
-    view = open_view(&s, NULL);
+    view = open_view(&s, &settings);
     picture = open_picture(&s);
     sample_poses(&s, poses);
     draw_pose(&s, view, &poses[3], light_blue, picture);
@@ -997,11 +1298,12 @@ static void captures_keep_to_their_slots(void)
     flight_pose poses[WILD_FRAMES];
     uint8_t *picture;
     terrimp_view *view;
-    uint32_t frame, atlas;
+    uint32_t frame;
+    terrimp_view_desc settings = manner_named("impostor_eager").settings;
     scene s;
     open_hills(&s, 640, 512, 40.0f);
     picture = open_picture(&s);
-    view = open_view(&s, NULL);
+    view = open_view(&s, &settings);
     wild_flight(&s, 60.0f, poses);
     for (frame = 0; frame < WILD_FRAMES; frame += 4) {
         tap t = tap_open(&s);
@@ -1010,14 +1312,11 @@ static void captures_keep_to_their_slots(void)
         t.captures = (terrimp_capture_command *)allocate(sizeof *t.captures
                                                          * (stats.captures + 1));
         paint_atlas(&s, 0);
-        paint_atlas(&s, 1);
         draw(&s, view, &camera, &t, light_blue, picture);
         CHECK(t.capture_count == stats.captures && stats.captures > 0);
-        for (atlas = 0; atlas < 2; atlas++) {
-            count_slots(&s, &t, atlas, covered);
-            read_atlas(&s, (int)atlas, rgba);
-            CHECK(count_strays(rgba, covered, texels) == 0);
-        }
+        count_slots(&s, &t, 0, covered);
+        read_atlas(&s, 0, rgba);
+        CHECK(count_strays(rgba, covered, texels) == 0);
         free(t.captures);
     }
     free(rgba);
@@ -1040,11 +1339,12 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
     terrimp_view *view;
     scene s;
     tap t;
-    uint32_t atlas, p;
+    uint32_t p;
+    terrimp_view_desc settings = manner_named("auto_eager").settings;
     open_hills(&s, 640, 512, 60.0f);
     a = open_picture(&s);
     b = open_picture(&s);
-    view = open_view(&s, NULL);
+    view = open_view(&s, &settings);
     sample_poses(&s, poses);
     for (p = 0; p < SAMPLE_POSES; p++) {
         size_t different;
@@ -1054,14 +1354,12 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
         t.captures = (terrimp_capture_command *)allocate(sizeof *t.captures
                                                          * (stats.captures + 1));
         draw(&s, view, &camera, &t, light_blue, a);
-        for (atlas = 0; atlas < 2; atlas++) {
-            count_slots(&s, &t, atlas, covered);
-            read_atlas(&s, (int)atlas, rgba);
-            for (i = 0; i < texels; i++)
-                if (!covered[i])
-                    memcpy(rgba + i * 4, "\xff\x00\xff\xff", 4);
-            glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, ATLAS, ATLAS, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
-        }
+        count_slots(&s, &t, 0, covered);
+        read_atlas(&s, 0, rgba);
+        for (i = 0; i < texels; i++)
+            if (!covered[i])
+                memcpy(rgba + i * 4, "\xff\x00\xff\xff", 4);
+        glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, ATLAS, ATLAS, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
         t.hold_captures = 1;
         t.capture_count = 0;
         draw(&s, view, &camera, &t, light_blue, b);
@@ -1089,7 +1387,10 @@ int main(void)
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);
+    RUN(pictures_in_pieces_are_like_whole_ones);
+    RUN(frames_change_no_more_than_those_of_the_full_mesh);
     RUN(no_hole_between_mipmapped_nodes);
+    RUN(long_flights_over_mipmapped_tiles_leave_no_hole);
     RUN(mipmapped_terrain_looks_like_the_full_mesh);
     RUN(the_same_flight_gives_the_same_commands_and_pixels);
     RUN(both_systems_draw_the_same_picture);

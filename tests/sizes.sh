@@ -19,8 +19,9 @@ fi
 row() # name, what, object
 {
     "$size" -B "$3" | awk -v name="$1" -v what="$2" -v aim=$aim 'NR == 2 {
+        judged = what ~ /run time/ && name == "cortex-m4"
         printf "%-11s %-48s %7d bytes of code and tables, %d of data%s\n", name, what, $1, $2 + $3,
-               what !~ /run time/ || name != "cortex-m4" ? "" : $1 <= aim ? "  (within the aim)" : "  (over the aim)" }'
+               judged ? ($1 <= aim ? "  (within the aim)" : "  (over the aim)") : "" }'
 }
 
 machine() # name, prefix, flags

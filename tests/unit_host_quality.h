@@ -3,6 +3,7 @@
 #ifndef UNIT_HOST_QUALITY_H
 #define UNIT_HOST_QUALITY_H
 
+#include "bench_plot.h"
 #include "check.h"
 #include "examples/host/quality.h"
 #include "examples/host/stats.h"
@@ -336,8 +337,57 @@ static void the_cost_of_a_quality_is_that_of_the_ways_that_have_it(void)
     CHECK(!stats_cost_at(ways, 0, 1.0, &cost));
 }
 
+/* ---- Plots -------------------------------------------------------------- */
+
+static int count_text(const char *path, const char *text)
+{
+    char line[4096];
+    FILE *file = fopen(path, "r");
+    int count = 0;
+    while (file && fgets(line, sizeof line, file)) {
+        const char *at = line;
+        while ((at = strstr(at, text)) != NULL) {
+            at += strlen(text);
+            count++;
+        }
+    }
+    if (file)
+        fclose(file);
+    return count;
+}
+
+static void a_plot_holds_every_point_in_its_frame(void)
+{
+    static plot p;
+    int round;
+    for (round = 0; round < 20; round++) {
+        int count = (int)random_range(1, 40), i;
+        plot_axis x, y;
+        memset(&p, 0, sizeof p);
+        p.title = p.x_label = p.y_label = "";
+        p.log_x = round % 2;
+        p.log_y = round / 2 % 2;
+        for (i = 0; i < count; i++)
+            plot_add(&p, i % 3 ? "one" : "other", (double)random_float(0.01f, 20.0f),
+                     (double)random_float(1.0f, 1.5f));
+        x = plot_fit(&p, 0);
+        y = plot_fit(&p, 1);
+        for (i = 0; i < (int)p.series[0].count; i++) {
+            double at_x = plot_place(&x, p.series[0].x[i]), at_y = plot_place(&y, p.series[0].y[i]);
+            CHECK(at_x > PLOT_LEFT && at_x < PLOT_LEFT + PLOT_WIDTH);
+            CHECK(at_y > PLOT_TOP && at_y < PLOT_TOP + PLOT_HEIGHT);
+        }
+        CHECK(plot_place(&x, 2.0) < plot_place(&x, 3.0)); /* more is right, and up */
+        CHECK(plot_place(&y, 2.0) > plot_place(&y, 3.0));
+        CHECK(plot_write(&p, "unit_host.svg"));
+        CHECK(count_text("unit_host.svg", "<circle") == count + (int)p.count); /* and the legend */
+        remove("unit_host.svg");
+    }
+}
+
 static void run_quality_tests(void)
 {
+    RUN(a_plot_holds_every_point_in_its_frame);
     RUN(similarity_agrees_with_its_definition);
     RUN(similarity_is_one_for_equals_and_falls_with_noise);
     RUN(change_agrees_with_brute_force);

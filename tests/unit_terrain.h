@@ -655,8 +655,8 @@ static void proud_meshes_stand_above_the_terrain(void)
     }
 }
 
-/* The corners of every node are its samples but for the step of heights that they are rounded to, up
-   where meshes stand proud: so four nodes of a level agree on them. */
+/* The corners of every node are its samples but for the step of heights that they are rounded to,
+   up where meshes stand proud: so four nodes of a level agree on them. */
 static void corners_stand_on_their_samples(void)
 {
     int proud;

@@ -1053,7 +1053,7 @@ static terrimp_view_desc random_settings(int mode)
     d.costs.draw = maybe(1.0f, 1000.0f);
     d.costs.triangle = maybe(0.5f, 20.0f);
     if (mode == TERRIMP_MODE_GEOMIP || mode == TERRIMP_MODE_AUTO)
-        d.max_ground = random_range(0, 2) ? 0 : random_range(20, 100);
+        d.max_ground = random_range(0, 2) ? 0 : random_range(200, 300);
     return d;
 }
 

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Makes the seeds of the fuzzers anew: tests/corpus/NAME/seed-* for tests/fuzz_NAME.c. Files in there
-# of other names are inputs that fuzzers found; they stay. The same seeds come out on every machine.
+# Makes the seeds of the fuzzers anew: tests/corpus/NAME/seed-* for tests/fuzz_NAME.c. Files in
+# there of other names are inputs that fuzzers found; they stay. The same seeds come out on every
+# machine.
 
 cd "$(dirname "$0")" || exit 1
 rm -f ./*/seed-*
@@ -54,4 +55,5 @@ seed dem pgm-cut "${pgm}P5 4"
 for format in 1 2 3 4; do
     seed dem raw-$format "\004\00$format\017\017\000$(noise $format 900)"
 done
-seed dem raw-nan "\004\004\014\014\000\000\000\300\177\000\000\300\177\000\000\200\077\000\000\000\000"
+nan='\000\000\300\177'
+seed dem raw-nan "\004\004\014\014\000$nan$nan\000\000\200\077\000\000\000\000"
