@@ -93,10 +93,12 @@
    MEMORY
        The caller owns it. terrimp_terrain_bytes and terrimp_view_bytes say how much; init lays
        everything out in one block and nothing is allocated afterwards. create does the same over
-       malloc or an allocator of yours. With default settings a terrain takes about
-       1250 bytes a chunk of 64 x 64 quads (0.3 bytes a sample), a view 185 bytes for each picture
-       it may keep and 14 a chunk. Samples are used where they lie. Outside of it, a host that
-       keeps every chunk's full detail as floats needs 12 bytes a sample.
+       malloc or an allocator of yours. With default settings a terrain takes 516 bytes a node, of
+       which there are 4/3 for each chunk of 64 x 64 quads (0.17 bytes a sample); building it 200
+       KiB and 4 bytes a column. A view takes 185 bytes for each picture it may keep and 14 a
+       chunk. Samples are used where they lie, and a bake is: that takes 1 KiB of memory. Outside
+       of it, a host that keeps every chunk's full detail as floats needs 12 bytes a sample, and
+       for coarse meshes 103 vertices and 543 indices a node.
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
@@ -105,8 +107,8 @@
        header's own mistakes. terrimp_result_text says what to do.
 
    THREADS AND DETERMINISM
-       No globals, no statics that change. Chunks may be built by several threads at once, each
-       with its own scratch; a built terrain may be read by any number of views on any threads;
+       No globals, no statics that change. Nodes may be built by several threads at once, each
+       with its own scratch, to the same bytes; a built terrain may be read by any number of views on any threads;
        one view belongs to one thread at a time. The same input gives the same commands, bit for
        bit, on one compiler with the same floating-point options.
 
@@ -128,6 +130,8 @@
          TERRIMP_SQRTF and SINF, COSF, TANF, ASINF, ACOSF   all six, instead of math.h
          TERRIMP_MALLOC(bytes), TERRIMP_FREE(pointer)       instead of stdlib.h
          TERRIMP_NO_MALLOC     no create and destroy, no stdlib.h (also before the API)
+         TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
+                               before the API). Then there is no 64-bit division either
 
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
@@ -907,7 +911,7 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
 
 /* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
    surface but for rounding, except beside vertices that may not be raised: a sample whose weight
-   hangs by more than 3/4 on corners (on a border) or on border vertices (inside) may stay above.
+   hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
    Border vertices follow from the samples of their border alone, so that neighbours still meet.
    Starts from every vertex raised by the largest shortfall round it and lowers them together as
    far as the samples let it.
@@ -6078,8 +6082,10 @@ TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, floa
 /* --- standing proud (Hess 6.1) --- */
 
 /* Free vertices rise by at most 1 / this of a sample's shortfall: else one sample beside a corner
-   would throw the vertex at the other end up. */
-#define TERRIMPI_LEAST_HOLD 0.25f
+   would throw the vertex at the other end up. Over 65 x 65 samples of the Pyrenees 0.25
+   leaves 0.46 % of all samples standing out, 0.5 leaves 1.2 %, 1 leaves 2.8 %, with a mean largest
+   error of 10.3, 7.2 and 5.5 % of the terrain's range; pictures in flight are best at 0.5. */
+#define TERRIMPI_LEAST_HOLD 0.5f
 
 /* Passes of lowering. Each takes away about a third of what is too high. */
 #define TERRIMPI_LOWER_PASSES 12
