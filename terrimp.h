@@ -102,8 +102,10 @@
        node: 690 for each 64 x 64 quads, 0.17 bytes a sample. A view takes about 470 bytes for each
        picture it may keep, 120 for each ground node it may draw and 23 for each node of the
        terrain. Samples are used where they lie; what is built can lie in read-only memory, as a
-       bake: then a terrain takes 600 bytes. Outside of it, a host that keeps the ground of all
-       nodes as floats needs 16 bytes a sample; one that makes it as it is drawn, much less.
+       bake: then a terrain takes 1 KiB. Building takes 200 KiB and 4 bytes a column for each
+       thread. Outside of it, a host that keeps the ground of all nodes as floats needs 16 bytes a
+       sample, much less if it makes that as it is drawn, and for coarse meshes 103 vertices and
+       543 indices a node.
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
@@ -113,9 +115,9 @@
 
    THREADS AND DETERMINISM
        No globals, no statics that change. Nodes may be built by several threads at once, each
-       with its own scratch; a built terrain may be read by any number of views on any threads;
-       one view belongs to one thread at a time. The same input gives the same commands, bit for
-       bit, on one compiler with the same floating-point options.
+       with its own scratch, to the same bytes; a built terrain may be read by any number of views
+       on any threads; one view belongs to one thread at a time. The same input gives the same
+       commands, bit for bit, on one compiler with the same floating-point options.
 
    LIMITS
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
@@ -958,7 +960,7 @@ TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uin
 
 /* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
    surface but for rounding, except beside vertices that may not be raised: a sample whose weight
-   hangs by more than 3/4 on corners (on a border) or on border vertices (inside) may stay above.
+   hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
    Border vertices follow from the samples of their border alone, so that neighbours still meet.
    Starts from every vertex raised by the largest shortfall round it and lowers them together as
    far as the samples let it.
@@ -4526,7 +4528,7 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
 
 /* Walks down to the nodes that are not split, children closest to the eye first, and leaves out
    what the frustum does not meet. Wagner's ground rectangle of the frustum, as an early out here
-   and above, was measured and left out: 0.042 against 0.045 ms a frame, less than runs differ by. */
+   and above, was measured and left out: 0.042 against 0.045 ms a frame, which is noise. */
 static void terrimpi_mip_collect(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
@@ -6663,8 +6665,10 @@ TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, floa
 /* --- standing proud (Hess 6.1) --- */
 
 /* Free vertices rise by at most 1 / this of a sample's shortfall: else one sample beside a corner
-   would throw the vertex at the other end up. */
-#define TERRIMPI_LEAST_HOLD 0.25f
+   would throw the vertex at the other end up. Over 65 x 65 samples of the Pyrenees 0.25
+   leaves 0.46 % of all samples standing out, 0.5 leaves 1.2 %, 1 leaves 2.8 %, with a mean largest
+   error of 10.3, 7.2 and 5.5 % of the terrain's range; pictures in flight are best at 0.5. */
+#define TERRIMPI_LEAST_HOLD 0.5f
 
 /* Passes of lowering. Each takes away about a third of what is too high. */
 #define TERRIMPI_LOWER_PASSES 12
