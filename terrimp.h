@@ -11013,13 +11013,6 @@ static uint32_t terrimpi_piece_triangles(const terrimp_view *v, const terrimpi_j
     return triangles;
 }
 
-/* The sine of the angle at which a capture looks down on the ground, not to be taken too small. */
-static float terrimpi_sine_of_view(const terrimp_capture *capture, const terrimp_box *box)
-{
-    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    return terrimpi_max(drop / capture->z_far, 0.1f);
-}
-
 /* The strip of neighbours that a capture needs, as a number of terrimpi_strip_quads: the texels
    that bilinear reads and the parallax can reach, in world units. At a grazing angle a texel is as
    many times longer on the ground as the sine of that angle is smaller. */
@@ -11032,7 +11025,8 @@ static uint32_t terrimpi_strip_width(const terrimp_view *v, const terrimpi_job *
     float texels = 1.5f + v->desc.tolerance_px * v->desc.texels_per_px;
     float per_texel_x = (capture->tan_right - capture->tan_left) / (float)job->rects[0].width;
     float per_texel_y = (capture->tan_up - capture->tan_down) / (float)job->rects[0].height;
-    float sine = terrimpi_sine_of_view(capture, box);
+    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
+    float sine = terrimpi_max(drop / capture->z_far, 0.1f);
     float reach = texels * capture->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
     float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << job->source);
     while (width < strips && (float)terrimpi_strip_quads(quads, width) * step < reach)
@@ -11114,20 +11108,31 @@ static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_j
     return 1;
 }
 
+/* How far a picture's terrain may lie from the mesh that wears it, along a ray. */
+static float terrimpi_depth_error(const terrimp_view *v, uint32_t node,
+                                  const terrimp_capture *capture, const terrimp_box *box)
+{
+    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
+    return 1.1f * v->terrain->meshes[node].error * capture->z_far / terrimpi_max(drop, 1e-20f);
+}
+
 /* Whether the picture of a node is better made in two parts, and where: when smears of what hides
-   behind its ridges would show before it is renewed, and a split spares most of them. The node's
-   mesh is in mesh_xyz. */
-static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want,
+   behind its ridges would show before it is renewed, and a split spares most of them. The parts
+   overlap by what the mesh may be off, which must not be all of their depth: at grazing angles it
+   is. The node's mesh is in mesh_xyz. */
+static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const terrimp_box *box,
                              const terrimp_capture *capture, float *distance)
 {
-    const terrimpi_mesh *mesh = &v->terrain->meshes[want->site.node];
+    uint32_t node = want->site.node;
+    const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine;
     terrimp_split split;
-    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || v->desc.max_capture_triangles)
+    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || v->desc.max_capture_triangles ||
+        terrimpi_depth_error(v, node, capture, box) > 0.2f * (capture->z_far - capture->z_near))
         return 0;
     terrimp_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
                           3u * mesh->triangle_count, &split);
-    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
     *distance = split.distance;
     return split.gap * sine * v->pixel_factor >
                TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
@@ -11154,7 +11159,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
         job->record = terrimpi_take_record(v, want->site.node);
     if (job->record == TERRIMPI_NO_RECORD)
         return 0;
-    job->part_count = terrimpi_split_at(v, want, front, &split) ? 2u : 1u;
+    job->part_count = terrimpi_split_at(v, want, &box, front, &split) ? 2u : 1u;
     if (!terrimpi_seat_job(v, size, job))
         return 0;
     size[0] = job->rects[0].width;
@@ -11169,9 +11174,8 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, terr
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
     *back = *front;
-    if (job->part_count == 2u) { /* the parts overlap by what the mesh may be off along a ray */
-        float overlap = 2.0f * terrimpi_mesh_error(v, want->site.node) /
-                        terrimpi_sine_of_view(front, &box);
+    if (job->part_count == 2u) {
+        float overlap = terrimpi_depth_error(v, want->site.node, front, &box);
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
     }
