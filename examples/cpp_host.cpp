@@ -364,7 +364,7 @@ bool fly()
     }
     check(image_write_png("cpp_host.png", rgb.data(), width, height));
     check(glGetError() == GL_NO_ERROR ? nullptr : "OpenGL reports an error");
-    return scene_accepts(&shown, 35.0);
+    return scene_accepts(&shown, 37.0);
 }
 
 } // namespace

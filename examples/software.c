@@ -21,8 +21,10 @@ typedef struct host {
     const terrimp_terrain *terrain;
     uint16_t screen[WIDTH * HEIGHT], atlas[ATLAS * ATLAS];
     uint16_t depth[ATLAS * ATLAS]; /* first of each capture, then of the screen */
+    uint32_t node_count;
     uint16_t *indices, *mesh_indices;
-    float *mesh_xyz, ground_xyz[GRID * 3];
+    float *mesh_xyz, ground_xyz[GRID * 3]; /* of one node */
+    uint32_t mesh_floats, mesh_index_count;
     uint16_t lightmap_texels[SCENE_SIDE * SCENE_SIDE * 4 / 3];
     raster_texture lightmap, atlas_texture;
     const float *lightmap_matrix;
@@ -65,34 +67,40 @@ static void turn_to_screen(host *h)
     raster_clear_depth(&h->r);
 }
 
+/* Vertices are made for each draw, from the samples and from the terrain's compact meshes: no
+   memory goes into vertex buffers. */
+static void draw_mesh(host *h, uint32_t node, const raster_style *style, uint32_t index_count)
+{
+    turn_to_screen(h);
+    if (terrimp_terrain_fill_mesh(h->terrain, node, h->mesh_xyz, h->mesh_floats, h->mesh_indices,
+                                  h->mesh_index_count) == TERRIMP_OK)
+        raster_draw(&h->r, style, h->mesh_xyz, h->mesh_indices, index_count);
+}
+
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     host *h = (host *)user;
     raster_style style = { 0 };
-    turn_to_screen(h);
     style.texture = &h->atlas_texture;
     style.texture_matrix = c->texture_matrix;
     style.depth_bias = c->depth_bias;
     style.alpha = RASTER_OPAQUE;
     style.within_depth = c->part_count > 1;
-    raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
-                h->mesh_indices + c->first_index, c->index_count);
+    draw_mesh(h, c->node, &style, c->index_count);
 }
 
+/* The floor is the mesh behind those of all nodes. */
 static void draw_floor(void *user, const terrimp_floor_command *c)
 {
     host *h = (host *)user;
     raster_style style = { 0 };
-    turn_to_screen(h);
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
     style.depth_bias = c->depth_bias;
     style.alpha = RASTER_OPAQUE;
-    raster_draw(&h->r, &style, h->mesh_xyz + (size_t)c->base_vertex * 3,
-                h->mesh_indices + c->first_index, c->index_count);
+    draw_mesh(h, h->node_count, &style, c->index_count);
 }
 
-/* Vertices are read from the samples for each draw: no memory for vertex buffers. */
 static void draw_ground(void *user, const terrimp_ground_command *c)
 {
     host *h = (host *)user;
@@ -111,18 +119,27 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
 
 static uint8_t ours[WIDTH * HEIGHT * 3], full[WIDTH * HEIGHT * 3];
 
+static uint32_t larger(uint32_t a, uint32_t b)
+{
+    return a > b ? a : b;
+}
+
 static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
 {
     terrimp_terrain_info info;
-    terrimp_terrain_get_info(terrain, &info);
+    if (terrimp_terrain_get_info(terrain, &info) != TERRIMP_OK)
+        return 0;
     h->terrain = terrain;
+    h->node_count = info.node_count;
+    h->mesh_floats = 3 * larger(info.mesh_vertex_stride, info.mesh_vertex_count
+                                                    - info.node_count * info.mesh_vertex_stride);
+    h->mesh_index_count = larger(info.mesh_index_stride, info.mesh_index_count
+                                                    - info.node_count * info.mesh_index_stride);
     h->indices = malloc(info.ground_index_count * sizeof *h->indices);
-    h->mesh_indices = malloc(info.mesh_index_count * sizeof *h->mesh_indices);
-    h->mesh_xyz = malloc(info.mesh_vertex_count * 3 * sizeof *h->mesh_xyz);
+    h->mesh_indices = malloc(h->mesh_index_count * sizeof *h->mesh_indices);
+    h->mesh_xyz = malloc(h->mesh_floats * sizeof *h->mesh_xyz);
     if (!h->indices || !h->mesh_indices || !h->mesh_xyz
-        || terrimp_terrain_fill_indices(terrain, h->indices, info.ground_index_count)
-        || terrimp_terrain_fill_meshes(terrain, h->mesh_xyz, info.mesh_vertex_count * 3,
-                                       h->mesh_indices, info.mesh_index_count))
+        || terrimp_terrain_fill_indices(terrain, h->indices, info.ground_index_count))
         return 0;
     raster_make_texture(&h->lightmap, h->lightmap_texels, s->lightmap, LOG2_SIDE);
     h->lightmap_matrix = s->lightmap_matrix;
@@ -163,6 +180,7 @@ int main(void)
 
     settings.texels_per_px = 1.0f; /* the nearest texel is taken: more would only flicker */
     settings.atlas_size = ATLAS;
+    settings.max_impostors = 128;
     yardstick.mode = TERRIMP_MODE_FULL;
     if (scene_open(&s) || terrimp_terrain_create(&s.desc, NULL, &terrain) != TERRIMP_OK
         || terrimp_view_create(terrain, &settings, NULL, &view) != TERRIMP_OK
@@ -182,6 +200,9 @@ int main(void)
         full_clocks += clock() - start;
         scene_judge(&s, i, &stats, ours, full, WIDTH, HEIGHT);
     }
+    printf("%zu KiB for screen, depth, atlas and buffers, %zu for the terrain, %zu for the view\n",
+           sizeof h / 1024, terrimp_terrain_bytes(&s.desc) / 1024,
+           terrimp_view_bytes(terrain, &settings) / 1024);
     printf("first frame %.1f ms, then %.1f ms a frame; full mesh %.1f ms\n",
            (double)first * 1000.0 / CLOCKS_PER_SEC,
            (double)(clocks - first) * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES - 1),
