@@ -643,6 +643,15 @@ static void check_nothing_in_sight_is_missing(const flight *f, uint32_t step)
         }
 }
 
+/* Ground fades with the distance of its unit, which is no farther away than the node itself, and is
+   the node in mode IMPOSTOR. */
+static void check_alpha(const flight *f, const flight_item *item, float closest)
+{
+    float wanted = (f->desc.fade_end - closest) / (f->desc.fade_end - f->desc.fade_start);
+    CHECK(item->ground.alpha >= wanted - 1e-4f);
+    CHECK(f->desc.mode != TERRIMP_MODE_IMPOSTOR || item->ground.alpha <= wanted + 1e-4f);
+}
+
 /* Impostors are nowhere closer than fade_start, and all that is distant lies behind the fade band,
    or eight times as deep; ground fades only within the band. */
 static void check_fades(const flight *f)
@@ -663,6 +672,7 @@ static void check_fades(const flight *f)
             CHECK(terrimp_box_farthest(box, f->camera.eye) > 0.0f);
         } else if (item->ground.alpha < 1.0f) {
             CHECK(closest >= f->desc.fade_start * 0.9999f);
+            check_alpha(f, item, closest);
         } else if (item->ground.depth_bias > 0.0f) {
             CHECK(bias < 0.0f || item->ground.depth_bias == bias);
             bias = item->ground.depth_bias;
@@ -752,10 +762,10 @@ static void check_pictures_are_good(const flight *f)
         const flight_picture *picture = &f->latest[f->items[i].node * FLIGHT_PARTS];
         if (!f->items[i].is_impostor)
             continue;
-        if (picture->begun == f->frame)
-            limit = 1.0;
-        else if (picture->begun != picture->made) /* in pieces: the eye has moved since */
+        if (picture->begun != picture->made || f->dropped) /* the eye has moved since it was begun */
             limit = fmax(most, 2.0);
+        else if (picture->begun == f->frame)
+            limit = 1.0;
         error = picture_error(f, f->items[i].node, &angle, &parallax);
         CHECK(error <= limit * 1.002 + 1e-5);
         worst_angle = fmax(worst_angle, angle);
@@ -776,6 +786,26 @@ static void check_limits(const flight *f)
     CHECK(d->max_capture_triangles == 0 || f->captured_triangles <= d->max_capture_triangles ||
           f->captured_cells <= 1u);
     CHECK(f->ground_count <= d->max_ground && f->impostor_count <= d->max_impostors);
+}
+
+/* Where nothing is made, the slots in use are those of pictures that the host has: none is lost. */
+static void check_no_slot_is_lost(const flight *f)
+{
+    double known = 0.0;
+    uint32_t i;
+    if (f->capture_count > 0 || f->dropped)
+        return;
+    for (i = 0; i < f->l->info.node_count * FLIGHT_PARTS; i++) {
+        const flight_picture *pictures[2];
+        int k;
+        pictures[0] = &f->latest[i];
+        pictures[1] = &f->opened[i];
+        for (k = 0; k < 2; k++)
+            if (pictures[k]->alive)
+                known += (double)pictures[k]->capture.slot.width *
+                         (double)pictures[k]->capture.slot.height;
+    }
+    CHECK((double)f->stats.texels_used <= known);
 }
 
 /* The statistics are what the callbacks have seen. */
@@ -825,6 +855,7 @@ static void flight_render(flight *f)
     CHECK(!f->in_capture);
     check_captures(f);
     check_stats(f);
+    check_no_slot_is_lost(f);
     check_limits(f);
     check_nothing_in_sight_is_missing(f, 3);
     check_fades(f);
