@@ -6,9 +6,9 @@
    Leaves: build/bench/frames.md (what it prints), frames.tsv (all figures, a line a scene and way),
            frame_times.tsv (every frame), *.svg (plots), *.png (of each way the worst frame: full
            mesh, the way, their difference), *_pop.png (around its worst pop: the full mesh before
-           and after, the way before and after)
+           and after, the way before and after), *_hole.png (around its first hole, if any)
 
-   BENCH_FRAMES=n   frames of a flight [each scene's own, 48 to 96]; the thesis has 10000
+   BENCH_FRAMES=n   frames of a flight [each scene's own, 40 to 80]; the thesis has 10000
    BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
    BENCH_ONLY=text  only scenes with this in their key (the names of the files)
    BENCH_WAYS=text  only ways with this in their name, and the full mesh
@@ -100,25 +100,25 @@ typedef struct run {
 
 static const run runs[] = {
     { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", PYRENEES },
-      LOOK_LIGHTMAP, WAYS(path_ways), 96, 10, 1, 0 },
+      LOOK_LIGHTMAP, WAYS(path_ways), 80, 10, 1, 0 },
     { { .name = "rough 2049 x 2049, straight flight", .key = "rough", ROUGH },
-      LOOK_LIGHTMAP, WAYS(path_ways), 96, 10, 1, 0 },
+      LOOK_LIGHTMAP, WAYS(path_ways), 80, 10, 1, 0 },
     { { .name = "rough, three materials and moving clouds", .key = "materials", ROUGH },
       LOOK_MATERIALS, WAYS(look_ways), 48, 10, 1, 0 },
     { { .name = "rough, with trees", .key = "trees", ROUGH },
       LOOK_TREES, WAYS(look_ways), 48, 10, 1, 0 },
     { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
-      LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 40, 8, 0, 0 },
     { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
-      LOOK_LIGHTMAP, WAYS(tile_ways), 60, 10, 0, 0 },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 40, 8, 0, 0 },
     { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 0 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 0 },
     { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
-      LOOK_LIGHTMAP, thesis_ways, 9, 9, 60, 10, 0, 0 },
+      LOOK_LIGHTMAP, thesis_ways, 9, 9, 40, 8, 0, 0 },
     { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 1 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 1 },
     { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 60, 10, 0, 0 }
+      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 0 }
 };
 
 /* ---- Output ------------------------------------------------------------- */
@@ -166,12 +166,12 @@ static void say_machine(void)
     line[strcspn(line, "\n")] = 0;
     say("Machine: %s; load at the start %s\nRenderer: %s\n",
         strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
-    say("Pictures of %d x %d, 60 degrees. Ratio: mean time over that of the full mesh in the same "
-        "frames; CPU ratio: the same\nof the processor, over all frames. The columns from mean to "
-        "start are in multiples of the full mesh's median. The\nfirst sixth of a flight, 20 frames "
-        "at most, is its start, when pictures are new: its mean has a column, and no other\nfigure "
-        "has it in. PSNR [dB] is over terrain unless it says picture.\n", SCENE_WIDTH,
-        SCENE_HEIGHT);
+    say("Pictures of %d x %d, 60 degrees. Ratio: mean of a frame's time over that of the full mesh "
+        "at about the same moment;\nCPU ratio: mean processor time over that of the full mesh. The "
+        "columns from mean to start are in multiples of the full\nmesh's median. The first sixth "
+        "of a flight, 20 frames at most, is its start, when pictures are new: its mean has a "
+        "column,\nand no other figure has it in. PSNR [dB] is over terrain unless it says "
+        "picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
 }
 
 /* ---- Quality ------------------------------------------------------------ */
@@ -212,17 +212,45 @@ static void keep_worst(contender *c, const contender *full, size_t frame)
     c->worst_frame = frame;
 }
 
-static void compare(contender *c, const contender *full, size_t frame, int with_ssim)
+enum { CROP = 160 }; /* pixels along a side */
+
+/* Copies what is around a pixel, as far as the picture goes; *to is allocated when it is null. */
+static void crop_around(const uint8_t *picture, int x, int y, uint8_t **to)
 {
-    size_t low = 0, holes;
-    stats_add(&c->psnr, psnr_of(c->picture, full->picture, NULL));
-    stats_add(&c->psnr_terrain, psnr_of(c->picture, full->picture, scene_sky));
-    holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky, &low);
+    int left = x - CROP / 2, top = y - CROP / 2, row;
+    left = left < 0 ? 0 : left > SCENE_WIDTH - CROP ? SCENE_WIDTH - CROP : left;
+    top = top < 0 ? 0 : top > SCENE_HEIGHT - CROP ? SCENE_HEIGHT - CROP : top;
+    if (!*to)
+        *to = need_memory((size_t)CROP * CROP * 3);
+    for (row = 0; row < CROP; row++)
+        memcpy(*to + (size_t)row * CROP * 3,
+               picture + ((size_t)(top + row) * SCENE_WIDTH + (size_t)left) * 3, (size_t)CROP * 3);
+}
+
+/* Counts the holes and keeps what is around the first that the way ever has. */
+static void compare_holes(contender *c, const contender *full, size_t frame)
+{
+    size_t low = 0, first = 0;
+    size_t holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky,
+                                 &low, &first);
     if (holes == SIZE_MAX)
         scene_stop("holes", "out of memory");
+    if (holes > 0 && c->holes <= 0.0) {
+        int x = (int)(first % SCENE_WIDTH), y = (int)(first / SCENE_WIDTH);
+        crop_around(full->picture, x, y, &c->hole_crops[0]);
+        crop_around(c->picture, x, y, &c->hole_crops[1]);
+        c->hole_frame = frame;
+    }
     if ((double)holes > c->holes)
         c->holes = (double)holes;
     c->low_pixels += (double)low;
+}
+
+static void compare(contender *c, const contender *full, size_t frame, int with_ssim)
+{
+    stats_add(&c->psnr, psnr_of(c->picture, full->picture, NULL));
+    stats_add(&c->psnr_terrain, psnr_of(c->picture, full->picture, scene_sky));
+    compare_holes(c, full, frame);
     if (with_ssim)
         stats_add(&c->ssim, quality_ssim(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT,
                                          scene_sky));
@@ -236,30 +264,6 @@ static void compare_fine(contender *c, const fine *f)
                                           scene_sky));
 }
 
-enum { CROP = 160 }; /* pixels along a side */
-
-/* Keeps what is around a pop: the full mesh before and after it, then the way. */
-static void keep_pop(contender *c, const contender *full)
-{
-    const uint8_t *pictures[4];
-    int i, y, left = c->pop.block_x - (CROP - QUALITY_BLOCK) / 2;
-    int top = c->pop.block_y - (CROP - QUALITY_BLOCK) / 2;
-    left = left < 0 ? 0 : left > SCENE_WIDTH - CROP ? SCENE_WIDTH - CROP : left;
-    top = top < 0 ? 0 : top > SCENE_HEIGHT - CROP ? SCENE_HEIGHT - CROP : top;
-    pictures[0] = full->before;
-    pictures[1] = full->picture;
-    pictures[2] = c->before;
-    pictures[3] = c->picture;
-    for (i = 0; i < 4; i++) {
-        if (!c->pop_crops[i])
-            c->pop_crops[i] = need_memory((size_t)CROP * CROP * 3);
-        for (y = 0; y < CROP; y++)
-            memcpy(c->pop_crops[i] + (size_t)y * CROP * 3,
-                   pictures[i] + ((size_t)(top + y) * SCENE_WIDTH + (size_t)left) * 3,
-                   (size_t)CROP * 3);
-    }
-}
-
 static void compare_change(contender *c, const contender *full, size_t frame)
 {
     quality_change change = quality_compare_change(c->before, c->picture, full->before,
@@ -270,7 +274,10 @@ static void compare_change(contender *c, const contender *full, size_t frame)
     if (change.block > c->pop.block) {
         c->pop = change;
         c->pop_frame = frame;
-        keep_pop(c, full);
+        crop_around(full->before, change.block_x, change.block_y, &c->pop_crops[0]);
+        crop_around(full->picture, change.block_x, change.block_y, &c->pop_crops[1]);
+        crop_around(c->before, change.block_x, change.block_y, &c->pop_crops[2]);
+        crop_around(c->picture, change.block_x, change.block_y, &c->pop_crops[3]);
     }
 }
 
@@ -314,6 +321,18 @@ static void note_time(const scene *s, const contender *c, size_t frame, int at_s
             c->now.captured_texels);
 }
 
+static double newest_ms(const contender *c)
+{
+    return c->ms.values[c->ms.count - 1];
+}
+
+/* What a frame of the full mesh takes at the time: the mean of the two that it drew last. */
+static double full_ms(const contender *full)
+{
+    size_t n = full->ms.count;
+    return n > 1 ? 0.5 * (full->ms.values[n - 1] + full->ms.values[n - 2]) : newest_ms(full);
+}
+
 static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
                        frame_plan plan)
 {
@@ -324,10 +343,10 @@ static void draw_frame(contender *ways, size_t count, const scene *s, size_t fra
         if (!plan.look && !plan.change && !way_has_memory(c->way))
             continue;
         contender_draw(c, camera, plan.start);
-        if (plan.look || plan.change) {
-            stats_add(&c->shared_ms, c->ms.values[c->ms.count - 1]);
+        if (!plan.start)
+            stats_add(&c->ratio, newest_ms(c) / full_ms(&ways[0]));
+        if (plan.look || plan.change)
             contender_read(c, s->context, frame);
-        }
         note_time(s, c, frame, plan.start);
     }
 }
@@ -358,13 +377,11 @@ static void fly(const run *r, contender *ways, size_t count, const scene *s, qua
 
 /* ---- Tables ------------------------------------------------------------- */
 
-/* What a way costs beside the full mesh, by mean times, so that the pictures that it makes now and
-   then are paid for. Of the clock: over the frames that both have drawn, for other programs may
-   have slowed down others. Of the processor: over all. */
+/* What a way costs beside the full mesh, by means, so that the pictures that it makes now and then
+   are paid for: of the clock, or of the processor. */
 static double cost_of(const contender *c, const contender *full, int processor)
 {
-    return processor ? mean(&c->cpu_ms) / mean(&full->cpu_ms)
-                     : mean(&c->shared_ms) / mean(&full->shared_ms);
+    return processor ? mean(&c->cpu_ms) / mean(&full->cpu_ms) : mean(&c->ratio);
 }
 
 static void print_times(const contender *ways, size_t count, double quad_ms)
@@ -612,15 +629,21 @@ static void write_pictures(const run *r, const contender *c)
 {
     const uint8_t *pictures[3];
     uint8_t *difference = need_memory((size_t)SCENE_PIXELS * 3);
-    const uint8_t *const crops[4] = { c->pop_crops[0], c->pop_crops[1], c->pop_crops[2],
-                                      c->pop_crops[3] };
+    const uint8_t *const pop[4] = { c->pop_crops[0], c->pop_crops[1], c->pop_crops[2],
+                                    c->pop_crops[3] };
+    const uint8_t *const hole[2] = { c->hole_crops[0], c->hole_crops[1] };
     image_difference(c->worst, c->worst_truth, SCENE_PIXELS, 1, difference);
     pictures[0] = c->worst_truth;
     pictures[1] = c->worst;
     pictures[2] = difference;
     write_side_by_side(r, c, "", pictures, 3, SCENE_WIDTH, SCENE_HEIGHT, 1);
-    if (crops[0])
-        write_side_by_side(r, c, "_pop", crops, 4, CROP, CROP, 3);
+    if (pop[0])
+        write_side_by_side(r, c, "_pop", pop, 4, CROP, CROP, 3);
+    if (hole[0]) {
+        write_side_by_side(r, c, "_hole", hole, 2, CROP, CROP, 4);
+        say("\n%s has its first hole in frame %zu: see the picture of it.\n", c->way->name,
+            c->hole_frame);
+    }
     free(difference);
 }
 

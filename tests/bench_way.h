@@ -31,7 +31,7 @@ typedef struct contender {
     terrimp_stats now;          /* of the newest frame */
     stats start_ms;             /* of the start of the flight, when its pictures are new */
     stats ms, cpu_ms;           /* of all frames after it, like all that follows */
-    stats shared_ms;            /* of those frames that every way has drawn */
+    stats ratio;                /* the same: ms over the newest that the full mesh took */
     double frames, triangles, draws, captures, captured_texels, waiting; /* sums */
     stats psnr, psnr_terrain, ssim;       /* against the full mesh [dB, dB, 1] */
     stats fine_psnr, fine_ssim;           /* over terrain, against the full mesh supersampled */
@@ -41,6 +41,8 @@ typedef struct contender {
     size_t picture_frame, worst_frame, pop_frame;
     quality_change pop;                   /* the worst one */
     uint8_t *pop_crops[4];                /* around it: the full mesh before and now, the way */
+    uint8_t *hole_crops[2];               /* around the first hole: the full mesh, the way */
+    size_t hole_frame;
 } contender;
 
 /* Whether a frame depends on those before: then every frame of the flight must be drawn. */
@@ -157,7 +159,7 @@ static void contender_close(contender *c)
     lists[8] = &c->pop_pixel;
     lists[9] = &c->pop_block;
     lists[10] = &c->start_ms;
-    lists[11] = &c->shared_ms;
+    lists[11] = &c->ratio;
     for (i = 0; i < 12; i++)
         stats_free(lists[i]);
     terrimp_view_destroy(c->view);
@@ -169,6 +171,8 @@ static void contender_close(contender *c)
     free(c->worst_truth);
     for (i = 0; i < 4; i++)
         free(c->pop_crops[i]);
+    for (i = 0; i < 2; i++)
+        free(c->hole_crops[i]);
 }
 
 #endif

@@ -311,7 +311,7 @@ static void use_geomip(void)
     free(tree.nodes);
     weights = (terrimp_geomip_weights *)fuzz_take((size_t)(tree.chunk_quads + 1u)
                                                   * (tree.chunk_quads + 1u) * sizeof *weights);
-    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, weights) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, TERRIMP_FORM_LIST, weights) == TERRIMP_OK);
     free(weights);
 }
 

@@ -219,7 +219,7 @@ static void holes_agree_with_brute_force(void)
     uint8_t a[QUALITY_BYTES], b[QUALITY_BYTES];
     int round, i;
     for (round = 0; round < 60; round++) {
-        size_t low, slow_low, holes, slow;
+        size_t low, slow_low, holes, slow, first = 0;
         make_picture(a, 20);
         make_picture(b, 20);
         for (i = 0; i < QUALITY_W * QUALITY_H; i++) {
@@ -229,15 +229,17 @@ static void holes_agree_with_brute_force(void)
                 memcpy(b + i * 3, quality_sky, 3);
         }
         slow = slow_holes(a, b, &slow_low);
-        holes = quality_holes(a, b, QUALITY_W, QUALITY_H, quality_sky, &low);
+        holes = quality_holes(a, b, QUALITY_W, QUALITY_H, quality_sky, &low, &first);
         CHECK(holes == slow && low == slow_low);
+        CHECK(!holes || (memcmp(a + first * 3, quality_sky, 3) == 0
+                         && memcmp(b + first * 3, quality_sky, 3) != 0));
     }
 }
 
 static void a_low_silhouette_is_no_hole(void)
 {
     uint8_t truth[QUALITY_BYTES], lower[QUALITY_BYTES];
-    size_t low;
+    size_t low, first = 0;
     int x, y;
     make_picture(truth, 10);
     make_picture(lower, 10);
@@ -249,8 +251,8 @@ static void a_low_silhouette_is_no_hole(void)
         }
     paint(lower, 20, 20, quality_sky);
     paint(lower, 21, 21, quality_sky);
-    CHECK(quality_holes(lower, truth, QUALITY_W, QUALITY_H, quality_sky, &low) == 2);
-    CHECK(low == 4 * QUALITY_W);
+    CHECK(quality_holes(lower, truth, QUALITY_W, QUALITY_H, quality_sky, &low, &first) == 2);
+    CHECK(low == 4 * QUALITY_W && first == 20 * QUALITY_W + 20);
 }
 
 static void a_smaller_picture_is_the_mean_of_its_squares(void)

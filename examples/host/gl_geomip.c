@@ -65,21 +65,30 @@ static gl_program make_program(gl_geomip *g, int index, const char *fragment)
 
 /* ---- Opening ------------------------------------------------------------ */
 
+/* Lists, with heights that are fitted. */
+enum { FORM = TERRIMP_FORM_FITTED };
+
+static size_t vertex_count(const gl_geomip *g)
+{
+    return terrimp_pattern_vertex_count(g->tree.chunk_quads, FORM);
+}
+
 /* What the tree and its view keep; close frees it. */
 static int allocate(gl_geomip *g)
 {
     const terrimp_geomip *t = &g->tree;
-    size_t nodes = t->node_count, grid = (size_t)(t->chunk_quads + 1) * (t->chunk_quads + 1);
+    size_t nodes = t->node_count, vertices = vertex_count(g);
     g->tree.nodes = malloc(nodes * sizeof *t->nodes);
+    g->tree.fits = malloc((t->fit_count + 1u) * sizeof *t->fits);
     g->view.distances = malloc(nodes * sizeof *g->view.distances);
     g->view.marks = calloc(nodes, sizeof *g->view.marks);
     g->view.draw_capacity = t->level_x[0] * t->level_z[0]; /* a tiling has no more */
     g->view.draws = malloc(g->view.draw_capacity * sizeof *g->view.draws);
     g->arrays = calloc(nodes, sizeof *g->arrays);
     g->vertices = calloc(nodes, sizeof *g->vertices);
-    g->xyz = malloc(grid * 3 * sizeof *g->xyz);
-    g->moves = malloc(grid * sizeof *g->moves);
-    return t->nodes && g->view.distances && g->view.marks && g->view.draws && g->arrays
+    g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
+    g->moves = malloc(vertices * sizeof *g->moves);
+    return t->nodes && t->fits && g->view.distances && g->view.marks && g->view.draws && g->arrays
            && g->vertices && g->xyz && g->moves;
 }
 
@@ -93,19 +102,16 @@ static terrimp_result build(gl_geomip *g)
     return result;
 }
 
-/* Plain lists for morphing too: beside the triangles of no area that the stitched form has, a
-   rasteriser was seen to leave a pixel open now and then. */
 static terrimp_result fill_indices(gl_geomip *g)
 {
-    const int form = TERRIMP_FORM_LIST;
     uint32_t quads = g->tree.chunk_quads, i;
-    uint32_t count = terrimp_pattern_index_count(quads, form);
+    uint32_t count = terrimp_pattern_index_count(quads, FORM);
     uint16_t *indices = malloc(count * sizeof *indices);
     terrimp_result result = TERRIMP_E_MEMORY;
     if (indices)
-        result = terrimp_pattern_fill(quads, form, indices, count);
+        result = terrimp_pattern_fill(quads, FORM, indices, count);
     for (i = 0; i < TERRIMP_PATTERN_COUNT && result == TERRIMP_OK; i++)
-        result = terrimp_pattern_find(quads, form, i, &g->patterns[i]);
+        result = terrimp_pattern_find(quads, FORM, i, &g->patterns[i]);
     if (result == TERRIMP_OK) {
         glBindVertexArray(0);
         glGenBuffers(1, &g->indices);
@@ -119,15 +125,15 @@ static terrimp_result fill_indices(gl_geomip *g)
 
 static terrimp_result fill_weights(gl_geomip *g)
 {
-    size_t grid = (size_t)(g->tree.chunk_quads + 1) * (g->tree.chunk_quads + 1);
-    terrimp_geomip_weights *weights = malloc(grid * sizeof *weights);
+    size_t count = vertex_count(g);
+    terrimp_geomip_weights *weights = malloc(count * sizeof *weights);
     terrimp_result result = TERRIMP_E_MEMORY;
     if (weights)
-        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, weights);
+        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, FORM, weights);
     if (result == TERRIMP_OK) {
         glGenBuffers(1, &g->weights);
         glBindBuffer(GL_ARRAY_BUFFER, g->weights);
-        glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(grid * sizeof *weights), weights,
+        glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(count * sizeof *weights), weights,
                      GL_STATIC_DRAW);
     }
     free(weights);
@@ -136,7 +142,8 @@ static terrimp_result fill_weights(gl_geomip *g)
 
 static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t chunk_quads)
 {
-    terrimp_result result = terrimp_geomip_init(field, chunk_quads, &g->tree);
+    terrimp_result result =
+        terrimp_geomip_init(field, chunk_quads ? chunk_quads : 32, &g->tree);
     if (result == TERRIMP_OK && !allocate(g))
         result = TERRIMP_E_MEMORY;
     if (result == TERRIMP_OK)
@@ -183,6 +190,7 @@ void gl_geomip_close(gl_geomip *g)
     glDeleteProgram(g->ground.id);
     glDeleteProgram(g->line.id);
     free(g->tree.nodes);
+    free(g->tree.fits);
     free(g->view.distances);
     free(g->view.marks);
     free(g->view.draws);
@@ -196,13 +204,13 @@ void gl_geomip_close(gl_geomip *g)
 /* ---- A node's vertices -------------------------------------------------- */
 
 /* Morphing vertices are six floats: position, then what they move by; others only the position. */
-static void send_vertices(const gl_geomip *g, size_t grid)
+static void send_vertices(const gl_geomip *g)
 {
-    size_t floats = is_morphing(g) ? 6 : 3, i;
+    size_t floats = is_morphing(g) ? 6 : 3, count = vertex_count(g), i;
     float *out;
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(grid * floats * sizeof *out), NULL, GL_STATIC_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(count * floats * sizeof *out), NULL, GL_STATIC_DRAW);
     out = glMapBuffer(GL_ARRAY_BUFFER, GL_WRITE_ONLY);
-    for (i = 0; out && i < grid; i++, out += floats) {
+    for (i = 0; out && i < count; i++, out += floats) {
         memcpy(out, g->xyz + i * 3, 3 * sizeof *out);
         if (is_morphing(g)) {
             out[3] = g->moves[i].move;
@@ -233,7 +241,6 @@ static void point_to_weights(const gl_geomip *g)
 /* Makes what a node lacks; from then on it is resident. */
 static terrimp_result make_node(gl_geomip *g, uint32_t node)
 {
-    size_t grid = (size_t)(g->tree.chunk_quads + 1) * (g->tree.chunk_quads + 1);
     size_t stride = (is_morphing(g) ? 6 : 3) * sizeof(float);
     terrimp_result result = terrimp_geomip_fill_vertices(&g->tree, node, g->xyz,
                                                          is_morphing(g) ? g->moves : NULL);
@@ -244,7 +251,7 @@ static terrimp_result make_node(gl_geomip *g, uint32_t node)
     glGenBuffers(1, &g->vertices[node]);
     glBindBuffer(GL_ARRAY_BUFFER, g->vertices[node]);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, g->indices);
-    send_vertices(g, grid);
+    send_vertices(g);
     point(0, 3, GL_FLOAT, stride, 0);
     if (is_morphing(g)) {
         point(1, 3, GL_FLOAT, stride, 3 * sizeof(float));

@@ -21,7 +21,7 @@ typedef struct gl_geomip {
 } gl_geomip;
 
 /* Builds the tree over the field that gl shows. Of the settings rule, tolerance_px, morph_ratio and
-   hysteresis are taken; a chunk_quads of 0 is the default. gl and the field's samples outlive g.
+   hysteresis are taken; a chunk_quads of 0 is 32. gl and the field's samples outlive g.
    Returns null, or one line that says what is wrong; then there is nothing to close. */
 const char *gl_geomip_open(gl_geomip *g, gl_terrain *gl, const terrimp_heightfield *field,
                            uint32_t chunk_quads, const terrimp_geomip_view *settings);

@@ -251,7 +251,7 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
     if (!weights)
         return "no memory for the morph weights";
     terrimp_terrain_get_info(g->terrain, &info);
-    terrimp_geomip_fill_weights(info.chunk_quads, weights);
+    terrimp_geomip_fill_weights(info.chunk_quads, TERRIMP_FORM_LIST, weights);
     g->morphing = gl_program_make(gl_morphing_vertex, gl_ground_fragment);
     glGenBuffers(1, &p->weights);
     glBindBuffer(GL_ARRAY_BUFFER, p->weights);

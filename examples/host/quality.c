@@ -217,7 +217,7 @@ static void spread_sky(uint8_t *marks, int width, int height, uint32_t *stack, s
 }
 
 size_t quality_holes(const uint8_t *rgb, const uint8_t *reference, int width, int height,
-                     const uint8_t sky[3], size_t *low)
+                     const uint8_t sky[3], size_t *low, size_t *first)
 {
     size_t count = (size_t)width * (size_t)height, unsure = 0, depth = 0, holes = 0, i;
     uint8_t *marks = malloc(count);
@@ -236,7 +236,8 @@ size_t quality_holes(const uint8_t *rgb, const uint8_t *reference, int width, in
         if (unsure)
             spread_sky(marks, width, height, stack, depth);
         for (i = 0; unsure && i < count; i++)
-            holes += marks[i] == UNSURE;
+            if (marks[i] == UNSURE && holes++ == 0)
+                *first = i;
         *low = unsure - holes;
     } else {
         holes = SIZE_MAX;

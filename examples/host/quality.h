@@ -32,9 +32,10 @@ quality_change quality_compare_change(const uint8_t *before, const uint8_t *now,
 /* Pixels of the sky's colour that have no way to the sky of the reference: holes in the terrain.
    A way goes over pixels of the sky's colour that touch, at a corner too; where a silhouette is too
    low there is one. *low receives the number of those pixels, which are sky here, terrain in the
-   reference, but no holes. Returns SIZE_MAX when memory runs out. */
+   reference, but no holes; *first that of the first hole, y * width + x, if there is one. Returns
+   SIZE_MAX when memory runs out. */
 size_t quality_holes(const uint8_t *rgb, const uint8_t *reference, int width, int height,
-                     const uint8_t sky[3], size_t *low);
+                     const uint8_t sky[3], size_t *low, size_t *first);
 
 /* A picture of width / factor times height / factor pixels, each the rounded mean of a square of
    factor^2; what is left over at the right and below is dropped. out may be rgb. */
