@@ -762,7 +762,7 @@ static void check_pictures_are_good(const flight *f)
         const flight_picture *picture = &f->latest[f->items[i].node * FLIGHT_PARTS];
         if (!f->items[i].is_impostor)
             continue;
-        if (picture->begun != picture->made || f->dropped) /* the eye has moved since it was begun */
+        if (picture->begun != picture->made || f->dropped) /* the eye has moved meanwhile */
             limit = fmax(most, 2.0);
         else if (picture->begun == f->frame)
             limit = 1.0;
