@@ -643,6 +643,15 @@ static void check_nothing_in_sight_is_missing(const flight *f, uint32_t step)
         }
 }
 
+/* Ground fades with the distance of its unit, which is no farther away than the node itself, and is
+   the node in mode IMPOSTOR. */
+static void check_alpha(const flight *f, const flight_item *item, float closest)
+{
+    float wanted = (f->desc.fade_end - closest) / (f->desc.fade_end - f->desc.fade_start);
+    CHECK(item->ground.alpha >= wanted - 1e-4f);
+    CHECK(f->desc.mode != TERRIMP_MODE_IMPOSTOR || item->ground.alpha <= wanted + 1e-4f);
+}
+
 /* Impostors are nowhere closer than fade_start, and all that is distant lies behind the fade band,
    or eight times as deep; ground fades only within the band. */
 static void check_fades(const flight *f)
@@ -663,6 +672,7 @@ static void check_fades(const flight *f)
             CHECK(terrimp_box_farthest(box, f->camera.eye) > 0.0f);
         } else if (item->ground.alpha < 1.0f) {
             CHECK(closest >= f->desc.fade_start * 0.9999f);
+            check_alpha(f, item, closest);
         } else if (item->ground.depth_bias > 0.0f) {
             CHECK(bias < 0.0f || item->ground.depth_bias == bias);
             bias = item->ground.depth_bias;
@@ -748,12 +758,16 @@ static void check_pictures_are_good(const flight *f)
     if (f->stats.waiting > 0)
         most = 4.0;
     for (i = 0; i < f->item_count; i++) {
-        double angle, parallax, error;
+        double angle, parallax, error, limit = most;
         const flight_picture *picture = &f->latest[f->items[i].node * FLIGHT_PARTS];
         if (!f->items[i].is_impostor)
             continue;
+        if (picture->begun != picture->made || f->dropped) /* the eye has moved meanwhile */
+            limit = fmax(most, 2.0);
+        else if (picture->begun == f->frame)
+            limit = 1.0;
         error = picture_error(f, f->items[i].node, &angle, &parallax);
-        CHECK(error <= (picture->begun == f->frame ? 1.0 : most) * 1.002 + 1e-5);
+        CHECK(error <= limit * 1.002 + 1e-5);
         worst_angle = fmax(worst_angle, angle);
         worst_parallax = fmax(worst_parallax, parallax);
     }
@@ -772,6 +786,26 @@ static void check_limits(const flight *f)
     CHECK(d->max_capture_triangles == 0 || f->captured_triangles <= d->max_capture_triangles ||
           f->captured_cells <= 1u);
     CHECK(f->ground_count <= d->max_ground && f->impostor_count <= d->max_impostors);
+}
+
+/* Where nothing is made, the slots in use are those of pictures that the host has: none is lost. */
+static void check_no_slot_is_lost(const flight *f)
+{
+    double known = 0.0;
+    uint32_t i;
+    if (f->capture_count > 0 || f->dropped)
+        return;
+    for (i = 0; i < f->l->info.node_count * FLIGHT_PARTS; i++) {
+        const flight_picture *pictures[2];
+        int k;
+        pictures[0] = &f->latest[i];
+        pictures[1] = &f->opened[i];
+        for (k = 0; k < 2; k++)
+            if (pictures[k]->alive)
+                known += (double)pictures[k]->capture.slot.width *
+                         (double)pictures[k]->capture.slot.height;
+    }
+    CHECK((double)f->stats.texels_used <= known);
 }
 
 /* The statistics are what the callbacks have seen. */
@@ -821,6 +855,7 @@ static void flight_render(flight *f)
     CHECK(!f->in_capture);
     check_captures(f);
     check_stats(f);
+    check_no_slot_is_lost(f);
     check_limits(f);
     check_nothing_in_sight_is_missing(f, 3);
     check_fades(f);
@@ -1055,8 +1090,6 @@ static terrimp_view_desc random_settings(int mode)
     d.costs.capture = random_magnitude(0.1f, 1e4f);
     d.costs.draw = maybe(1.0f, 1000.0f);
     d.costs.triangle = maybe(0.5f, 20.0f);
-    if (mode == TERRIMP_MODE_GEOMIP || mode == TERRIMP_MODE_AUTO)
-        d.max_ground = random_range(0, 2) ? 0 : random_range(200, 300);
     return d;
 }
 
@@ -1182,7 +1215,7 @@ static void flights_with_random_settings_keep_every_law(void)
         waiting += flight_room.total_waiting;
         land_free(&l);
     }
-    CHECK(pieces > 10 && high > 100 && waiting > 100);
+    CHECK(pieces > 3 && high > 50 && waiting > 50);
 }
 
 /* Pictures of many nodes, a few triangles a frame: they arrive in pieces. */
