@@ -1,6 +1,6 @@
-/* Shows a host in C++: the header compiled as C++, its objects in unique_ptr, its results turned into
-   exceptions, and its commands recorded. A command is plain values, so a list of copies is all that
-   a render thread needs: here frame n + 1 is decided and recorded while frame n is drawn.
+/* Shows a host in C++: the header compiled as C++, its objects in unique_ptr, its results turned
+   into exceptions, and its commands recorded. A command is plain values, so a list of copies is all
+   that a render thread needs: here frame n + 1 is decided and recorded while frame n is drawn.
    Build:  make cpp_host
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
            cpp_host.png. Exit code 1 when one has holes or is too far from the full mesh. */
@@ -23,7 +23,7 @@ extern "C" {
 namespace {
 
 constexpr int width = 640, height = 480;
-constexpr uint32_t atlas_size = 1024;
+constexpr uint32_t atlas_size = 2048;
 
 void check(terrimp_result result)
 {

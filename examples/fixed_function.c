@@ -8,7 +8,7 @@
    - the depth bias is a scale about the eye, of vertices that are relative to the eye;
    - a picture in two parts is cut to r / q within 0..1 by two clip planes, rows of its matrix;
    - "nothing where alpha is below 0.5" is the alpha test. The division by alpha is not to be had:
-     captures are cleared to the colour of ground instead of black, for the filter to mix in.
+     captures are cleared to the mean colour of ground instead of black, for the filter to mix in.
    Build:  make fixed_function
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
            fixed_function.png. Exit code 1 when one has holes or is too far from the full mesh. */
@@ -33,6 +33,7 @@ typedef struct host {
     uint16_t *indices, *mesh_indices;
     float *mesh_xyz, ground_xyz[GRID * 3], stq[GRID * 3], strq[GRID * 4];
     const float *lightmap_matrix;
+    float mean[3];              /* colour of the lightmap */
     float eye[3];               /* of the capture or of the frame */
     int on_screen, capturing;
     int without_texture_matrix; /* (s, t, q) by terrimp_texture_coordinates */
@@ -86,7 +87,7 @@ static void begin_capture(void *user, const terrimp_capture_command *c)
     h->capturing = 1;
     glViewport(0, 0, width, height);
     glScissor(0, 0, width, height);
-    glClearColor(0.3f, 0.35f, 0.2f, 0.0f);
+    glClearColor(h->mean[0], h->mean[1], h->mean[2], 0.0f);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     if (!c->clear)
         draw_slot(h, &c->slot);
@@ -246,7 +247,7 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
 {
     terrimp_terrain_info info;
     uint8_t *rgb = s->lightmap;
-    int side, level;
+    int side, level, i;
     terrimp_terrain_get_info(terrain, &info);
     h->terrain = terrain;
     h->indices = malloc(info.ground_index_count * sizeof *h->indices);
@@ -262,6 +263,8 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
         glTexImage2D(GL_TEXTURE_2D, level, GL_RGB8, side, side, 0, GL_RGB, GL_UNSIGNED_BYTE, rgb);
         halve(rgb, side / 2);
     }
+    for (i = 0; i < 3; i++)
+        h->mean[i] = (float)rgb[i] / 255.0f; /* one texel is left */
     h->lightmap_matrix = s->lightmap_matrix;
     h->atlas = make_texture(GL_LINEAR);
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, ATLAS, ATLAS, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);

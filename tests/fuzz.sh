@@ -11,7 +11,7 @@ seconds=${1:-0}
 names=${*:-$(ls tests/fuzz_*.c | sed 's/.*fuzz_//; s/[.]c$//')}
 work=build/fuzz
 mkdir -p $work
-flags="-std=c99 -g -O2 -Wall -Wextra -Wno-unused-function -I."
+flags="-std=c99 -g -Wall -Wextra -Wno-unused-function -I."
 sanitize="-fsanitize=address,undefined -fno-sanitize-recover=all"
 CC=${CC:-cc}
 
@@ -23,7 +23,7 @@ sanitizers_work()
 
 replays() # name
 {
-    $CC $flags $sanitize tests/fuzz_$1.c -lm -o $work/replay_$1 &&
+    $CC -O0 $flags $sanitize tests/fuzz_$1.c -lm -o $work/replay_$1 &&
         $work/replay_$1 tests/corpus/$1/* > $work/replay_$1.txt 2>&1 && return
     # Once more, to say which file it was.
     FUZZ_VERBOSE=1 $work/replay_$1 tests/corpus/$1/* 2>&1 | tail -n 30
@@ -34,7 +34,7 @@ replays() # name
 fuzz() # name
 {
     mkdir -p $work/$1
-    clang $flags -DFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
+    clang -O2 $flags -DFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
         tests/fuzz_$1.c -lm -o $work/fuzz_$1 || return
     $work/fuzz_$1 -max_total_time=$seconds -max_len=1024 -len_control=20 -timeout=20 \
         -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=$work/$1. \

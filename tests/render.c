@@ -1065,7 +1065,8 @@ static void no_hole_between_mipmapped_nodes(void)
     scene_close(&s);
 }
 
-/* Background below the topmost ground of each column: with a level camera only a hole shows it. */
+/* Background below the topmost ground of each column. With a level camera that is a hole, or the far
+   end of a valley that runs to the terrain's edge. */
 static size_t count_below_ground(const scene *s, const uint8_t *picture)
 {
     size_t count = 0;
@@ -1084,21 +1085,26 @@ static void check_long_flight(scene *s, float morph_ratio)
     terrimp_geomip_view settings = geomip_settings(0, 2.0f, morph_ratio);
     uint8_t *picture = open_picture(s);
     flight way;
+    terrimp_view *full = open_full_view(s);
     gl_geomip g;
-    size_t i, all = 0;
+    size_t i, all = 0, edges = 0;
     need(flight_circle(&way, &s->field, 600, 2.0f * s->field.spacing_x) ? NULL : way.error);
     need(gl_geomip_open(&g, &s->gl, &s->field, 32, &settings));
     for (i = 0; i < way.count; i++) {
         size_t holes;
         draw_geomip(s, &g, &way.poses[i], magenta, picture);
         holes = count_below_ground(s, picture);
-        if (holes && !all)
-            keep_picture(s, "long_holes", i, picture);
+        if (holes == 0)
+            continue;
+        keep_picture(s, "long_holes", i, picture);
+        draw_pose(s, full, &way.poses[i], magenta, picture);
+        edges += count_below_ground(s, picture);
         all += holes;
     }
-    printf("  %s, morphing %.1f: %u frames, %u pixels are holes\n", s->name, (double)morph_ratio,
-           (unsigned)way.count, (unsigned)all);
-    CHECK(all == 0);
+    printf("  %s, morphing %.1f: %u frames, %u pixels are open, in the full mesh %u\n", s->name,
+           (double)morph_ratio, (unsigned)way.count, (unsigned)all, (unsigned)edges);
+    CHECK(all <= edges);
+    terrimp_view_destroy(full);
     gl_geomip_close(&g);
     flight_free(&way);
     free(picture);
@@ -1109,6 +1115,7 @@ static void long_flights_over_mipmapped_tiles_leave_no_hole(void)
 {
     static const char *const files[] = { "N42E001.hgt", "N41E001.hgt", "N49E011.hgt",
                                          "N48W125.hgt" };
+    static const dem_desc whole; /* all zero */
     size_t i;
     if (!getenv("TERRIMP_LONG")) {
         SKIP("TERRIMP_LONG is not set");
@@ -1116,7 +1123,7 @@ static void long_flights_over_mipmapped_tiles_leave_no_hole(void)
     }
     for (i = 0; i < sizeof files / sizeof *files; i++) {
         scene s;
-        if (!open_tile(&s, files[i], NULL))
+        if (!open_tile(&s, files[i], &whole))
             continue;
         scene_show(&s, 480, 384, 60.0f, ATLAS);
         check_long_flight(&s, 1.0f);

@@ -700,6 +700,7 @@ static void atlas_functions_refuse(void)
     REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 8, 8, 0xffffffffu, rows, 4));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 8, 8, 0, rows, 0));
 
+    memset(&shelves, 0, sizeof shelves); /* compared as bytes below, gaps included */
     GIVES(TERRIMP_OK, terrimp_shelves_init(&shelves, 8, 8, 0, rows, 1));
     GIVES(TERRIMP_E_NULL, terrimp_shelves_insert(NULL, &rect));
     GIVES(TERRIMP_E_NULL, terrimp_shelves_insert(&shelves, NULL));
@@ -733,6 +734,7 @@ static void atlas_functions_refuse(void)
     REFUSES(TERRIMP_E_RANGE, pair_out, terrimp_pair_init(&pair_out, 0, 8, rows, 4));
     REFUSES(TERRIMP_E_RANGE, pair_out, terrimp_pair_init(&pair_out, 8, 65537, rows, 4));
     REFUSES(TERRIMP_E_RANGE, pair_out, terrimp_pair_init(&pair_out, 8, 8, rows, 0));
+    memset(&pair, 0, sizeof pair);
     GIVES(TERRIMP_OK, terrimp_pair_init(&pair, 8, 8, rows, 4));
     pair_out = pair;
     memset(slots, 0, sizeof slots);

@@ -444,7 +444,7 @@ static void simp_raise(simp_case *t, float amount, float extra_corner, float *wo
     CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_OK);
 }
 
-/* Is every sample under the raised surface, but for those whose weight hangs by more than 3/4 on
+/* Is every sample under the raised surface, but for those whose weight hangs by more than half on
    border vertices? Samples of the border have no such excuse: the corners were raised for them. */
 static int simp_hidden(const simp_case *t)
 {
@@ -469,7 +469,7 @@ static int simp_hidden(const simp_case *t)
                 for (k = 0; k < 3; k++)
                     hold += m->indices[i + (uint32_t)k] >= m->border_vertex_count ? w[k] : 0.0f;
                 h = w[0] * a->height + w[1] * b->height + w[2] * c->height;
-                if ((on_border || hold > 0.251f) && t->heights[z * t->cols + x] > h + 2e-3f)
+                if ((on_border || hold > 0.501f) && t->heights[z * t->cols + x] > h + 2e-3f)
                     return 0;
             }
     return 1;

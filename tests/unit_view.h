@@ -758,7 +758,8 @@ static void check_pictures_are_good(const flight *f)
         worst_parallax = fmax(worst_parallax, parallax);
     }
     CHECK(fabs((double)f->stats.worst_angle_rad - worst_angle) <= 2e-3 * worst_angle + 1e-5);
-    CHECK(fabs((double)f->stats.worst_parallax_px - worst_parallax) <= 2e-3 * worst_parallax + 1e-5);
+    CHECK(fabs((double)f->stats.worst_parallax_px - worst_parallax) <=
+          2e-3 * worst_parallax + 1e-5);
 }
 
 /* A frame keeps to its limits; but one picture, or one piece of a single node, may be larger. */
@@ -1009,7 +1010,9 @@ static terrimp_view_desc eager_settings(void)
     d.mode = TERRIMP_MODE_AUTO;
     d.ground_tolerance_px = 0.1f;
     d.costs.capture = 20.0f;
+    d.costs.draw = 40.0f;
     d.costs.triangle = 4.0f;
+    d.costs.ground_px = d.costs.impostor_px = 0.08f;
     return d;
 }
 
@@ -1079,8 +1082,8 @@ static void view_defaults_are_those_of_the_table(void)
         CHECK(out.max_capture_texels == 0 && out.max_capture_triangles == 0);
         CHECK(!out.no_lookahead && !out.no_spreading && !out.no_splits);
         CHECK(out.costs.draw == 40.0f && out.costs.triangle == 1.0f);
-        CHECK(out.costs.ground_px == 0.08f && out.costs.impostor_px == 0.08f);
-        CHECK(out.costs.capture == 1000.0f);
+        CHECK(out.costs.ground_px == 0.25f && out.costs.impostor_px == 0.25f);
+        CHECK(out.costs.capture == 1400.0f);
         d.fade_start = 10.0f;
         d.tolerance_px = 0.06f;
         CHECK(terrimp_view_desc_resolve(l.terrain, &d, &d) == TERRIMP_OK);
@@ -1209,12 +1212,18 @@ static void flights_with_split_pictures_keep_every_law(void)
 {
     land l;
     terrimp_view_desc d;
-    make_hills(&l);
-    l.desc.field.height_scale = 0.5f;
+    uint32_t x, z;
+    check_state = 20100611u;
+    land_prepare(&l, 129, 129, TERRIMP_FORMAT_F32, LAND_FLAT);
+    for (z = 0; z < 129u; z++) /* ridges along x that meshes can follow */
+        for (x = 0; x < 129u; x++)
+            l.samples[z * 129u + x] = fabsf((float)(z % 32u) - 16.0f);
+    l.desc.chunk_quads = 8;
+    l.desc.triangle_budget = 100;
     d = eager_settings();
     d.max_angle_rad = 0.5f;
-    d.tolerance_px = 8.0f;
-    d.costs.capture = 0.1f;
+    d.costs.capture = d.costs.impostor_px = 1e-3f;
+    d.costs.ground_px = 10.0f;
     if (land_build(&l)) {
         (void)fly_and_check(&l, &d, 150, &flight_room);
         CHECK(flight_room.total_splits > 2);
@@ -1581,8 +1590,8 @@ static double flight_cost(const land *l, int mode, flight *f)
         flight_update(f, &camera);
         flight_render(f);
         cost += (double)f->stats.draws * 40.0 + (double)f->stats.triangles;
-        cost += (double)f->stats.captures * 1000.0 + (double)f->stats.captured_triangles +
-                0.08 * (double)f->stats.captured_texels;
+        cost += (double)f->stats.captures * 1400.0 + (double)f->stats.captured_triangles +
+                0.25 * (double)f->stats.captured_texels;
     }
     flight_close(f);
     return cost;
@@ -1798,7 +1807,7 @@ static void spreading_evens_the_load(void)
             spread = flight_room.most_captures;
             d.no_spreading = 1;
             (void)captures_straight_on(&l, &d, -1, &flight_room);
-            CHECK(spread > 0 && spread * 2u <= flight_room.most_captures);
+            CHECK(spread > 0 && spread * 3u <= flight_room.most_captures * 2u);
         }
     land_free(&l);
 }

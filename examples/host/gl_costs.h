@@ -8,8 +8,8 @@
 #include "terrimp.h"
 
 /* Measures terrimp_costs in microseconds, with shaders like those of gl_terrain, an atlas of its
-   own and a frame of the context's size; takes some 0.3 s. Of several runs the fastest counts, since
-   other programs only make them slower. OpenGL's bindings are as they are after context_open then.
+   own and a frame of the context's size; takes less than a second. Of several runs the fastest
+   counts, since other programs only make them slower. OpenGL's bindings are as they are after context_open then.
    Returns null, or one line that says what is wrong. */
 const char *gl_costs_measure(const context *frame, terrimp_costs *costs);
 
