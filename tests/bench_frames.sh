@@ -88,10 +88,10 @@ measure_tolerances() # scene options...
 {
     scene=$1
     shift
-    for tolerance in 0.5 1 2 4 8; do
+    for tolerance in 0.5 1 2 4 8 16; do
         measure_geomip "$scene, $tolerance px" "$@" --tolerance $tolerance
     done
-    for tolerance in 0.5 1 2 4 8; do
+    for tolerance in 0.5 1 2 4 8 16; do
         measure_geomip "$scene, bound $tolerance px" "$@" --tolerance $tolerance --rule bound
     done
     measure_geomip "$scene, 1 px, morphing 1.5" "$@" --morph 1.5
