@@ -826,8 +826,8 @@ static void no_hole_between_mipmapped_nodes(void)
     scene_close(&s);
 }
 
-/* Background below the topmost ground of each column. With a level camera that is a hole, or the far
-   end of a valley that runs to the terrain's edge. */
+/* Background below the topmost ground of each column. With a level camera that is a hole, or the
+   far end of a valley that runs to the terrain's edge. */
 static size_t count_below_ground(const scene *s, const uint8_t *picture)
 {
     size_t count = 0;
