@@ -1796,7 +1796,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
    Errors     E_NULL; those of terrimp_camera_resolve; E_CAPACITY when more than max_ground chunks
-              are in sight in mode FULL or IMPOSTOR: the frame before stays
+              are in sight in mode FULL or IMPOSTOR: the frame before stays. In GEOMIP and AUTO
+              E_CAPACITY when even ground at 1000 px needs more nodes: there is no frame then
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
@@ -10570,8 +10571,10 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
             float tolerance = v->desc.ground_tolerance_px * v->ground_scale;
             v->ground.tolerance_px = terrimpi_min(tolerance, 1000.0f);
             result = terrimp_geomip_select(&v->terrain->tree, &v->ground, &v->camera);
-            if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f)
+            if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f) {
+                v->outdated = 1; /* select has written over the list of the frame before */
                 return result;
+            }
             if (result == TERRIMP_E_CAPACITY)
                 v->ground_scale *= 1.3f;
         }

@@ -12,7 +12,7 @@ names=${*:-$(ls tests/fuzz_*.c | sed 's/.*fuzz_//; s/[.]c$//')}
 work=build/fuzz
 mkdir -p $work
 flags="-std=c99 -g -Wall -Wextra -Wno-unused-function -I."
-sanitize="-fsanitize=address,undefined -fno-sanitize-recover=all"
+sanitize="-fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
 CC=${CC:-cc}
 
 sanitizers_work()

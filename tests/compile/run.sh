@@ -30,11 +30,15 @@ builds_and_runs()
 # is private to a file and half used has unused functions, and this is no fault.
 ways()
 {
+    freestanding=-ffreestanding
+    case $1 in
+    clang++*) freestanding= ;; # it would mangle the name of main
+    esac
     check "$1: included several times"      builds_and_runs "$2" twice.c
     check "$1: inside extern C"             builds_and_runs "$2" extern_c.c
     check "$1: after macros like windows.h" builds_and_runs "$2" windows.c
     check "$1: without malloc"              builds_and_runs "$2" no_malloc.c
-    check "$1: as without a system"         builds_and_runs "$2 -ffreestanding" bare.c
+    check "$1: as without a system"         builds_and_runs "$2 $freestanding" bare.c
     check "$1: without building, from a bake" \
         builds_and_runs "$2 -Wno-unused-function" no_build.c bake_maker.c
     check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c

@@ -37,6 +37,11 @@ while [ $call -lt 17 ]; do
     call=$((call + 1))
 done
 
+# What was found once: a pair of atlases is asked for a picture of 2^32 - 1 texels.
+field='\000\000\000\001\000'
+seed functions pair-huge \
+    "$field\017\002\310\310\001\000\024\024\001\011\024\001\024\024"
+
 # Elevation files behind six bytes: name (0 .hgt, 3 .pgm, 4 raw), raw format, width, depth, crop.
 hgt='\000\000\000\000\000'
 pgm='\003\000\000\000\000'
