@@ -51,7 +51,7 @@ minimal_repeats()
 }
 
 check "minimal builds with the command in its first comment, and runs" minimal_runs
-check "minimal captures in its first frame and hardly any later" minimal_captures
+check "minimal captures, and draws its pictures" minimal_captures
 check "minimal draws something in each of its 8 frames" minimal_draws_all
 check "minimal prints the same again" minimal_repeats
 
