@@ -9606,7 +9606,7 @@ static size_t terrimpi_bake_arrays(const terrimp_terrain *t)
 {
     terrimp_terrain counted = *t;
     size_t bytes = terrimpi_terrain_layout(&counted, NULL);
-    return bytes > UINT32_MAX - sizeof(terrimpi_bake) ? 0 : bytes;
+    return bytes > 0xffffffffu - sizeof(terrimpi_bake) ? 0 : bytes;
 }
 
 TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
@@ -10010,6 +10010,7 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #define TERRIMPI_AHEAD 0.6f       /* ... that a new picture starts with: its eye lies ahead */
 #define TERRIMPI_LONGEST_LIFE 600.0f /* [frames] of a picture, for the cost model */
 #define TERRIMPI_FLIP 1.25f       /* how much cheaper the other kind must be to be changed to */
+#define TERRIMPI_SEEN 0.4f        /* of the pixels of a picture, that the screen shows */
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
@@ -10837,8 +10838,7 @@ static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
     want->record = v->record_of[want->site.node];
     want->pixels = k * k * (capture.tan_right - capture.tan_left) *
                    (capture.tan_up - capture.tan_down);
-    want->draw_cost = costs->draw + costs->triangle * (float)(mesh.index_count / 3u) +
-                      costs->impostor_px * want->pixels;
+    want->draw_cost = costs->draw + costs->triangle * (float)(mesh.index_count / 3u);
     sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
     want->life = v->desc.no_lookahead ? 1.0f : 1.0f + TERRIMPI_AHEAD;
     want->life = terrimpi_min(TERRIMPI_LONGEST_LIFE,
@@ -10862,16 +10862,16 @@ static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
 
 /* ---- ground or impostors? ---- */
 
-static float terrimpi_ground_cost(const terrimp_view *v, const terrimpi_unit *unit, float pixels)
+static float terrimpi_ground_cost(const terrimp_view *v, const terrimpi_unit *unit)
 {
     const terrimp_costs *costs = &v->desc.costs;
     float quads = (float)v->terrain->desc.chunk_quads;
-    return (float)unit->leaf_count * (costs->draw + costs->triangle * 2.0f * quads * quads) +
-           costs->ground_px * pixels;
+    return (float)unit->leaf_count * (costs->draw + costs->triangle * 2.0f * quads * quads);
 }
 
 /* Decides for a unit whether impostors pay: their draws, and their captures spread over the frames
-   that they last, against the ground's draws. */
+   that they last, against the ground's draws. Both shade the same pixels: what that costs alike is
+   left out, or it would hide how much dearer the rest of one is. */
 static void terrimpi_decide(terrimp_view *v, terrimpi_unit *unit, float *spread, float *drawn)
 {
     float impostors = 0.0f, captures = 0.0f, pixels = 0.0f, ground;
@@ -10885,7 +10885,10 @@ static void terrimpi_decide(terrimp_view *v, terrimpi_unit *unit, float *spread,
         pixels += want->pixels;
         ready &= terrimpi_usable(v, want->record, want->urgency);
     }
-    ground = terrimpi_ground_cost(v, unit, pixels);
+    ground = terrimpi_ground_cost(v, unit);
+    pixels *= TERRIMPI_SEEN * (v->desc.costs.impostor_px - v->desc.costs.ground_px);
+    impostors += terrimpi_max(pixels, 0.0f);
+    ground += terrimpi_max(-pixels, 0.0f);
     if (v->desc.mode == TERRIMP_MODE_AUTO && pays) {
         float all = impostors + captures;
         pays = v->prefers[node] ? all < ground * TERRIMPI_FLIP : all * TERRIMPI_FLIP < ground;
