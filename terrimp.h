@@ -6954,7 +6954,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
            TERRIMPI_FLOOR_QUADS)
         t->floor_level++;
     (void)terrimpi_mul(t->tree.node_count + 3u, t->index_stride * sizeof(float), &ok);
-    return ok && t->tree.node_count < UINT32_MAX / t->index_stride - 3u;
+    return ok && t->tree.node_count < 0xffffffffu / t->index_stride - 3u;
 }
 
 /* The one description of what is built: sets the arrays when there is a base. Returns the bytes, 0
@@ -7124,7 +7124,7 @@ static void terrimpi_make_facets(const terrimpi_patch *p, const terrimp_mesh *me
     for (i = 0; i < mesh->surface_index_count; i += 3u, facets++) {
         const uint16_t *corner = mesh->indices + i;
         memset(facets, 0, sizeof *facets);
-        facets->low = UINT32_MAX;
+        facets->low = 0xffffffffu;
         for (k = 0; k < 3u; k++)
             terrimpi_add_side(p, mesh->vertices + corner[k],
                               mesh->vertices + corner[k == 2u ? 0 : k + 1u], facets);
@@ -7912,7 +7912,7 @@ static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t 
 
 /* Pattern 0 is the whole node, as geomip pattern 0; then come, for each strip width but the whole,
    the strips of the eight neighbours, behind all geomip patterns. Returns where pattern `wanted`
-   stands, or with UINT32_MAX the end of all. */
+   stands, or with 0xffffffffu the end of all. */
 static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
@@ -7991,7 +7991,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->level_count = tree->level_count;
     info->node_count = tree->node_count;
     info->ground_vertex_count = (quads + 1u) * (quads + 1u);
-    info->ground_index_count = terrimpi_find_pattern(quads, UINT32_MAX).first_index;
+    info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
     info->mesh_vertex_count = tree->node_count * terrain->vertex_stride +
@@ -8012,7 +8012,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     if (!terrain->built)
         return TERRIMP_E_STATE;
     quads = terrain->desc.chunk_quads;
-    if (capacity < terrimpi_find_pattern(quads, UINT32_MAX).first_index)
+    if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
         return TERRIMP_E_CAPACITY;
     terrimp_pattern_fill(quads, TERRIMP_FORM_LIST, indices, capacity);
     strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
@@ -8348,7 +8348,7 @@ static size_t terrimpi_bake_arrays(const terrimp_terrain *t)
 {
     terrimp_terrain counted = *t;
     size_t bytes = terrimpi_terrain_layout(&counted, NULL);
-    return bytes > UINT32_MAX - sizeof(terrimpi_bake) ? 0 : bytes;
+    return bytes > 0xffffffffu - sizeof(terrimpi_bake) ? 0 : bytes;
 }
 
 TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
