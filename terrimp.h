@@ -9744,14 +9744,31 @@ static int terrimpi_loop_ok(const terrimpi_point *points, uint32_t count, uint32
     return 1;
 }
 
-/* Whether the triangles of a surface face up, have corners that exist, and cover its node. */
+/* A number for a directed edge that has nothing to do with those of others. */
+static uint32_t terrimpi_edge_hash(uint32_t from, uint32_t to)
+{
+    uint32_t hash = terrimpi_hash(0, from << 8 | to);
+    hash = terrimpi_hash(hash >> 15, hash);
+    return terrimpi_hash(hash >> 13, hash);
+}
+
+/* What an edge adds to the sum over a surface; the same edge the other way takes it off. */
+static uint32_t terrimpi_edge_sum(uint32_t from, uint32_t to)
+{
+    return terrimpi_edge_hash(from, to) - terrimpi_edge_hash(to, from);
+}
+
+/* Whether the triangles of a surface face up, have corners that exist, and cover its node: that
+   inner edges have two sides, and border edges one, is told from a sum over all. */
 static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const terrimpi_patch *p)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
     const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
     const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
     int64_t area, all = 0;
-    uint32_t i, k;
+    uint32_t i, k, edges = 0, border = mesh->border_count;
+    for (i = 0; i < border; i++)
+        edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
         int64_t x[3], z[3];
         for (k = 0; k < 3u; k++) {
@@ -9764,8 +9781,10 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const te
         if (area <= 0)
             return 0;
         all += area;
+        for (k = 0; k < 3u; k++)
+            edges += terrimpi_edge_sum(corners[k], corners[k == 2u ? 0 : k + 1u]);
     }
-    return all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
+    return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
 
 /* Whether all numbers of one node are what building could have made. */

@@ -375,7 +375,7 @@ static void every_false_number_of_a_bake_is_refused(void)
     static const float bad[] = {-1.0f, FLT_MAX, 0.0f};
     baked_land b;
     uint32_t kind;
-    for (kind = 0; bake_sized(&b, 3) && kind < 29; kind++) {
+    for (kind = 0; bake_sized(&b, 2) && kind < 29; kind++) {
         terrimpi_bake *bake = (terrimpi_bake *)(void *)b.block;
         terrimp_terrain t;
         uint32_t node = random_range(0, b.l.info.node_count - 1u);
@@ -414,7 +414,7 @@ static void every_false_number_of_a_bake_is_refused(void)
         case 20: corners[1] = mesh->vertex_count; break;
         case 21: corners[0] = corners[1]; break;
         case 22: points[1].x = 1; break;
-        case 23: points[mesh->border_count].z = 17; break;
+        case 23: points[mesh->vertex_count - 1].z = 17; break;
         case 24: points[0].z = 1; break;
         case 25: points[0].height = 65535; break;
         case 26: points[mesh->vertex_count - 1].height = 0; break;
@@ -426,6 +426,22 @@ static void every_false_number_of_a_bake_is_refused(void)
             fprintf(stderr, "kind %u\n", (unsigned)kind);
         CHECK(baked_open(&b) == TERRIMP_E_BAKE);
         baked_free(&b);
+    }
+    baked_free(&b);
+}
+
+/* A surface of the right area that covers one half twice and the other not at all. */
+static void surfaces_with_holes_are_refused(void)
+{
+    baked_land b;
+    if (bake_sized(&b, 0)) {
+        terrimp_terrain t;
+        CHECK(terrimpi_bake_header((terrimpi_bake *)(void *)b.block, b.bytes, &t));
+        terrimpi_bake_arrays_at(&t, b.block);
+        CHECK(t.meshes[0].triangle_count == 2);
+        memcpy(t.corners, t.corners + 3, 3);
+        forge_checksum(b.block);
+        CHECK(baked_open(&b) == TERRIMP_E_BAKE);
     }
     baked_free(&b);
 }
@@ -662,6 +678,7 @@ static void bake_tests(void)
     RUN(bakes_of_the_other_byte_order_convert);
     RUN(damaged_bakes_do_no_harm);
     RUN(every_false_number_of_a_bake_is_refused);
+    RUN(surfaces_with_holes_are_refused);
     RUN(truncated_bakes_are_refused);
     RUN(bakes_may_have_company);
     RUN(rebuilt_terrains_equal_those_built_anew);
