@@ -551,7 +551,7 @@ static void live_free_all(live_model *m)
 static void live_slots_keep_apart_inside_and_find_all_room(void)
 {
     int run, step, failed = 0;
-    for (run = 0; run < 40; run++) {
+    for (run = 0; run < 16; run++) {
         live_model m;
         uint32_t width = random_range(1, 200), height = random_range(1, 200);
         uint32_t most = random_range(1, 60), padding = run % 4 == 0 ? random_range(0, 30) : 1;
@@ -569,7 +569,7 @@ static void live_slots_keep_apart_inside_and_find_all_room(void)
         CHECK(live_alloc(&m, 1, 1) == TERRIMP_E_CAPACITY);
         live_close(&m);
     }
-    CHECK(failed > 1000);
+    CHECK(failed > 300);
 }
 
 /* What a slot may take of a free rectangle. */
@@ -602,7 +602,7 @@ static int live_is_free(const live_model *m, const terrimp_rect *rect)
 static void live_holes_are_maximal(void)
 {
     int run, step;
-    for (run = 0; run < 20; run++) {
+    for (run = 0; run < 6; run++) {
         live_model m;
         live_open(&m, random_range(20, 300), random_range(20, 300), random_range(0, 3), LIVE_SLOTS);
         for (step = 0; step < 150; step++) {
@@ -646,7 +646,7 @@ static uint32_t live_contact(const live_model *m, const terrimp_rect *place)
 static void live_slots_go_where_they_fit_best(void)
 {
     int run, step, choices = 0;
-    for (run = 0; run < 10; run++) {
+    for (run = 0; run < 6; run++) {
         live_model m;
         live_open(&m, random_range(20, 200), random_range(20, 200), random_range(0, 3), LIVE_SLOTS);
         for (step = 0; step < 150; step++) {
@@ -688,13 +688,13 @@ static void live_slots_go_where_they_fit_best(void)
         }
         live_close(&m);
     }
-    CHECK(choices > 500);
+    CHECK(choices > 200);
 }
 
 static void live_statistics_count_what_is_there(void)
 {
     int run, step;
-    for (run = 0; run < 20; run++) {
+    for (run = 0; run < 8; run++) {
         live_model m;
         uint32_t width = random_range(50, 300), height = random_range(50, 300);
         live_open(&m, width, height, random_range(0, 2), LIVE_SLOTS);
@@ -731,8 +731,8 @@ static void live_statistics_count_what_is_there(void)
 /* What room says fits, has the shape that was asked for, and is as large as can be. */
 static void live_room_is_the_largest_of_its_shape(void)
 {
-    int run, step, reduced = 0, nothing = 0;
-    for (run = 0; run < 20; run++) {
+    int run, step, reduced = 0;
+    for (run = 0; run < 10; run++) {
         live_model m;
         live_open(&m, random_range(20, 300), random_range(20, 300), random_range(0, 3), LIVE_SLOTS);
         for (step = 0; step < 150; step++) {
@@ -747,7 +747,6 @@ static void live_room_is_the_largest_of_its_shape(void)
                 CHECK(w > 0 ? live_fits(&m, w, h)
                             : !live_fits(&m, (width - 1u) / height + 1u,
                                          (height - 1u) / width + 1u));
-                nothing += w == 0;
                 continue;
             }
             reduced++;
@@ -756,7 +755,7 @@ static void live_room_is_the_largest_of_its_shape(void)
         }
         live_close(&m);
     }
-    CHECK(reduced > 100 && nothing > 0);
+    CHECK(reduced > 50);
 }
 
 /* What eviction costs at a place; negative where a slot stays. */
@@ -803,7 +802,7 @@ static double live_cheapest(const live_model *m, uint32_t width, uint32_t height
 static void live_eviction_frees_what_costs_least(void)
 {
     int run, step, evicted = 0, refused = 0, out_of_handles = 0;
-    for (run = 0; run < 30; run++) {
+    for (run = 0; run < 18; run++) {
         live_model m;
         live_open(&m, random_range(20, 200), random_range(20, 200), random_range(0, 3),
                   run % 3 ? LIVE_SLOTS : random_range(1, 12));
@@ -845,7 +844,7 @@ static void live_eviction_frees_what_costs_least(void)
         }
         live_close(&m);
     }
-    CHECK(evicted > 500 && refused > 100 && out_of_handles > 30);
+    CHECK(evicted > 300 && refused > 50 && out_of_handles > 20);
 }
 
 /* Where the memory for free rectangles is too small some room is overlooked, but slots still keep
@@ -853,7 +852,7 @@ static void live_eviction_frees_what_costs_least(void)
 static void live_atlas_survives_a_full_list_of_holes(void)
 {
     int run, step;
-    for (run = 0; run < 60; run++) {
+    for (run = 0; run < 30; run++) {
         live_model m;
         live_open(&m, 150, 100, 1, LIVE_SLOTS);
         m.atlas.max_holes = random_range(1, 12);
