@@ -7815,12 +7815,9 @@ static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint3
    contain, which touch it. */
 static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, first, old;
+    uint32_t i, first = terrimpi_holes_part(atlas, 0, freed), old = atlas->hole_count;
     int beside;
-    if (atlas->hole_count == atlas->max_holes)
-        atlas->hole_count--;
-    first = terrimpi_holes_part(atlas, 0, freed);
-    old = atlas->hole_count;
+    /* There is memory for one more: what was cut last has left its place. */
     atlas->holes[atlas->hole_count++] = terrimpi_live_whole(atlas);
     /* What lies beside, above or below cuts most: with it first, the list stays short. */
     for (beside = 1; beside >= 0; beside--)
@@ -7979,7 +7976,7 @@ static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
     }
 }
 
-/* Searches at the corners of holes and slots, where there are very many at every so manieth.
+/* Searches at the corners of holes and slots; where these are very many, of every n-th.
    Returns 0 when all such places hold a slot that stays. */
 static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
 {

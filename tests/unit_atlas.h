@@ -552,7 +552,7 @@ static void live_free_all(live_model *m)
 static void live_slots_keep_apart_inside_and_find_all_room(void)
 {
     int run, step, failed = 0;
-    for (run = 0; run < 40; run++) {
+    for (run = 0; run < 16; run++) {
         live_model m;
         uint32_t width = random_range(1, 200), height = random_range(1, 200);
         uint32_t most = random_range(1, 60), padding = run % 4 == 0 ? random_range(0, 30) : 1;
@@ -570,13 +570,132 @@ static void live_slots_keep_apart_inside_and_find_all_room(void)
         CHECK(live_alloc(&m, 1, 1) == TERRIMP_E_CAPACITY);
         live_close(&m);
     }
-    CHECK(failed > 1000);
+    CHECK(failed > 300);
+}
+
+/* What a slot may take of a free rectangle. */
+static terrimp_rect live_unpadded(const live_model *m, const terrimp_rect *hole)
+{
+    terrimp_rect rect = *hole;
+    uint32_t padding = m->atlas.desc.padding;
+    rect.width = rect.width > padding ? rect.width - padding : 0;
+    rect.height = rect.height > padding ? rect.height - padding : 0;
+    return rect;
+}
+
+/* Whether a rectangle, padding included, is free and within the atlas. */
+static int live_is_free(const live_model *m, const terrimp_rect *rect)
+{
+    uint32_t padding = m->atlas.desc.padding, k;
+    if (!rect_within(rect, m->atlas.desc.width + padding, m->atlas.desc.height + padding))
+        return 0;
+    for (k = 0; k < m->atlas.desc.max_slots; k++) {
+        terrimp_rect slot = m->taken[k];
+        slot.width += padding;
+        slot.height += padding;
+        if (m->taken[k].width > 0 && rects_overlap(rect, &slot, 0))
+            return 0;
+    }
+    return 1;
+}
+
+/* The holes are free, none can grow to any side, and none is there twice. */
+static void live_holes_are_maximal(void)
+{
+    int run, step;
+    for (run = 0; run < 6; run++) {
+        live_model m;
+        live_open(&m, random_range(20, 300), random_range(20, 300), random_range(0, 3), LIVE_SLOTS);
+        for (step = 0; step < 150; step++) {
+            uint32_t i, k, side;
+            live_churn(&m, 2, 60);
+            for (i = 0; i < m.atlas.hole_count; i++) {
+                const terrimp_rect *hole = &m.atlas.holes[i];
+                CHECK(hole->width > 0 && hole->height > 0 && live_is_free(&m, hole));
+                for (side = 0; side < 4; side++) {
+                    terrimp_rect larger = *hole;
+                    larger.x -= side == 0;
+                    larger.y -= side == 1;
+                    larger.width += side == 0 || side == 2;
+                    larger.height += side == 1 || side == 3;
+                    CHECK((side == 0 && hole->x == 0) || (side == 1 && hole->y == 0) ||
+                          !live_is_free(&m, &larger));
+                }
+                for (k = 0; k < i; k++)
+                    CHECK(memcmp(hole, &m.atlas.holes[k], sizeof *hole) != 0);
+            }
+        }
+        live_close(&m);
+    }
+}
+
+/* Texels beside a padded place that are not free. */
+static uint32_t live_contact(const live_model *m, const terrimp_rect *place)
+{
+    uint32_t i, contact = 0, side;
+    for (side = 0; side < 4; side++)
+        for (i = 0; i < (side < 2 ? place->height : place->width); i++) {
+            terrimp_rect texel = {0, 0, 1, 1};
+            texel.x = place->x + (side == 0 ? 0xffffffffu : side == 1 ? place->width : i);
+            texel.y = place->y + (side == 2 ? 0xffffffffu : side == 3 ? place->height : i);
+            contact += !live_is_free(m, &texel);
+        }
+    return contact;
+}
+
+/* A slot goes into the smallest hole that takes it, to the corner where it touches most. */
+static void live_slots_go_where_they_fit_best(void)
+{
+    int run, step, choices = 0;
+    for (run = 0; run < 6; run++) {
+        live_model m;
+        live_open(&m, random_range(20, 200), random_range(20, 200), random_range(0, 3), LIVE_SLOTS);
+        for (step = 0; step < 150; step++) {
+            uint32_t padding = m.atlas.desc.padding, k, corner, slot, smallest = 0xffffffffu;
+            terrimp_rect hole = {0, 0, 0, 0}, rect, place;
+            uint32_t width = random_range(1, 30), height = random_range(1, 30), most = 0;
+            live_model before;
+            live_churn(&m, 2, 40);
+            if (m.count == LIVE_SLOTS)
+                live_free(&m, 0);
+            for (k = 0; k < m.atlas.hole_count; k++) {
+                const terrimp_rect *h = &m.atlas.holes[k];
+                if (h->width >= width + padding && h->height >= height + padding &&
+                    h->width * h->height < smallest) {
+                    smallest = h->width * h->height;
+                    hole = *h;
+                }
+            }
+            if (smallest == 0xffffffffu)
+                continue;
+            before = m;
+            CHECK(terrimp_live_atlas_alloc(&m.atlas, width, height, &slot) == TERRIMP_OK);
+            CHECK(terrimp_live_atlas_rect(&m.atlas, slot, &rect) == TERRIMP_OK);
+            m.taken[slot] = rect;
+            m.count++;
+            rect.width += padding;
+            rect.height += padding;
+            CHECK(rect.x == hole.x || rect.x + rect.width == hole.x + hole.width);
+            CHECK(rect.y == hole.y || rect.y + rect.height == hole.y + hole.height);
+            for (corner = 0; corner < 4; corner++) {
+                place = rect;
+                place.x = hole.x + (corner & 1u ? hole.width - rect.width : 0u);
+                place.y = hole.y + (corner & 2u ? hole.height - rect.height : 0u);
+                k = live_contact(&before, &place);
+                choices += corner > 0 && k != most;
+                most = k > most ? k : most;
+            }
+            CHECK(live_contact(&before, &rect) == most);
+        }
+        live_close(&m);
+    }
+    CHECK(choices > 200);
 }
 
 static void live_statistics_count_what_is_there(void)
 {
     int run, step;
-    for (run = 0; run < 20; run++) {
+    for (run = 0; run < 8; run++) {
         live_model m;
         uint32_t width = random_range(50, 300), height = random_range(50, 300);
         live_open(&m, width, height, random_range(0, 2), LIVE_SLOTS);
@@ -589,7 +708,14 @@ static void live_statistics_count_what_is_there(void)
                 texels += m.taken[k].width * m.taken[k].height * (m.taken[k].width > 0);
             CHECK(stats.slots == m.count && stats.texels_used == texels);
             CHECK(stats.texels_free == width * height - texels && stats.failures == m.failures);
-            if (stats.largest_width > 0 && m.count < LIVE_SLOTS) {
+            for (k = 0; k < m.atlas.hole_count; k++) {
+                terrimp_rect hole = live_unpadded(&m, &m.atlas.holes[k]);
+                CHECK(hole.width * hole.height <= stats.largest_width * stats.largest_height);
+            }
+            if (m.count == LIVE_SLOTS)
+                continue;
+            CHECK(stats.largest_width > 0 ? stats.largest_height > 0 : !live_fits(&m, 1, 1));
+            if (stats.largest_width > 0) {
                 CHECK(live_fits(&m, stats.largest_width, stats.largest_height));
                 CHECK(!live_fits(&m, stats.largest_width + 1u, stats.largest_height));
                 CHECK(!live_fits(&m, stats.largest_width, stats.largest_height + 1u));
@@ -606,8 +732,8 @@ static void live_statistics_count_what_is_there(void)
 /* What room says fits, has the shape that was asked for, and is as large as can be. */
 static void live_room_is_the_largest_of_its_shape(void)
 {
-    int run, step, reduced = 0, nothing = 0;
-    for (run = 0; run < 20; run++) {
+    int run, step, reduced = 0;
+    for (run = 0; run < 10; run++) {
         live_model m;
         live_open(&m, random_range(20, 300), random_range(20, 300), random_range(0, 3), LIVE_SLOTS);
         for (step = 0; step < 150; step++) {
@@ -622,7 +748,6 @@ static void live_room_is_the_largest_of_its_shape(void)
                 CHECK(w > 0 ? live_fits(&m, w, h)
                             : !live_fits(&m, (width - 1u) / height + 1u,
                                          (height - 1u) / width + 1u));
-                nothing += w == 0;
                 continue;
             }
             reduced++;
@@ -631,7 +756,7 @@ static void live_room_is_the_largest_of_its_shape(void)
         }
         live_close(&m);
     }
-    CHECK(reduced > 100 && nothing > 0);
+    CHECK(reduced > 50);
 }
 
 /* What eviction costs at a place; negative where a slot stays. */
@@ -678,7 +803,7 @@ static double live_cheapest(const live_model *m, uint32_t width, uint32_t height
 static void live_eviction_frees_what_costs_least(void)
 {
     int run, step, evicted = 0, refused = 0, out_of_handles = 0;
-    for (run = 0; run < 30; run++) {
+    for (run = 0; run < 18; run++) {
         live_model m;
         live_open(&m, random_range(20, 200), random_range(20, 200), random_range(0, 3),
                   run % 3 ? LIVE_SLOTS : random_range(1, 12));
@@ -720,7 +845,7 @@ static void live_eviction_frees_what_costs_least(void)
         }
         live_close(&m);
     }
-    CHECK(evicted > 500 && refused > 100 && out_of_handles > 30);
+    CHECK(evicted > 300 && refused > 50 && out_of_handles > 20);
 }
 
 /* Where the memory for free rectangles is too small some room is overlooked, but slots still keep
@@ -728,13 +853,15 @@ static void live_eviction_frees_what_costs_least(void)
 static void live_atlas_survives_a_full_list_of_holes(void)
 {
     int run, step;
-    for (run = 0; run < 60; run++) {
+    for (run = 0; run < 30; run++) {
         live_model m;
         live_open(&m, 150, 100, 1, LIVE_SLOTS);
         m.atlas.max_holes = random_range(1, 12);
+        memset(&m.atlas.holes[m.atlas.max_holes], UNTOUCHED, sizeof(terrimp_rect));
         for (step = 0; step < 300; step++) {
             live_churn(&m, 2, 40);
             CHECK(m.atlas.hole_count <= m.atlas.max_holes);
+            CHECK(is_untouched(&m.atlas.holes[m.atlas.max_holes], sizeof(terrimp_rect)));
         }
         live_free_all(&m);
         CHECK(live_alloc(&m, 150, 100) == TERRIMP_OK);
@@ -916,6 +1043,8 @@ static void atlas_tests(void)
     RUN(pair_reduces_what_does_not_fit);
     RUN(pair_reports_when_nothing_fits);
     RUN(live_slots_keep_apart_inside_and_find_all_room);
+    RUN(live_holes_are_maximal);
+    RUN(live_slots_go_where_they_fit_best);
     RUN(live_statistics_count_what_is_there);
     RUN(live_room_is_the_largest_of_its_shape);
     RUN(live_eviction_frees_what_costs_least);
