@@ -11287,7 +11287,7 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
 {
     const terrimp_view_desc *d = &v->desc;
     uint32_t i, count, put_off = 0, due = 0, texels = 0, triangles = 0;
-    float allowance = terrimpi_max(1.5f * spread, drawn), spent = 0.0f, angle, parallax;
+    float allowance = terrimpi_max(2.0f * spread, drawn), spent = 0.0f, angle, parallax;
     if (v->open && terrimpi_judge(v, v->opened.captures[0].eye, &v->opened.site, &angle,
                                   &parallax) >= TERRIMPI_STALE) {
         terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
