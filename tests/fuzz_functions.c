@@ -237,7 +237,7 @@ static void judge_picture(void)
 static void use_patterns(void)
 {
     uint32_t quads = fuzz_u8() & 7u ? 4u + 2u * fuzz_below(7) : fuzz_size(200), i, count;
-    int form = (int)fuzz_below(4) - (fuzz_u8() == 0);
+    int form = (int)fuzz_below(5) - (fuzz_u8() == 0);
     terrimp_pattern found;
     (void)terrimp_pattern_find(quads, form, fuzz_size(16), &found);
     count = terrimp_pattern_index_count(quads, form);
@@ -246,7 +246,7 @@ static void use_patterns(void)
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count - 1u) == TERRIMP_E_CAPACITY);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count) == TERRIMP_OK);
         for (i = 0; i < count; i++)
-            FUZZ_CHECK(indices[i] < (quads + 1u) * (quads + 1u));
+            FUZZ_CHECK(indices[i] < terrimp_pattern_vertex_count(quads, form));
         free(indices);
     }
 }
@@ -257,7 +257,8 @@ static void draw_node(const terrimp_geomip *tree, const terrimp_geomip_draw *dra
     terrimp_geomip_vertex *vertices = (terrimp_geomip_vertex *)fuzz_take(count * sizeof *vertices);
     float *xyz = (float *)fuzz_take(count * 3u * sizeof *xyz);
     FUZZ_CHECK(terrimp_geomip_fill_vertices(tree, draw->node, xyz, vertices) == TERRIMP_OK);
-    FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, draw, vertices, xyz + 1, 3) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, TERRIMP_FORM_LIST, draw, vertices, xyz + 1,
+                                    3) == TERRIMP_OK);
     FUZZ_CHECK(fuzz_finite(xyz, count * 3u));
     free(xyz);
     free(vertices);
@@ -311,7 +312,8 @@ static void use_geomip(void)
     free(tree.nodes);
     weights = (terrimp_geomip_weights *)fuzz_take((size_t)(tree.chunk_quads + 1u)
                                                   * (tree.chunk_quads + 1u) * sizeof *weights);
-    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, TERRIMP_FORM_LIST, weights) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, TERRIMP_FORM_LIST, weights) ==
+               TERRIMP_OK);
     free(weights);
 }
 

@@ -305,7 +305,7 @@ static GLuint make_texture(GLint least, GLint most)
     return texture;
 }
 
-/* Texel centres lie on the samples; where OpenGL's largest texture is too small, on some of them. */
+/* Texel centres lie on the samples; on some of them where OpenGL's largest texture is too small. */
 static int make_lightmap(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *rgb,
                          uint32_t limit)
 {

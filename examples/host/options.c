@@ -147,7 +147,8 @@ typedef enum option_id {
     DEM, FORMAT, RAW_SIZE, CROP, TERRAIN_SIZE, SEED, SPACING, HEIGHT_SCALE, MODE, SIZE, FOV, SKY,
     FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
     IMPOSTOR_PX, ATLAS, ATLAS_COUNT, MAX_CAPTURES, MAX_CAPTURE_TEXELS, MAX_CAPTURE_TRIANGLES,
-    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS, WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
+    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS,
+    WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
 } option_id;
 
 typedef struct option {
@@ -176,7 +177,7 @@ static const option table[OPTION_COUNT] = {
     { FADE, "--fade", "START,END", "distances between which ground gives way to impostors" },
     { MAX_ANGLE, "--max-angle", "DEG", "view angle that outdates a picture [5]" },
     { TOLERANCE, "--tolerance", "PIXELS", "error that outdates a picture [1]" },
-    { GROUND_TOLERANCE, "--ground-tolerance", "PIXELS", "error of ground, but in full [half of it]" },
+    { GROUND_TOLERANCE, "--ground-tolerance", "PIXELS", "error of ground [half of that]" },
     { TEXELS, "--texels", "N", "texels for a pixel in a new picture [2]" },
     { IMPOSTOR_PX, "--impostor-px", "PIXELS", "side of an impostor before it is split [320]" },
     { ATLAS, "--atlas", "N", "texels along the side of an atlas [4096]" },
