@@ -1095,6 +1095,26 @@ static terrimp_view_desc random_settings(int mode)
 
 /* ---- flights ---- */
 
+/* de Boer's demonstration: 257 x 257 samples of a byte in blocks of 17 x 17, with all that changes at
+   run time within 32 KiB. The heights and what was built may lie in read-only memory. */
+static void the_state_of_a_small_terrain_takes_32_kib(void)
+{
+    land l;
+    terrimp_view_desc d;
+    land_prepare(&l, 257, 257, TERRIMP_FORMAT_U8, LAND_HILLS);
+    l.desc.chunk_quads = 16;
+    memset(&d, 0, sizeof d);
+    d.max_impostors = 24;
+    d.max_ground = 64;
+    d.max_captures = 2;
+    d.atlas_size = 256;
+    if (land_build(&l)) {
+        size_t bytes = terrimp_view_bytes(l.terrain, &d);
+        CHECK(bytes > 0 && bytes + terrimp_terrain_open_bytes() <= 32768u);
+    }
+    land_free(&l);
+}
+
 static void view_defaults_are_those_of_the_table(void)
 {
     land l;
@@ -2000,6 +2020,7 @@ static void create_survives_every_failed_allocation(void)
 
 static void view_tests(void)
 {
+    RUN(the_state_of_a_small_terrain_takes_32_kib);
     RUN(view_defaults_are_those_of_the_table);
     RUN(ground_is_limited_only_where_it_can_be_coarse);
     RUN(flights_keep_every_law);
