@@ -1095,8 +1095,8 @@ static terrimp_view_desc random_settings(int mode)
 
 /* ---- flights ---- */
 
-/* de Boer's demonstration: 257 x 257 samples of a byte in blocks of 17 x 17, all that changes at run
-   time within 32 KiB. The heights and what was built may lie in read-only memory. */
+/* de Boer's demonstration: 257 x 257 samples of a byte in blocks of 17 x 17, and all that changes
+   at run time within 32 KiB. Heights and what was built may lie in read-only memory. */
 static void the_state_of_a_small_terrain_takes_32_kib(void)
 {
     land l;
