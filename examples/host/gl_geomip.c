@@ -4,63 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- Shaders ------------------------------------------------------------ */
-
-/* Each variant is completed by a function `height`. As in gl_terrain, all positions are taken
-   relative to the eye first. */
-#define VERTEX_HEAD                      \
-    "#version 330 core\n"                \
-    "layout(location = 0) in vec3 position;\n"
-
-#define VERTEX_MAIN                                               \
-    "uniform mat4 matrix;\n"                                      \
-    "uniform vec3 eye;\n"                                         \
-    "uniform vec4 field;\n"                                       \
-    "out vec2 uv;\n"                                              \
-    "void main() {\n"                                             \
-    "    vec3 p = vec3(position.x, height(), position.z) - eye;\n" \
-    "    uv = position.xz * field.xy + field.zw;\n"               \
-    "    gl_Position = matrix * vec4(p, 1.0);\n"                  \
-    "}\n"
-
-static const char still_vertex[] = VERTEX_HEAD
-    "float height() { return position.y; }\n" VERTEX_MAIN;
-
-/* The formula of terrimp_geomip_weights. Sides are in the order Z0, Z1, X0, X1. Vertices that two
-   nodes share get the same sums, bit for bit, since all that differs is a product with 0. */
-static const char morphing_vertex[] = VERTEX_HEAD
-    "layout(location = 1) in vec3 move;\n"
-    "layout(location = 2) in vec4 odd;\n"
-    "layout(location = 3) in vec4 even;\n"
-    "layout(location = 4) in vec4 beside;\n"
-    "layout(location = 5) in float self;\n"
-    "uniform float morph;\n"
-    "uniform vec4 side, side_coarse;\n"
-    "float height() {\n"
-    "    float factor = self * morph + dot(odd, side) + dot(even, side_coarse);\n"
-    "    vec4 border = beside * side_coarse;\n"
-    "    vec2 along = vec2(border.x + border.y, border.z + border.w);\n"
-    "    return position.y + factor * (move.x + dot(move.yz, along));\n"
-    "}\n" VERTEX_MAIN;
-
-static const char line_fragment[] =
-    "#version 330 core\n"
-    "uniform vec3 tint;\n"
-    "out vec4 colour;\n"
-    "void main() { colour = vec4(tint, 1.0); }\n";
-
 static int is_morphing(const gl_geomip *g)
 {
     return g->view.morph_ratio > 1.0f;
 }
 
-static gl_program make_program(gl_geomip *g, int index, const char *fragment)
+static gl_program make_program(const gl_geomip *g, const char *fragment)
 {
-    gl_program p = gl_program_make(is_morphing(g) ? morphing_vertex : still_vertex, fragment);
-    g->morph[index] = glGetUniformLocation(p.id, "morph");
-    g->side[index] = glGetUniformLocation(p.id, "side");
-    g->side_coarse[index] = glGetUniformLocation(p.id, "side_coarse");
-    return p;
+    return gl_program_make(is_morphing(g) ? gl_morphing_vertex : gl_ground_vertex, fragment);
 }
 
 /* ---- Opening ------------------------------------------------------------ */
@@ -154,8 +105,8 @@ static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t
         result = fill_weights(g);
     if (result != TERRIMP_OK)
         return terrimp_result_text((int)result);
-    g->ground = make_program(g, 0, gl_ground_fragment);
-    g->line = make_program(g, 1, line_fragment);
+    g->ground = make_program(g, gl_ground_fragment);
+    g->line = make_program(g, gl_line_fragment);
     if (!g->ground.id || !g->line.id)
         return "a shader does not compile";
     return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for the indices";
@@ -221,21 +172,14 @@ static void send_vertices(const gl_geomip *g)
     glUnmapBuffer(GL_ARRAY_BUFFER);
 }
 
-static void point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset)
-{
-    glEnableVertexAttribArray(location);
-    glVertexAttribPointer(location, size, type, GL_FALSE, (GLsizei)stride,
-                          (const void *)(uintptr_t)offset);
-}
-
 static void point_to_weights(const gl_geomip *g)
 {
     size_t stride = sizeof(terrimp_geomip_weights);
     glBindBuffer(GL_ARRAY_BUFFER, g->weights);
-    point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
-    point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
-    point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
-    point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
+    gl_point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
+    gl_point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
+    gl_point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
+    gl_point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
 }
 
 /* Makes what a node lacks; from then on it is resident. */
@@ -252,9 +196,9 @@ static terrimp_result make_node(gl_geomip *g, uint32_t node)
     glBindBuffer(GL_ARRAY_BUFFER, g->vertices[node]);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, g->indices);
     send_vertices(g);
-    point(0, 3, GL_FLOAT, stride, 0);
+    gl_point(0, 3, GL_FLOAT, stride, 0);
     if (is_morphing(g)) {
-        point(1, 3, GL_FLOAT, stride, 3 * sizeof(float));
+        gl_point(1, 3, GL_FLOAT, stride, 3 * sizeof(float));
         point_to_weights(g);
     }
     g->resident++;
@@ -287,31 +231,30 @@ terrimp_result gl_geomip_update(gl_geomip *g, const terrimp_camera *camera, terr
     return result;
 }
 
-static void draw_node(const gl_geomip *g, int program, const terrimp_geomip_draw *draw)
+static void draw_node(const gl_geomip *g, const gl_program *p, const terrimp_geomip_draw *draw)
 {
     const terrimp_pattern *pattern = &g->patterns[draw->pattern];
-    const float *tint = gl_geomip_colour(draw->level);
-    if (program == 1)
-        glUniform3fv(g->line.tint, 1, tint);
+    if (p == &g->line)
+        glUniform3fv(p->tint, 1, gl_geomip_colour(draw->level));
     if (is_morphing(g)) {
-        glUniform1f(g->morph[program], draw->morph);
-        glUniform4fv(g->side[program], 1, draw->side);
-        glUniform4fv(g->side_coarse[program], 1, draw->side_coarse);
+        glUniform1f(p->morph, draw->morph);
+        glUniform4fv(p->side, 1, draw->side);
+        glUniform4fv(p->side_coarse, 1, draw->side_coarse);
     }
     glBindVertexArray(g->arrays[draw->node]);
     glDrawElements(GL_TRIANGLES, (GLsizei)pattern->index_count, GL_UNSIGNED_SHORT,
                    (const void *)(uintptr_t)(pattern->first_index * sizeof(uint16_t)));
 }
 
-static terrimp_result draw_all(gl_geomip *g, int program)
+static terrimp_result draw_all(gl_geomip *g, const gl_program *p)
 {
-    const gl_program *p = program == 0 ? &g->ground : &g->line;
     terrimp_result result = TERRIMP_OK;
     uint32_t i;
     gl_terrain_turn_to_frame(g->gl);
     glUseProgram(p->id);
     glUniformMatrix4fv(p->matrix, 1, GL_FALSE, g->gl->camera_matrix);
     glUniform3fv(p->eye, 1, g->gl->camera_eye);
+    glUniform1f(p->scale, 1.0f);
     glUniform4fv(p->field, 1, g->gl->field);
     glBindTexture(GL_TEXTURE_2D, g->gl->lightmap);
     for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
@@ -319,14 +262,14 @@ static terrimp_result draw_all(gl_geomip *g, int program)
         if (!g->arrays[draw->node])
             result = make_node(g, draw->node);
         if (result == TERRIMP_OK)
-            draw_node(g, program, draw);
+            draw_node(g, p, draw);
     }
     return result;
 }
 
 terrimp_result gl_geomip_draw(gl_geomip *g)
 {
-    return draw_all(g, 0);
+    return draw_all(g, &g->ground);
 }
 
 terrimp_result gl_geomip_wireframe(gl_geomip *g)
@@ -335,7 +278,7 @@ terrimp_result gl_geomip_wireframe(gl_geomip *g)
     glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
     glEnable(GL_POLYGON_OFFSET_LINE);
     glPolygonOffset(-1.0f, -8.0f);
-    result = draw_all(g, 1);
+    result = draw_all(g, &g->line);
     glDisable(GL_POLYGON_OFFSET_LINE);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     gl_terrain_end(g->gl);

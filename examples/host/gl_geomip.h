@@ -15,7 +15,6 @@ typedef struct gl_geomip {
     uint32_t resident;               /* nodes that have vertices */
     GLuint indices, weights;
     gl_program ground, line;
-    GLint morph[2], side[2], side_coarse[2]; /* places in ground and line; -1 without morphing */
     float *xyz;                      /* of the node that is being made */
     terrimp_geomip_vertex *moves;
 } gl_geomip;

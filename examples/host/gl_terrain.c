@@ -24,7 +24,7 @@
     "    gl_Position = matrix * vec4(p * scale, 1.0);\n"          \
     "}\n"
 
-static const char ground_vertex[] = VERTEX_HEAD
+const char gl_ground_vertex[] = VERTEX_HEAD
     "float height() { return position.y; }\n" VERTEX_MAIN;
 
 /* The formula of terrimp_geomip_weights. Sides are in the order Z0, Z1, X0, X1. Vertices that two
@@ -84,7 +84,7 @@ static const char impostor_fragment[] =
     "    colour = vec4(c.rgb / c.a, 1.0);\n"
     "}\n";
 
-static const char line_fragment[] =
+const char gl_line_fragment[] =
     "#version 330 core\n"
     "uniform vec3 tint;\n"
     "out vec4 colour;\n"
@@ -134,6 +134,13 @@ gl_program gl_program_make(const char *vertex_source, const char *fragment_sourc
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
     p.tint = glGetUniformLocation(p.id, "tint");
     return p;
+}
+
+void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset)
+{
+    glEnableVertexAttribArray(location);
+    glVertexAttribPointer(location, size, type, GL_FALSE, (GLsizei)stride,
+                          (const void *)(uintptr_t)offset);
 }
 
 /* ---- Buffers and textures ----------------------------------------------- */
@@ -388,10 +395,10 @@ static const char *fill(gl_terrain *g, const terrimp_terrain *terrain,
     g->atlas_size = (GLsizei)atlas_size;
     if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
-    g->ground = gl_program_make(ground_vertex, gl_ground_fragment);
-    g->fading = gl_program_make(ground_vertex, fading_fragment);
+    g->ground = gl_program_make(gl_ground_vertex, gl_ground_fragment);
+    g->fading = gl_program_make(gl_ground_vertex, fading_fragment);
     g->impostor = gl_program_make(impostor_vertex, impostor_fragment);
-    g->line = gl_program_make(ground_vertex, line_fragment);
+    g->line = gl_program_make(gl_ground_vertex, gl_line_fragment);
     if (!g->ground.id || !g->fading.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
     set_field(g, &g->ground);
@@ -601,13 +608,6 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
               c->depth_bias);
 }
 
-static void point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset)
-{
-    glEnableVertexAttribArray(location);
-    glVertexAttribPointer(location, size, type, GL_FALSE, (GLsizei)stride,
-                          (const void *)(uintptr_t)offset);
-}
-
 /* A morphing node is a draw of its own: its factors are uniforms. */
 static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32_t slot)
 {
@@ -623,19 +623,19 @@ static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32
     glUniform4fv(g->morphing.side_coarse, 1, c->side_coarse);
     glBindVertexArray(p->array);
     glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
-    point(0, 3, GL_FLOAT, 0, vertices * 3 * sizeof(float));
+    gl_point(0, 3, GL_FLOAT, 0, vertices * 3 * sizeof(float));
     glBindBuffer(GL_ARRAY_BUFFER, p->moves);
-    point(1, 3, GL_FLOAT, sizeof *p->morph,
+    gl_point(1, 3, GL_FLOAT, sizeof *p->morph,
           vertices * sizeof *p->morph + offsetof(terrimp_geomip_vertex, move));
     glBindBuffer(GL_ARRAY_BUFFER, p->weights);
-    point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
-    point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
-    point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
-    point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
+    gl_point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
+    gl_point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
+    gl_point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
+    gl_point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
     glDrawElements(GL_TRIANGLES, (GLsizei)c->index_count, GL_UNSIGNED_SHORT,
                    index_offset(c->first_index));
     glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
-    point(0, 3, GL_FLOAT, 0, 0);
+    gl_point(0, 3, GL_FLOAT, 0, 0);
 }
 
 static void draw_ground(void *user, const terrimp_ground_command *command)

@@ -16,11 +16,17 @@ typedef struct gl_program {
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
 } gl_program;
 
-/* The shading of opaque ground, alike in every mode: the lightmap at `uv`. */
-extern const char gl_ground_fragment[];
+/* Vertices of ground as they are, and morphing ones by the formula of terrimp_geomip_weights. */
+extern const char gl_ground_vertex[], gl_morphing_vertex[];
+
+/* The shading of opaque ground, alike in every mode: the lightmap at `uv`. And outlines. */
+extern const char gl_ground_fragment[], gl_line_fragment[];
 
 /* Makes a program whose input `position` is at location 0; the id is 0 when it does not compile. */
 gl_program gl_program_make(const char *vertex_source, const char *fragment_source);
+
+/* Enables an attribute of the bound vertex array and points it into the bound buffer. */
+void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset);
 
 enum { GL_TO_FRAME = -1, GL_TO_NOTHING = -2 };
 
