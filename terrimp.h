@@ -11280,14 +11280,60 @@ static uint32_t terrimpi_fill_queue(terrimp_view *v)
     return count;
 }
 
+/* What the captures of a frame may cost, and what those that are taken do. */
+typedef struct terrimpi_spending {
+    float allowance, spread, cost;
+    uint32_t texels, triangles;
+} terrimpi_spending;
+
+/* Takes the capture of a want as the next job, whole or its first piece, if the limits allow.
+   Returns 0 when it is put off. */
+static int terrimpi_take_job(terrimp_view *v, const terrimpi_want *want, terrimpi_spending *s)
+{
+    const terrimp_view_desc *d = &v->desc;
+    terrimpi_job *job = &v->jobs[v->job_count];
+    float cost = s->cost + want->capture_cost;
+    if (v->job_count == d->max_captures ||
+        (!d->no_spreading && s->cost > 0.0f && cost > s->allowance) ||
+        (want->urgency < 1.0f && cost > s->spread) ||
+        (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
+        (d->max_capture_triangles && s->triangles >= d->max_capture_triangles) ||
+        !terrimpi_prepare_job(v, want, job))
+        return 0;
+    if (d->max_capture_texels && s->texels > 0 &&
+        s->texels + terrimpi_job_texels(job) > d->max_capture_texels) {
+        terrimpi_cancel_job(v, job);
+        return 0;
+    }
+    if (d->max_capture_triangles && s->triangles + job->triangles > d->max_capture_triangles) {
+        if (!v->open)
+            terrimpi_cut_piece(v, job, d->max_capture_triangles - s->triangles);
+        if (v->open || (s->triangles > 0 && s->triangles + terrimpi_piece_triangles(v, job) >
+                                                d->max_capture_triangles)) {
+            terrimpi_cancel_job(v, job);
+            return 0;
+        }
+        v->opened = *job;
+        v->open = job->cell_to < job->cell_count;
+    }
+    s->texels += terrimpi_job_texels(job);
+    s->triangles += terrimpi_piece_triangles(v, job);
+    s->cost += job->cost;
+    v->job_count++;
+    return 1;
+}
+
 /* Continues the picture that is being made in pieces; then takes captures from the queue as the
    limits allow. `spread` is what captures cost in the mean frame, `drawn` what the draws of this
    frame cost: together with captures for as much as that, no frame is much worse than the last. */
 static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
 {
-    const terrimp_view_desc *d = &v->desc;
-    uint32_t i, count, put_off = 0, due = 0, texels = 0, triangles = 0;
-    float allowance = terrimpi_max(2.0f * spread, drawn), spent = 0.0f, angle, parallax;
+    terrimpi_spending s;
+    uint32_t i, count, put_off = 0, due = 0;
+    float angle, parallax;
+    memset(&s, 0, sizeof s);
+    s.allowance = terrimpi_max(2.0f * spread, drawn);
+    s.spread = spread;
     if (v->open && terrimpi_judge(v, v->opened.captures[0].eye, &v->opened.site, &angle,
                                   &parallax) >= TERRIMPI_STALE) {
         terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
@@ -11298,59 +11344,24 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
         terrimpi_job *job = &v->jobs[v->job_count++];
         v->records[v->opened.record].seen = v->frame;
         *job = v->opened;
-        terrimpi_cut_piece(v, job, d->max_capture_triangles);
-        texels += terrimpi_job_texels(job);
-        triangles += terrimpi_piece_triangles(v, job);
-        spent += v->opened.cost * (float)(job->cell_to - job->cell_from) /
-                 (float)job->cell_count;
+        terrimpi_cut_piece(v, job, v->desc.max_capture_triangles);
+        s.texels = terrimpi_job_texels(job);
+        s.triangles = terrimpi_piece_triangles(v, job);
+        s.cost = v->opened.cost * (float)(job->cell_to - job->cell_from) / (float)job->cell_count;
     }
     for (i = 0; i < count; i++) {
         const terrimpi_want *want = &v->wants[v->queue[i]];
-        terrimpi_job *job = &v->jobs[v->job_count];
         int is_due = want->urgency >= 1.0f;
+        int taken = terrimpi_take_job(v, want, &s);
         due += is_due ? 1u : 0u;
-        if (v->job_count == d->max_captures ||
-            (!d->no_spreading && spent > 0.0f && spent + want->capture_cost > allowance) ||
-            (!is_due && spent + want->capture_cost > spread) ||
-            (d->max_capture_texels && texels >= d->max_capture_texels) ||
-            (d->max_capture_triangles && triangles >= d->max_capture_triangles)) {
-            put_off += is_due ? 1u : 0u;
-            continue;
-        }
-        if (!terrimpi_prepare_job(v, want, job)) {
-            put_off += is_due ? 1u : 0u;
-            continue;
-        }
-        if ((d->max_capture_texels && texels > 0 &&
-             texels + terrimpi_job_texels(job) > d->max_capture_texels) ||
-            (d->max_capture_triangles && v->open &&
-             triangles + job->triangles > d->max_capture_triangles)) {
-            terrimpi_cancel_job(v, job);
-            put_off += is_due ? 1u : 0u;
-            continue;
-        }
-        if (d->max_capture_triangles && triangles + job->triangles > d->max_capture_triangles) {
-            terrimpi_cut_piece(v, job, d->max_capture_triangles - triangles);
-            if (triangles > 0 &&
-                triangles + terrimpi_piece_triangles(v, job) > d->max_capture_triangles) {
-                terrimpi_cancel_job(v, job);
-                put_off += is_due ? 1u : 0u;
-                continue;
-            }
-            v->opened = *job;
-            v->open = job->cell_to < job->cell_count;
-        }
-        texels += terrimpi_job_texels(job);
-        triangles += terrimpi_piece_triangles(v, job);
-        spent += job->cost;
-        v->job_count++;
+        put_off += is_due && !taken ? 1u : 0u;
     }
     for (i = 0; i < v->job_count; i++) {
         v->stats.captures += v->jobs[i].part_count;
         v->stats.splits += v->jobs[i].part_count - 1u;
     }
-    v->stats.captured_texels = texels;
-    v->stats.captured_triangles = triangles;
+    v->stats.captured_texels = s.texels;
+    v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
     v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
 }
