@@ -996,7 +996,7 @@ static uint32_t fly_and_check(const land *l, const terrimp_view_desc *desc, int 
                          random_range(0, l->desc.field.depth - 1u), random_range(1, 9),
                          random_range(1, 9));
         flight_update(f, camera);
-        f->dropped = f->dropped && f->desc.max_capture_triangles; /* a picture may wait for long */
+        f->dropped = 0;
         if (random_range(0, 15) != 0) /* else a host that drops a frame */
             flight_render(f);
         else
