@@ -1145,6 +1145,38 @@ static void view_defaults_are_those_of_the_table(void)
     land_free(&l);
 }
 
+/* In AUTO the tolerance alone makes pictures coarser: fewer texels, longer lives, closer to the eye;
+   what is set stays. Other modes keep Hess' settings. */
+static void the_tolerance_rules_the_pictures_of_auto(void)
+{
+    static const struct {
+        float tolerance, sides, texels, angle;
+    } rows[] = {{0.1f, 2.0f, 2.0f, 1.0f},        {1.0f, 2.0f, 2.0f, 1.0f},
+                {1.6f, 1.25f, 1.581f, 1.265f},   {2.0f, 1.0f, 1.414f, 1.414f},
+                {4.0f, 1.0f, 1.0f, 2.0f},        {9.0f, 1.0f, 0.667f, 3.0f},
+                {100.0f, 1.0f, 0.667f, 3.0f}};
+    land l;
+    uint32_t i, mode;
+    land_prepare(&l, 70, 70, TERRIMP_FORMAT_F32, LAND_FLAT);
+    if (land_build(&l))
+        for (mode = 0; mode < TERRIMP_MODE_COUNT; mode++)
+            for (i = 0; i < sizeof rows / sizeof *rows; i++) {
+                int follows = mode == TERRIMP_MODE_DEFAULT || mode == TERRIMP_MODE_AUTO;
+                float side = 64.0f * l.desc.field.spacing_x;
+                terrimp_view_desc d, again;
+                memset(&d, 0, sizeof d);
+                d.mode = (int)mode;
+                d.tolerance_px = rows[i].tolerance;
+                CHECK(terrimp_view_desc_resolve(l.terrain, &d, &d) == TERRIMP_OK);
+                CHECK(fabsf(d.fade_start / side - (follows ? rows[i].sides : 2.0f)) < 1e-3f);
+                CHECK(fabsf(d.texels_per_px - (follows ? rows[i].texels : 2.0f)) < 1e-3f);
+                CHECK(fabsf(d.max_angle_rad / 0.0873f - (follows ? rows[i].angle : 1.0f)) < 1e-3f);
+                CHECK(terrimp_view_desc_resolve(l.terrain, &d, &again) == TERRIMP_OK);
+                CHECK(memcmp(&d, &again, sizeof d) == 0);
+            }
+    land_free(&l);
+}
+
 /* More chunks than 4096: only GEOMIP and AUTO do with fewer ground nodes. */
 static void ground_is_limited_only_where_it_can_be_coarse(void)
 {
@@ -2022,6 +2054,7 @@ static void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
     RUN(view_defaults_are_those_of_the_table);
+    RUN(the_tolerance_rules_the_pictures_of_auto);
     RUN(ground_is_limited_only_where_it_can_be_coarse);
     RUN(flights_keep_every_law);
     RUN(flights_with_the_band_inside_boxes_keep_every_law);
