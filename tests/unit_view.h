@@ -1170,7 +1170,8 @@ static void the_tolerance_rules_the_pictures_of_auto(void)
                 CHECK(terrimp_view_desc_resolve(l.terrain, &d, &d) == TERRIMP_OK);
                 CHECK(fabsf(d.fade_start / side - (follows ? rows[i].sides : 2.0f)) < 1e-3f);
                 CHECK(fabsf(d.texels_per_px - (follows ? rows[i].texels : 2.0f)) < 1e-3f);
-                CHECK(fabsf(d.max_angle_rad / 0.0873f - (follows ? rows[i].angle : 1.0f)) < 1e-3f);
+                CHECK(fabsf(d.max_angle_rad / 0.0873f - (follows ? rows[i].angle : 1.0f)) <
+                      1e-3f);
                 CHECK(terrimp_view_desc_resolve(l.terrain, &d, &again) == TERRIMP_OK);
                 CHECK(memcmp(&d, &again, sizeof d) == 0);
             }
