@@ -138,13 +138,19 @@ static void build_terrain(flyover *f)
 static void open_graphics(flyover *f)
 {
     uint8_t *lightmap = lightmap_bake(&f->field);
+    gl_terrain_desc desc;
     const char *trouble;
     if (!lightmap)
         stop("no memory for the lightmap");
+    memset(&desc, 0, sizeof desc);
+    desc.frame = &f->context;
+    desc.terrain = f->terrain;
+    desc.field = &f->field;
+    desc.lightmap = lightmap;
+    desc.atlas_size = f->chosen.desc.atlas_size;
     trouble = context_open(&f->context, (int)f->options.width, (int)f->options.height);
     if (!trouble)
-        trouble = gl_terrain_open(&f->gl, &f->context, f->terrain, &f->field, lightmap,
-                                  f->chosen.desc.atlas_size);
+        trouble = gl_terrain_open(&f->gl, &desc);
     if (!trouble && f->chosen.desc.morph_ratio > 1.0f)
         trouble = gl_terrain_use_morphing(&f->gl);
     if (trouble)

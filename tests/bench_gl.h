@@ -12,7 +12,9 @@
 static const char quad_vertex[] =
     "#version 330 core\n"
     "out vec2 uv;\n"
+    "out vec3 place;\n"
     "void main() {\n"
+    "    place = vec3(0.0);\n"
     "    uv = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));\n"
     "    gl_Position = vec4(uv * 2.0 - 1.0, 0.0, 1.0);\n"
     "}\n";
@@ -93,6 +95,7 @@ static void fine_draw(fine *f, look *l, gl_terrain *gl, terrimp_view *full,
                       terrimp_camera camera)
 {
     const context *frame = gl->frame;
+    terrimp_callbacks callbacks;
     terrimp_stats now;
     need(terrimp_view_get_stats(full, &now));
     scene_tighten(&camera, &now);
@@ -100,7 +103,9 @@ static void fine_draw(fine *f, look *l, gl_terrain *gl, terrimp_view *full,
     camera.height_px *= FINE;
     gl->frame = &f->frame;
     need(gl_terrain_begin(gl, &camera, scene_sky));
-    need(look_render(l, gl, full));
+    callbacks = look_begin(l, gl);
+    need(terrimp_view_render(full, &callbacks));
+    look_end(l);
     gl_terrain_end(gl);
     gl->frame = frame;
     context_read(&f->frame, f->large);

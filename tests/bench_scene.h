@@ -43,6 +43,7 @@ typedef struct scene {
     terrimp_heightfield field;
     terrimp_box box;
     uint8_t *lightmap;
+    const char *shading;       /* of gl_terrain_desc */
     flight flight;
     const context *context;
     terrimp_terrain *terrain[SCENE_CHUNKS]; /* by chunk size; null until it is used */
@@ -189,8 +190,16 @@ static int scene_terrain(scene *s, uint32_t chunk_quads)
 
 static void scene_open_gl(scene *s, int terrain, uint32_t atlas_size, gl_terrain *gl)
 {
-    const char *trouble = gl_terrain_open(gl, s->context, s->terrain[terrain], &s->field,
-                                          s->lightmap, atlas_size);
+    gl_terrain_desc desc;
+    const char *trouble;
+    memset(&desc, 0, sizeof desc);
+    desc.frame = s->context;
+    desc.terrain = s->terrain[terrain];
+    desc.field = &s->field;
+    desc.lightmap = s->lightmap;
+    desc.atlas_size = atlas_size;
+    desc.shading = s->shading;
+    trouble = gl_terrain_open(gl, &desc);
     if (trouble)
         scene_stop(s->desc->name, trouble);
 }

@@ -51,16 +51,6 @@ static int way_has_memory(const way *w)
     return w->mode != TERRIMP_MODE_FULL && w->mode != TERRIMP_MODE_GEOMIP;
 }
 
-/* The OpenGL side of ways that keep no pictures; the first of them dresses it. */
-static gl_terrain *open_shared_gl(const contender *c, scene *s, int terrain)
-{
-    int is_new = !s->is_open[terrain];
-    gl_terrain *gl = scene_shared_gl(s, terrain);
-    if (is_new)
-        look_dress(c->look, gl);
-    return gl;
-}
-
 static terrimp_view_desc way_describe(const way *w)
 {
     terrimp_view_desc desc;
@@ -96,14 +86,13 @@ static void contender_open(contender *c, const way *w, scene *s, look *l)
     need(terrimp_view_desc_resolve(s->terrain[terrain], &desc, &desc));
     need(terrimp_view_create(s->terrain[terrain], &desc, NULL, &c->view));
     if (!way_has_memory(w) && w->morph_ratio <= 1.0f) {
-        c->gl = open_shared_gl(c, s, terrain);
+        c->gl = scene_shared_gl(s, terrain);
         return;
     }
     c->gl = &c->own_gl;
     scene_open_gl(s, terrain, desc.atlas_size, c->gl);
     if (w->morph_ratio > 1.0f)
         look_need(gl_terrain_use_morphing(c->gl));
-    look_dress(l, c->gl);
 }
 
 static void contender_note(contender *c, double ms, double cpu_ms)
@@ -122,11 +111,14 @@ static void contender_note(contender *c, double ms, double cpu_ms)
 static void contender_draw(contender *c, terrimp_camera camera, int at_start)
 {
     double start = clock_ms(), cpu_start = clock_cpu_ms();
+    terrimp_callbacks callbacks;
     need(terrimp_view_update(c->view, &camera));
     need(terrimp_view_get_stats(c->view, &c->now));
     scene_tighten(&camera, &c->now);
     need(gl_terrain_begin(c->gl, &camera, scene_sky));
-    need(look_render(c->look, c->gl, c->view));
+    callbacks = look_begin(c->look, c->gl);
+    need(terrimp_view_render(c->view, &callbacks));
+    look_end(c->look);
     gl_terrain_end(c->gl);
     if (at_start)
         stats_add(&c->start_ms, clock_ms() - start);
