@@ -49,16 +49,17 @@
 #define MORPHING(tolerance_)                                                              \
     { .name = "geomip " #tolerance_ " px, morphing", .family = "geomip morphing",         \
       .mode = TERRIMP_MODE_GEOMIP, .tolerance_px = (float)tolerance_, .morph_ratio = 1.5f }
-/* As in the thesis but for the atlas; foreground and chunk width as in its tables: "200, 64". */
+/* As in the thesis; foreground and chunk width as in its tables: "200, 64". */
 #define HESS(foreground_, chunk_)                                                         \
     { .name = "Hess " #foreground_ ", " #chunk_, .family = "Hess " #chunk_,               \
       .mode = TERRIMP_MODE_IMPOSTOR, .chunk_quads = chunk_, .foreground = foreground_,    \
-      .angle_alone = 1 }
+      .hess = 1, .texels_per_px = 1.0f }
 
 static const way path_ways[] = {
     FULL, AUTO(0.5), AUTO(1), AUTO(2), AUTO(4), AUTO(8),
-    { .name = "Hess, foreground 2 chunks", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR,
-      .angle_alone = 1 },
+    { .name = "Hess", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR, .hess = 1,
+      .texels_per_px = 1.0f },
+    { .name = "Hess, 2 texels a px", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR, .hess = 1 },
     IMPOSTOR(1),
     GEOMIP(0.25), GEOMIP(0.5), GEOMIP(1), GEOMIP(2), GEOMIP(4), GEOMIP(8),
     BOUND(1), BOUND(2), BOUND(4), BOUND(8), MORPHING(1)
