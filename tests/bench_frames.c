@@ -27,9 +27,6 @@
 
 #include "examples/host/image.h"
 
-#include <stdarg.h>
-#include <sys/stat.h>
-
 /* ---- What is measured --------------------------------------------------- */
 
 #define FULL { .name = "full", .family = "full", .mode = TERRIMP_MODE_FULL }
@@ -75,7 +72,9 @@ static const way tile_ways[] = { FULL, AUTO(1), AUTO(2), IMPOSTOR(1), GEOMIP(1),
 static const way thesis_ways[] = {
     FULL, AUTO(1), GEOMIP(1), HESS(400, 64), HESS(400, 128),
     /* only with BENCH_ALL, or on the terrain of 2049: */
-    HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128)
+    HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128),
+    /* only with BENCH_ALL: */
+    GEOMIP(0.5), GEOMIP(2), GEOMIP(4), GEOMIP(8), IMPOSTOR(1)
 };
 
 enum { WAYS_MAX = 32 }; /* in a run */
@@ -113,66 +112,32 @@ static const run runs[] = {
     { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
       LOOK_LIGHTMAP, WAYS(tile_ways), 40, 8, 0, 0 },
     { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 0 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 14, 40, 8, 0, 0 },
     { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
-      LOOK_LIGHTMAP, thesis_ways, 9, 9, 40, 8, 0, 0 },
+      LOOK_LIGHTMAP, thesis_ways, 9, 14, 40, 8, 0, 0 },
     { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 1 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 14, 40, 8, 0, 1 },
     { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 0 }
+      LOOK_LIGHTMAP, thesis_ways, 5, 14, 40, 8, 0, 0 }
 };
 
 /* ---- Output ------------------------------------------------------------- */
 
-static const char work[] = "build/bench";
-static FILE *report, *figures, *times;
+static FILE *figures, *times;
 
-static FILE *open_output(const char *name)
+static void say_protocol(void)
 {
-    char path[256];
-    FILE *file;
-    snprintf(path, sizeof path, "%s/%s", work, name);
-    file = fopen(path, "w");
-    if (!file)
-        scene_stop(path, "cannot be written");
-    return file;
-}
-
-/* To the terminal and to the report. */
-static void say(const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vprintf(format, arguments);
-    va_end(arguments);
-    va_start(arguments, format);
-    vfprintf(report, format, arguments);
-    va_end(arguments);
-    fflush(stdout);
-}
-
-static void say_machine(void)
-{
-    char line[256] = "", load[64] = "";
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    while (file && fgets(line, sizeof line, file) && strncmp(line, "model name", 10) != 0)
-        ;
-    if (file)
-        fclose(file);
-    file = fopen("/proc/loadavg", "r");
-    if (file && fscanf(file, "%63s", load) != 1)
-        load[0] = 0;
-    if (file)
-        fclose(file);
-    line[strcspn(line, "\n")] = 0;
-    say("Machine: %s; load at the start %s\nRenderer: %s\n",
-        strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
-    say("Pictures of %d x %d, 60 degrees. Ratio: mean of a frame's time over that of the full mesh "
-        "at about the same moment;\nCPU ratio: mean processor time over that of the full mesh. The "
-        "columns from mean to start are in multiples of the full\nmesh's median. The first sixth "
-        "of a flight, 20 frames at most, is its start, when pictures are new: its mean has a "
-        "column,\nand no other figure has it in. PSNR [dB] is over terrain unless it says "
-        "picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
+    say_machine(context_renderer());
+    say("Pictures of %d x %d, 60 degrees. The columns from median to worst are ratios: a frame's "
+        "time over that of the full mesh at\nabout the same moment. CPU: mean processor time over "
+        "that of the full mesh. The first sixth of a flight, 20 frames at most,\nis its start, "
+        "when pictures are new: its mean, over the full mesh's median, has a column, and no other "
+        "figure has it in.\nquads: median time over that of a textured quad over the whole "
+        "picture. reuse: frames that a picture is drawn.\nPSNR [dB] is over terrain unless it says "
+        "picture; 4 x 4: against the full mesh with as many samples a pixel. From frame\nto frame, "
+        "beyond what the full mesh changes: shimmer, the mean over all pixels; pop, the worst mean "
+        "over 16 x 16 pixels;\npixel, the worst pixel. holes: in the worst frame; low: pixels of "
+        "sky above a silhouette that is too low.\n", SCENE_WIDTH, SCENE_HEIGHT);
 }
 
 /* ---- Quality ------------------------------------------------------------ */
@@ -235,7 +200,7 @@ static void compare_holes(contender *c, const contender *full, size_t frame)
     size_t holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky,
                                  &low, &first);
     if (holes == SIZE_MAX)
-        scene_stop("holes", "out of memory");
+        bench_stop("holes", "out of memory");
     if (holes > 0 && c->holes <= 0.0) {
         int x = (int)(first % SCENE_WIDTH), y = (int)(first / SCENE_WIDTH);
         crop_around(full->picture, x, y, &c->hole_crops[0]);
@@ -337,7 +302,7 @@ static double full_ms(const contender *full)
 static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
                        frame_plan plan)
 {
-    terrimp_camera camera = scene_camera(s, frame);
+    terrimp_camera camera = tour_camera(&s->tour, &s->box, frame);
     size_t i;
     for (i = 0; i < count; i++) {
         contender *c = &ways[i];
@@ -357,14 +322,14 @@ static void fly(const run *r, contender *ways, size_t count, const scene *s, qua
 {
     look *l = ways[0].look;
     size_t frame, i;
-    for (frame = 0; frame < s->flight.count; frame++) {
-        frame_plan plan = plan_frame(r, frame, s->flight.count, stride);
+    for (frame = 0; frame < s->tour.flight.count; frame++) {
+        frame_plan plan = plan_frame(r, frame, s->tour.flight.count, stride);
         l->seconds = (float)frame / SCENE_FPS;
         draw_frame(ways, count, s, frame, plan);
         if (plan.look)
             quad_draw(q, s->context, ways[0].gl->lightmap);
         if (plan.fine)
-            fine_draw(f, l, ways[0].gl, ways[0].view, scene_camera(s, frame));
+            fine_draw(f, l, ways[0].gl, ways[0].view, tour_camera(&s->tour, &s->box, frame));
         for (i = 0; i < count; i++) {
             if (plan.look)
                 compare(&ways[i], &ways[0], frame, plan.ssim);
@@ -389,21 +354,26 @@ static void print_times(const contender *ways, size_t count, double quad_ms)
 {
     double unit = stats_summarise(&ways[0].ms).median;
     size_t i;
-    say("\n| way | ms | ratio | CPU ratio | mean | sd | 95 %% | 99 %% | worst | start | quads | "
+    say("\n| way | ms | median | mean | sd | 95 %% | 99 %% | worst | CPU | start | quads | "
         "triangles | draws | captures | ktexels | reuse |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < count; i++) {
         const contender *c = &ways[i];
-        stats_summary ms = stats_summarise(&c->ms);
+        stats_summary ms = stats_summarise(&c->ms), ratio = stats_summarise(&c->ratio);
         double n = c->frames;
-        say("| %s | %.1f | %.3f | %.3f | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f | %.1f | %.0f | "
-            "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, cost_of(c, &ways[0], 0),
-            cost_of(c, &ways[0], 1), ms.mean / unit, ms.deviation / unit, ms.p95 / unit,
-            ms.p99 / unit, ms.worst / unit, mean(&c->start_ms) / unit, ms.median / quad_ms,
-            c->triangles / n, c->draws / n, c->captures / n, c->captured_texels / n / 1e3,
-            (double)c->now.reuse);
+        say("| %s | %.1f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %.1f | %.0f | "
+            "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, ratio.median, ratio.mean,
+            ratio.deviation, ratio.p95, ratio.p99, ratio.worst, cost_of(c, &ways[0], 1),
+            mean(&c->start_ms) / unit, ms.median / quad_ms, c->triangles / n, c->draws / n,
+            c->captures / n, c->captured_texels / n / 1e3, (double)c->now.reuse);
     }
     say("\nA textured quad over the whole picture: %.1f ms.\n", quad_ms);
+    for (i = 0; i < count; i++)
+        if (ways[i].hess)
+            say("%s: its atlases were packed %u times, %u of these before all pictures had moved; "
+                "sides were reduced to %.2f at worst.\n", ways[i].way->name,
+                (unsigned)ways[i].hess->pair.repacks, (unsigned)ways[i].hess->early_packs,
+                (double)ways[i].hess->least_scale);
 }
 
 static void print_quality(const contender *ways, size_t count)
@@ -431,13 +401,12 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
     size_t i;
     for (i = 0; i < count; i++) {
         const contender *c = &ways[i];
-        stats_summary ms = stats_summarise(&c->ms);
+        stats_summary ms = stats_summarise(&c->ms), ratio = stats_summarise(&c->ratio);
         double n = c->frames;
         fprintf(figures, "%s\t%s\t%s\t%zu\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t"
                 "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
-                cost_of(c, &ways[0], 0), cost_of(c, &ways[0], 1), ms.mean / unit,
-                ms.deviation / unit, ms.p95 / unit, ms.p99 / unit, ms.worst / unit,
-                mean(&c->start_ms) / unit, quad_ms);
+                ratio.median, ratio.mean, ratio.deviation, ratio.p95, ratio.p99, ratio.worst,
+                cost_of(c, &ways[0], 1), mean(&c->start_ms) / unit, quad_ms);
         fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t%.2f\t", c->triangles / n, c->draws / n,
                 c->captures / n, c->captured_texels / n, (double)c->now.reuse, c->waiting / n);
         fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
@@ -450,8 +419,8 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
 
 static void write_headings(void)
 {
-    fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio\tcpu_ratio\tmean\tdeviation\t"
-            "p95\tp99\tworst\tstart\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+    fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio_median\tratio_mean\t"
+            "ratio_deviation\tratio_p95\tratio_p99\tratio_worst\tcpu_ratio\tstart\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
             "reuse\twaiting\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\t"
             "ssim_4x4\tshimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
     fprintf(times, "scene\tway\tframe\tstart\tms\ttriangles\tdraws\tcaptures\t"
@@ -563,9 +532,9 @@ static void plot_peers(plot *p, const char *key)
 static void write_plot(const plot *p, const char *key, const char *kind)
 {
     char path[256];
-    snprintf(path, sizeof path, "%s/%s_%s.svg", work, key, kind);
+    snprintf(path, sizeof path, "%s/%s_%s.svg", bench_folder, key, kind);
     if (!plot_write(p, path))
-        scene_stop(path, "cannot be written");
+        bench_stop(path, "cannot be written");
     say("\nPlot: %s\n", path);
 }
 
@@ -618,13 +587,13 @@ static void write_side_by_side(const run *r, const contender *c, const char *suf
             memcpy(to, pictures[column / width]
                        + ((size_t)(y / factor * width) + (size_t)(column % width)) * 3, 3);
         }
-    snprintf(path, sizeof path, "%s/%s_%s%s.png", work, r->scene.key, c->way->name, suffix);
+    snprintf(path, sizeof path, "%s/%s_%s%s.png", bench_folder, r->scene.key, c->way->name, suffix);
     for (letter = path; *letter; letter++)
         if (*letter == ' ' || *letter == ',')
             *letter = '_';
     trouble = image_write_png(path, out, wide, high);
     if (trouble)
-        scene_stop(path, trouble);
+        bench_stop(path, trouble);
     free(out);
 }
 
@@ -652,23 +621,10 @@ static void write_pictures(const run *r, const contender *c)
 
 /* ---- All of it ---------------------------------------------------------- */
 
-static int whole_protocol(void)
-{
-    const char *all = getenv("BENCH_ALL");
-    return all && *all && *all != '0';
-}
-
-static size_t frames_of(const run *r)
-{
-    const char *frames = getenv("BENCH_FRAMES");
-    long count = frames ? strtol(frames, NULL, 10) : 0;
-    return count > 0 ? (size_t)count : r->frames;
-}
-
 /* Opens the ways that are wanted, the full mesh first; returns how many. */
 static size_t open_ways(const run *r, contender *ways, scene *s, look *l)
 {
-    size_t offered = whole_protocol() ? r->all_way_count : r->way_count, count = 0, i;
+    size_t offered = bench_all() ? r->all_way_count : r->way_count, count = 0, i;
     const char *wanted = getenv("BENCH_WAYS");
     for (i = 0; i < offered; i++)
         if (i == 0 || !wanted || strstr(r->ways[i].name, wanted))
@@ -680,18 +636,18 @@ static void measure(const run *r, const context *frame)
 {
     contender *ways = need_memory(WAYS_MAX * sizeof *ways);
     size_t count, i;
-    double quad_ms;
+    double quad_ms, start = clock_ms();
     scene s;
     quad q;
     fine f;
     look l;
-    scene_open(&s, &r->scene, frame, frames_of(r));
+    scene_open(&s, &r->scene, frame, bench_frames(r->frames));
     look_open(&l, r->look, &s);
     count = open_ways(r, ways, &s, &l);
     quad_open(&q);
     fine_open(&f, frame);
-    say("\n## %s, %zu frames\n", r->scene.name, s.flight.count);
-    fly(r, ways, count, &s, &q, &f, whole_protocol() ? 1 : r->stride);
+    say("\n## %s, %zu frames\n", r->scene.name, s.tour.flight.count);
+    fly(r, ways, count, &s, &q, &f, bench_all() ? 1 : r->stride);
     quad_ms = stats_summarise(&q.ms).median;
     print_times(ways, count, quad_ms);
     print_quality(ways, count);
@@ -705,6 +661,7 @@ static void measure(const run *r, const context *frame)
         note_size(r, ways, count);
     for (i = 1; i < count; i++)
         write_pictures(r, &ways[i]);
+    say("\n(%.0f s)\n", (clock_ms() - start) * 1e-3);
     fine_close(&f);
     quad_close(&q);
     for (i = 0; i < count; i++)
@@ -719,7 +676,7 @@ static int is_wanted(const run *r)
     const char *only = getenv("BENCH_ONLY");
     if (only && *only)
         return strstr(r->scene.key, only) != NULL;
-    return whole_protocol() || !r->only_all;
+    return bench_all() || !r->only_all;
 }
 
 int main(void)
@@ -729,13 +686,11 @@ int main(void)
     double start = clock_ms();
     size_t i;
     if (trouble)
-        scene_stop("OpenGL", trouble);
-    mkdir("build", 0777);
-    mkdir(work, 0777);
-    report = open_output("frames.md");
-    figures = open_output("frames.tsv");
-    times = open_output("frame_times.tsv");
-    say_machine();
+        bench_stop("OpenGL", trouble);
+    say_open("frames", 0);
+    figures = bench_output("frames", ".tsv");
+    times = bench_output("frame_times", ".tsv");
+    say_protocol();
     write_headings();
     for (i = 0; i < sizeof runs / sizeof *runs; i++) {
         if (!is_wanted(&runs[i]))
@@ -750,7 +705,7 @@ int main(void)
     say("\nAll of it took %.0f s.\n", (clock_ms() - start) * 1e-3);
     fclose(times);
     fclose(figures);
-    fclose(report);
+    say_close();
     context_close(&frame);
     return 0;
 }

@@ -30,7 +30,7 @@ static void quad_open(quad *q)
     memset(q, 0, sizeof *q);
     q->program = gl_program_make(quad_vertex, gl_ground_fragment);
     if (!q->program.id)
-        scene_stop("the quad", "a shader does not compile");
+        bench_stop("the quad", "a shader does not compile");
     glGenVertexArrays(1, &q->array);
 }
 
@@ -87,7 +87,7 @@ static void fine_open(fine *f, const context *frame)
     glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, f->frame.width, f->frame.height);
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, f->frame.depth);
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-        scene_stop("the supersampled reference", "its framebuffer is not complete");
+        bench_stop("the supersampled reference", "its framebuffer is not complete");
 }
 
 /* Leaves the supersampled picture of what a view of the full mesh has decided last. */
@@ -98,7 +98,7 @@ static void fine_draw(fine *f, look *l, gl_terrain *gl, terrimp_view *full,
     terrimp_callbacks callbacks;
     terrimp_stats now;
     need(terrimp_view_get_stats(full, &now));
-    scene_tighten(&camera, &now);
+    tour_tighten(&camera, &now);
     camera.width_px *= FINE;
     camera.height_px *= FINE;
     gl->frame = &f->frame;

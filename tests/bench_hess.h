@@ -226,7 +226,7 @@ static void hess_update(hess *h, const terrimp_camera *camera)
             hess_repack(h);
             hess_mark_due(h, &complete);
             if (!hess_assign(h))
-                scene_stop("two atlases", "what was just packed does not fit");
+                bench_stop("two atlases", "what was just packed does not fit");
         }
     }
     hess_count(h);

@@ -22,7 +22,7 @@ typedef struct look {
 static void look_need(const char *trouble)
 {
     if (trouble)
-        scene_stop("the looks of the scene", trouble);
+        bench_stop("the looks of the scene", trouble);
 }
 
 static void look_open(look *l, int kind, scene *s)
@@ -30,11 +30,11 @@ static void look_open(look *l, int kind, scene *s)
     memset(l, 0, sizeof *l);
     l->kind = kind;
     if (kind == LOOK_MATERIALS)
-        look_need(shading_open(&l->shading, &s->field, s->lightmap));
+        look_need(shading_open(&l->shading, &s->tour.field, s->lightmap));
     s->shading = kind == LOOK_MATERIALS ? shading_source : NULL;
     if (kind == LOOK_TREES) {
         l->chunks = scene_terrain(s, scene_chunk_quads[0]);
-        look_need(trees_open(&l->trees, s->terrain[l->chunks], &s->field, LOOK_TREE_COUNT));
+        look_need(trees_open(&l->trees, s->terrain[l->chunks], &s->tour.field, LOOK_TREE_COUNT));
     }
 }
 

@@ -126,7 +126,7 @@ static void contender_draw(contender *c, terrimp_camera camera, int at_start)
     double start = clock_ms(), cpu_start = clock_cpu_ms();
     terrimp_callbacks callbacks;
     contender_update(c, &camera);
-    scene_tighten(&camera, &c->now);
+    tour_tighten(&camera, &c->now);
     need(gl_terrain_begin(c->gl, &camera, scene_sky));
     callbacks = look_begin(c->look, c->gl);
     if (c->hess)
