@@ -178,7 +178,8 @@ static void hess_count(hess *h)
 {
     uint32_t i, quads = h->info.chunk_quads, impostors = 0;
     terrimp_stats *s = &h->stats;
-    float closest = 1e30f;
+    float closest = 1e30f, up;
+    float aspect = (float)h->camera.width_px / (float)h->camera.height_px;
     memset(s, 0, sizeof *s);
     for (i = 0; i < h->seen_count; i++) {
         const hess_chunk *c = &h->chunks[h->seen[i]];
@@ -205,6 +206,9 @@ static void hess_count(hess *h)
     for (i = 0; i < h->seen_count; i++)
         s->z_far = fmaxf(s->z_far, terrimp_box_farthest(&h->chunks[h->seen[i]].box, h->camera.eye)
                                        * (1.0f + h->depth_bias));
+    /* A point at that distance in the corner of the screen has the smallest depth. */
+    up = tanf(0.5f * h->camera.fov_y_rad);
+    s->z_near /= sqrtf(1.0f + up * up * (1.0f + aspect * aspect));
     h->captured += s->captures;
     h->drawn += impostors;
     s->reuse = h->captured > 0.0 ? (float)(h->drawn / h->captured) : 0.0f;
