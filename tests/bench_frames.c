@@ -20,9 +20,10 @@
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
-#include "bench_gl.h"
+#include "bench_fine.h"
 #include "bench_peers.h"
 #include "bench_plot.h"
+#include "bench_quad.h"
 #include "bench_way.h"
 
 #include "examples/host/image.h"
@@ -671,6 +672,19 @@ static void measure(const run *r, const context *frame)
     scene_close(&s);
 }
 
+static int file_is_there(const char *name)
+{
+    char path[1024];
+    FILE *file;
+    if (!name)
+        return 1;
+    scene_data_path(name, path, sizeof path);
+    file = fopen(path, "rb");
+    if (file)
+        fclose(file);
+    return file != NULL;
+}
+
 static int is_wanted(const run *r)
 {
     const char *only = getenv("BENCH_ONLY");
@@ -695,7 +709,7 @@ int main(void)
     for (i = 0; i < sizeof runs / sizeof *runs; i++) {
         if (!is_wanted(&runs[i]))
             continue;
-        if (scene_file_is_there(runs[i].scene.file) && scene_file_is_there(runs[i].scene.path))
+        if (file_is_there(runs[i].scene.file) && file_is_there(runs[i].scene.path))
             measure(&runs[i], &frame);
         else
             say("\n## %s: its files are not here\n", runs[i].scene.name);

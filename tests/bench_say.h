@@ -30,7 +30,7 @@ static void need(terrimp_result result)
         bench_stop("terrimp", terrimp_result_text((int)result));
 }
 
-static void *need_memory(size_t bytes)
+static inline void *need_memory(size_t bytes)
 {
     void *memory = malloc(bytes ? bytes : 1);
     if (!memory)
@@ -56,7 +56,7 @@ static size_t bench_frames(size_t frames)
 }
 
 /* Where the real tiles and the flight paths are. */
-static const char *bench_data(void)
+static inline const char *bench_data(void)
 {
     const char *folder = getenv("TERRIMP_DATA");
     return folder && *folder ? folder : "../shared/data";
@@ -65,7 +65,7 @@ static const char *bench_data(void)
 /* ---- Saying ------------------------------------------------------------- */
 
 /* Opens a file of the folder for writing. */
-static FILE *bench_output(const char *name, const char *ending)
+static inline FILE *bench_output(const char *name, const char *ending)
 {
     char path[256];
     FILE *file;

@@ -36,10 +36,15 @@ typedef struct scene {
     const scene_desc *desc;
     tour tour;
     terrimp_box box;
+    terrimp_heightfield light; /* what the lightmap lies over: the field, or every n-th sample */
+    uint16_t *light_samples;   /* these, or null */
     uint8_t *lightmap;
     const char *shading;       /* of gl_terrain_desc */
     const context *context;
     terrimp_terrain *terrain[SCENE_CHUNKS]; /* by chunk size; null until it is used */
+    void *bake[SCENE_CHUNKS];               /* that it lies in, when it was read from a file */
+    double build_s[SCENE_CHUNKS];           /* what building it took; 0: it was read */
+    size_t vertex_bytes;                    /* of gl_terrain_desc */
     gl_terrain gl[SCENE_CHUNKS];            /* of ways that keep no pictures */
     int is_open[SCENE_CHUNKS];
 } scene;
@@ -53,20 +58,31 @@ static void scene_data_path(const char *name, char *path, size_t size)
         snprintf(path, size, "%s/%s", bench_data(), name);
 }
 
-static int scene_file_is_there(const char *name)
-{
-    char path[1024];
-    FILE *file;
-    if (!name)
-        return 1;
-    scene_data_path(name, path, sizeof path);
-    file = fopen(path, "rb");
-    if (file)
-        fclose(file);
-    return file != NULL;
-}
-
 /* ---- The scene ---------------------------------------------------------- */
+
+enum { SCENE_LARGEST = 4097, SCENE_LIGHT = 2049 }; /* samples along a side */
+
+/* The lightmap of a very large terrain is a coarse one: it would not fit into a texture. */
+static void scene_light(scene *s)
+{
+    uint32_t side = s->tour.field.width, step, x, z;
+    const uint16_t *samples = s->tour.field.samples;
+    s->light = s->tour.field;
+    if (side > SCENE_LARGEST && s->tour.field.format == TERRIMP_FORMAT_U16) {
+        uint16_t *out = s->light_samples = need_memory(sizeof *out * SCENE_LIGHT * SCENE_LIGHT);
+        step = (side - 1) / (SCENE_LIGHT - 1);
+        for (z = 0; z < SCENE_LIGHT; z++)
+            for (x = 0; x < SCENE_LIGHT; x++)
+                *out++ = samples[(size_t)z * step * side + (size_t)x * step];
+        s->light.samples = s->light_samples;
+        s->light.width = s->light.depth = SCENE_LIGHT;
+        s->light.spacing_x *= (float)step;
+        s->light.spacing_z *= (float)step;
+    }
+    s->lightmap = lightmap_bake(&s->light);
+    if (!s->lightmap)
+        bench_stop(s->desc->name, "no memory for the lightmap");
+}
 
 static void scene_open(scene *s, const scene_desc *desc, const context *frame, size_t frames)
 {
@@ -95,9 +111,63 @@ static void scene_open(scene *s, const scene_desc *desc, const context *frame, s
     what.height = SCENE_HEIGHT;
     if (!tour_load(&s->tour, &what) || !tour_plan(&s->tour))
         bench_stop(desc->name, s->tour.error);
-    s->lightmap = lightmap_bake(&s->tour.field);
-    if (!s->lightmap)
-        bench_stop(desc->name, "no memory for the lightmap");
+    scene_light(s);
+}
+
+/* Bakes of made-up terrains, which take long to build, are kept between runs. */
+static void scene_bake_path(const scene *s, int i, char *path, size_t size)
+{
+    snprintf(path, size, "%s/made_%u_%u.bake", bench_folder, (unsigned)s->desc->size,
+             (unsigned)scene_chunk_quads[i]);
+}
+
+/* Takes the terrain from a bake that is younger than what builds it. Returns 0 when there is none.
+   (Its samples are not compared: of 16385 x 16385 that would take long.) */
+static int scene_read_bake(scene *s, int i)
+{
+    struct stat header, bake;
+    size_t bytes, need_bytes = terrimp_terrain_open_bytes();
+    char path[1024];
+    FILE *file;
+    void *memory;
+    int ok;
+    scene_bake_path(s, i, path, sizeof path);
+    if (!s->desc->size || stat("terrimp.h", &header) != 0 || stat(path, &bake) != 0
+        || bake.st_mtime <= header.st_mtime)
+        return 0;
+    file = fopen(path, "rb");
+    if (!file)
+        return 0;
+    bytes = (size_t)bake.st_size;
+    memory = need_memory(need_bytes + bytes + 8);
+    s->bake[i] = (char *)memory + (need_bytes + 7) / 8 * 8;
+    ok = fread(s->bake[i], 1, bytes, file) == bytes
+         && terrimp_terrain_open(&s->tour.field, s->bake[i], bytes, memory, need_bytes,
+                                 &s->terrain[i]) == TERRIMP_OK;
+    fclose(file);
+    s->bake[i] = memory;
+    if (!ok) {
+        free(memory);
+        s->bake[i] = NULL;
+        s->terrain[i] = NULL;
+    }
+    return ok;
+}
+
+static void scene_write_bake(const scene *s, int i)
+{
+    size_t bytes = terrimp_bake_bytes(s->terrain[i]);
+    void *block = s->desc->size ? malloc(bytes) : NULL;
+    char path[1024];
+    FILE *file;
+    if (!block)
+        return;
+    need(terrimp_bake_write(s->terrain[i], block, bytes));
+    scene_bake_path(s, i, path, sizeof path);
+    file = fopen(path, "wb");
+    if (file && (fwrite(block, 1, bytes, file) != bytes) + (fclose(file) != 0) > 0)
+        remove(path);
+    free(block);
 }
 
 /* The terrain with chunks of that many quads, built when it is first asked for. */
@@ -105,6 +175,7 @@ static int scene_terrain(scene *s, uint32_t chunk_quads)
 {
     terrimp_terrain_desc desc;
     terrimp_terrain_info info;
+    double start;
     int i = 0;
     while (i + 1 < SCENE_CHUNKS && scene_chunk_quads[i] != chunk_quads)
         i++;
@@ -113,7 +184,12 @@ static int scene_terrain(scene *s, uint32_t chunk_quads)
     memset(&desc, 0, sizeof desc);
     desc.field = s->tour.field;
     desc.chunk_quads = scene_chunk_quads[i];
-    need(terrimp_terrain_create(&desc, NULL, &s->terrain[i]));
+    start = clock_ms();
+    if (!scene_read_bake(s, i)) {
+        need(terrimp_terrain_create(&desc, NULL, &s->terrain[i]));
+        s->build_s[i] = (clock_ms() - start) * 1e-3;
+        scene_write_bake(s, i);
+    }
     need(terrimp_terrain_get_info(s->terrain[i], &info));
     s->box = info.box;
     return i;
@@ -126,7 +202,8 @@ static void scene_open_gl(scene *s, int terrain, uint32_t atlas_size, gl_terrain
     memset(&desc, 0, sizeof desc);
     desc.frame = s->context;
     desc.terrain = s->terrain[terrain];
-    desc.field = &s->tour.field;
+    desc.field = &s->light;
+    desc.vertex_bytes = s->vertex_bytes;
     desc.lightmap = s->lightmap;
     desc.atlas_size = atlas_size;
     desc.shading = s->shading;
@@ -150,9 +227,13 @@ static void scene_close(scene *s)
     for (i = 0; i < SCENE_CHUNKS; i++) {
         if (s->is_open[i])
             gl_terrain_close(&s->gl[i]);
-        terrimp_terrain_destroy(s->terrain[i]);
+        if (s->bake[i])
+            free(s->bake[i]);
+        else
+            terrimp_terrain_destroy(s->terrain[i]);
     }
     free(s->lightmap);
+    free(s->light_samples);
     tour_close(&s->tour);
 }
 
