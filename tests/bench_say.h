@@ -18,13 +18,13 @@ static FILE *say_report, *say_rows;
 
 /* ---- Ending early ------------------------------------------------------- */
 
-static void bench_stop(const char *what, const char *trouble)
+static inline void bench_stop(const char *what, const char *trouble)
 {
     fprintf(stderr, "bench: %s: %s\n", what, trouble);
     exit(2);
 }
 
-static void need(terrimp_result result)
+static inline void need(terrimp_result result)
 {
     if (result != TERRIMP_OK)
         bench_stop("terrimp", terrimp_result_text((int)result));
@@ -41,14 +41,14 @@ static inline void *need_memory(size_t bytes)
 /* ---- What is asked for -------------------------------------------------- */
 
 /* Whether BENCH_ALL asks for the whole protocol. */
-static int bench_all(void)
+static inline int bench_all(void)
 {
     const char *all = getenv("BENCH_ALL");
     return all && *all && *all != '0';
 }
 
 /* BENCH_FRAMES, or so many. */
-static size_t bench_frames(size_t frames)
+static inline size_t bench_frames(size_t frames)
 {
     const char *wanted = getenv("BENCH_FRAMES");
     long count = wanted ? strtol(wanted, NULL, 10) : 0;
@@ -79,14 +79,14 @@ static inline FILE *bench_output(const char *name, const char *ending)
 }
 
 /* Rows: whether tables are to be written as NAME.tsv, too; a program may have a better one. */
-static void say_open(const char *name, int rows)
+static inline void say_open(const char *name, int rows)
 {
     say_report = bench_output(name, ".md");
     say_rows = rows ? bench_output(name, ".tsv") : NULL;
 }
 
 /* A row of a Markdown table with tabs between its cells; the line under the headings has none. */
-static void say_row(const char *line)
+static inline void say_row(const char *line)
 {
     const char *cell = line + 1, *end;
     if (!say_rows || line[0] != '|' || strncmp(line, "|--", 3) == 0)
@@ -103,7 +103,7 @@ static void say_row(const char *line)
 }
 
 /* Like printf. A row may be said in pieces. */
-static void say(const char *format, ...)
+static inline void say(const char *format, ...)
 {
     static char line[4096];
     size_t used = strlen(line), length;
@@ -124,7 +124,7 @@ static void say(const char *format, ...)
 }
 
 /* renderer: that of OpenGL, or null. */
-static void say_machine(const char *renderer)
+static inline void say_machine(const char *renderer)
 {
     char line[256] = "", load[64] = "";
     FILE *file = fopen("/proc/cpuinfo", "r");
@@ -144,7 +144,7 @@ static void say_machine(const char *renderer)
         say("Renderer: %s\n", renderer);
 }
 
-static void say_close(void)
+static inline void say_close(void)
 {
     if (fclose(say_report) != 0 || (say_rows && fclose(say_rows) != 0))
         bench_stop(bench_folder, "a report could not be written to its end");
