@@ -11,7 +11,7 @@
              does. How full the atlas is then, and the time of one allocation or freeing.
 
    Build:  make bench_atlas
-   Use:    build/bench_atlas   (BENCH_FRAMES is the number of frames of a flight [1200])
+   Use:    build/bench_atlas   (BENCH_FRAMES is the number of frames of a flight [900])
    Leaves: build/bench/atlas.md (what it prints), atlas.tsv (its rows) */
 #define _POSIX_C_SOURCE 200112L
 #define TERRIMP_IMPLEMENTATION
@@ -855,7 +855,7 @@ static void compare_churn(void)
 int main(void)
 {
     static recording flown;
-    uint32_t frames = (uint32_t)bench_frames(1200);
+    uint32_t frames = (uint32_t)bench_frames(900);
     say_open("atlas", 1);
     say_machine(NULL);
     fly(&flown, 0, frames);
