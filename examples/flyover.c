@@ -298,16 +298,6 @@ static void show_progress(const flyover *f, size_t frame, double ms)
                 frame + 1 == f->tour.flight.count ? "        \n" : "        ");
 }
 
-static double smallest(const stats *s)
-{
-    double least = s->values[0];
-    size_t i;
-    for (i = 1; i < s->count; i++)
-        if (s->values[i] < least)
-            least = s->values[i];
-    return least;
-}
-
 static void print_summary(const flyover *f)
 {
     double frames = (double)f->tour.flight.count;
@@ -324,11 +314,11 @@ static void print_summary(const flyover *f)
     printf("worst_parallax_px %.3f\n", (double)f->worst_parallax_px);
     if (f->options.compare) {
         stats_summary full = stats_summarise(&f->full.ms);
+        stats_summary psnr = stats_summarise(&f->psnr);
+        stats_summary terrain = stats_summarise(&f->psnr_terrain);
         stats_print(stdout, "full_ms", full);
-        printf("psnr_mean %.2f\npsnr_worst %.2f\n", stats_summarise(&f->psnr).mean,
-               smallest(&f->psnr));
-        printf("psnr_terrain_mean %.2f\npsnr_terrain_worst %.2f\n",
-               stats_summarise(&f->psnr_terrain).mean, smallest(&f->psnr_terrain));
+        printf("psnr_mean %.2f\npsnr_worst %.2f\n", psnr.mean, psnr.least);
+        printf("psnr_terrain_mean %.2f\npsnr_terrain_worst %.2f\n", terrain.mean, terrain.least);
         printf("speed_up %.2f\n", full.median / summary.median);
     }
 }

@@ -38,6 +38,11 @@ static inline void *need_memory(size_t bytes)
     return memory;
 }
 
+static inline double mean(const stats *s)
+{
+    return stats_summarise(s).mean;
+}
+
 /* ---- What is asked for -------------------------------------------------- */
 
 /* Whether BENCH_ALL asks for the whole protocol. */

@@ -54,11 +54,6 @@ static plot times = { .title = "A frame against the size of the terrain, circle 
                       .x_label = "samples along a side", .y_label = "median frame time [ms]",
                       .log_x = 1, .log_y = 1 };
 
-static double mean(const stats *s)
-{
-    return stats_summarise(s).mean;
-}
-
 static double peak_mib(void)
 {
     struct rusage usage;
