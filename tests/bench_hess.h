@@ -239,18 +239,17 @@ static void hess_update(hess *h, const terrimp_camera *camera)
 /* ---- Drawing it --------------------------------------------------------- */
 
 /* The chunk and the strips of its neighbours: patterns that stand in the shared indices. */
-static void hess_draw_block(const hess *h, uint32_t chunk, uint32_t strip,
-                            const terrimp_callbacks *callbacks)
+static void hess_draw_block(const hess *h, uint32_t chunk, const terrimp_callbacks *callbacks)
 {
     uint32_t wide = h->info.chunks_x, x = chunk % wide, z = chunk / wide, cell;
+    uint32_t quads = h->info.chunk_quads;
     terrimp_ground_command ground;
     memset(&ground, 0, sizeof ground);
     ground.alpha = 1.0f;
     for (cell = 0; cell < 9; cell++) {
         uint32_t nx = x + cell % 3 - 1, nz = z + cell / 3 - 1; /* below 0 it wraps: too large */
-        terrimpi_pattern p = terrimpi_find_pattern(
-            h->info.chunk_quads, cell == 4 ? 0 : terrimpi_strip_pattern(h->info.chunk_quads, strip,
-                                                                        cell - (cell > 4)));
+        uint32_t which = cell == 4 ? 0 : terrimpi_strip_pattern(quads, 0, cell - (cell > 4));
+        terrimpi_pattern p = terrimpi_find_pattern(quads, which);
         if (nx >= wide || nz >= h->info.chunks_z)
             continue;
         ground.node = nz * wide + nx;
@@ -260,7 +259,7 @@ static void hess_draw_block(const hess *h, uint32_t chunk, uint32_t strip,
     }
 }
 
-/* The strips are 6 % of the chunk's width or a little more: that closed all seams. */
+/* The strips are a 16th of the chunk's width, the least that there are. */
 static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callbacks)
 {
     hess_chunk *c = &h->chunks[chunk];
@@ -288,7 +287,7 @@ static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callb
         command.clip_max[i] = c->box.max[2 * i] + border;
     }
     callbacks->begin_capture(callbacks->user, &command);
-    hess_draw_block(h, chunk, 0, callbacks);
+    hess_draw_block(h, chunk, callbacks);
     callbacks->end_capture(callbacks->user, &command);
     need(terrimp_pair_fill(&h->pair, slot));
     memcpy(c->eye, capture.eye, sizeof c->eye);

@@ -114,7 +114,8 @@ rows() # file.tsv
 
 scale()
 {
-    awk -F '\t' '$1 == "samples" { table++ } table == 1' $bench/scale.tsv > $new/scale.tsv
+    awk -F '\t' '$1 == "samples" { table++ } table == 1' $bench/scale.tsv |
+        cut -f 1-3,7,9-14 > $new/scale.tsv
     rows $new/scale.tsv
 }
 
