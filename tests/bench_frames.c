@@ -408,7 +408,8 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
 static void write_headings(void)
 {
     fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio_median\tratio_mean\t"
-            "ratio_deviation\tratio_p95\tratio_p99\tratio_worst\tcpu_ratio\tstart\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+            "ratio_deviation\tratio_p95\tratio_p99\tratio_worst\tcpu_ratio\tstart\tquad_ms\t"
+            "triangles\tdraws\tcaptures\tcaptured_texels\t"
             "reuse\twaiting\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\t"
             "ssim_4x4\tshimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
     fprintf(times, "scene\tway\tframe\tstart\tms\ttriangles\tdraws\tcaptures\t"

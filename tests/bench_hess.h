@@ -158,7 +158,8 @@ static void hess_repack(hess *h)
     h->least_scale = h->scale < h->least_scale ? h->scale : h->least_scale;
 }
 
-/* Gives what is due a place in the newest atlas, if it has none there. Returns 0 when it is full. */
+/* Gives what is due a place in the newest atlas, if it has none there. Returns 0 when that is
+   full. */
 static int hess_assign(hess *h)
 {
     uint32_t i, size[2];

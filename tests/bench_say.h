@@ -1,5 +1,5 @@
-/* What all benchmarks share: how they stop, where they write, and what machine they ran on. What is
-   said goes to the terminal and to build/bench/NAME.md; the rows of its tables go to NAME.tsv too. */
+/* What all benchmarks share: how they stop, where they write, and what machine they ran on. What
+   is said goes to the terminal and to build/bench/NAME.md; rows of its tables to NAME.tsv too. */
 #ifndef BENCH_SAY_H
 #define BENCH_SAY_H
 

@@ -1,13 +1,13 @@
-/* Measures what a frame costs, drawing included, against the size of the terrain: the thesis' circle
-   over made-up terrains of 513 to 16385 samples a side, in full, with geometrical mipmapping, and
-   with everything.
+/* Measures what a frame costs, drawing included, against the size of the terrain: the thesis'
+   circle over made-up terrains of 513 to 16385 samples a side, in full, with geometrical
+   mipmapping, and with everything.
 
    Build:  make bench_scale
    Use:    build/bench_scale       (in the project's directory)
    Leaves: build/bench/scale.md (what it prints), scale.tsv, scale.svg
 
-   BENCH_FRAMES=n   frames of a flight [72]; the first sixth, 20 at most, is its start, when pictures
-                    are new: no figure has it in
+   BENCH_FRAMES=n   frames of a flight [72]; the first sixth, 20 at most, is its start, when
+                    pictures are new: no figure has it in
    BENCH_ALL=1      8193 and 16385 too: minutes for building them, once; their bakes are kept
    BENCH_ONLY=n     this size alone
 
@@ -138,9 +138,9 @@ static void measure(const scene_desc *desc, const context *frame, outcome *out)
 static void say_headings(void)
 {
     say_machine(context_renderer());
-    say("Pictures of %d x %d; %zu frames of the thesis' circle, 80 units a second; ms of the clock, "
-        "quads: over that of a textured\nquad over the whole picture; PSNR [dB] against the full "
-        "mesh, over terrain.\n\n| samples | way | median | mean | sd | 95 %% | 99 %% | worst | CPU "
+    say("Pictures of %d x %d; %zu frames of the thesis' circle, 80 units a second; ms of the "
+        "clock, quads: over that of a textured\nquad over the whole picture; PSNR [dB] against the "
+        "full mesh, over terrain.\n\n| samples | way | median | mean | sd | 95 %% | 99 %% | worst | CPU "
         "| quads | PSNR | triangles | draws | captures | ktexels |\n"
         "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n", SCENE_WIDTH,
         SCENE_HEIGHT, bench_frames(72));

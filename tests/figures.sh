@@ -35,8 +35,10 @@ ways() # scene columns
 # The same of other engines; empty cells so many before triangles and draws, and behind.
 peers() # scene before behind
 {
-    sed -n 's/^ *{ "'"$1"'", "\(.*\)", \([0-9.]*\), \([0-9.]*\), \([0-9]*\), \([0-9]*\) }.*/\1;\2;\3;\4;\5/p' \
-        tests/bench_peers.h | awk -F ';' -v before="$2" -v behind="$3" '{
+    number='\([0-9.]*\)'
+    fields='"\(.*\)", '"$number, $number, $number, $number"
+    sed -n 's/^ *{ "'"$1"'", '"$fields"' }.*/\1;\2;\3;\4;\5/p' tests/bench_peers.h |
+        awk -F ';' -v before="$2" -v behind="$3" '{
             printf "| %s (quoted) | %s | %s |", $1, $2, $3
             for (i = 0; i < before; i++) printf " |"
             printf " %s | %s |", $4, $5
@@ -46,7 +48,8 @@ peers() # scene before behind
 
 columns="cpu_ratio:%.3f psnr_terrain:%.1f ssim:%.3f psnr_4x4:%.1f pop_block:%.1f holes:%d
          triangles:%d draws:%d captures:%.2f"
-heading="cost | PSNR | SSIM | PSNR to 4 x 4 samples | worst pop | holes | triangles | draws | captures |
+heading="cost | PSNR | SSIM | PSNR to 4 x 4 samples | worst pop | holes | triangles | draws |\
+ captures |
 |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
 
 rough()
@@ -70,7 +73,8 @@ pyrenees()
 # What auto and impostor gain at equal quality: the last table of each scene in frames.md.
 faster()
 {
-    echo "| | cost by the clock | PSNR | than our geomip | by processor time | at equal SSIM | than peers (quoted) | by processor time |"
+    echo "| | cost by the clock | PSNR | than our geomip | by processor time | at equal SSIM |" \
+        "than peers (quoted) | by processor time |"
     echo "|---|--:|--:|--:|--:|--:|--:|--:|"
     awk '/^## / { scene = $2; sub(/,.*/, "", scene); if (/materials/) scene = "materials"
                   if (/trees/) scene = "trees" }
@@ -127,7 +131,8 @@ growth()
 
 cpu()
 {
-    echo "| terrain | way | update, median ms | 99 % | render, median ms | worst of the start | view KiB |"
+    echo "| terrain | way | update, median ms | 99 % | render, median ms | worst of the start |" \
+        "view KiB |"
     echo "|--:|---|--:|--:|--:|--:|--:|"
     awk -F '\t' 'NR > 1 && $1 >= 1025 && $2 !~ /room/ {
         printf "| %s | %s | %.2f | %.2f | %.3f | %.1f | %d |\n", $1, $2, $3, $4, $5, $7, $11 / 1024
@@ -140,8 +145,12 @@ building()
 }
 
 simplifier() { rows $bench/simplifier.tsv; }
-atlas() { awk -F '\t' '$1 == "atlas" { table++ } $1 == "packer" { exit } table == 1' $bench/atlas.tsv > $new/atlas.tsv
-          rows $new/atlas.tsv; }
+
+atlas()
+{
+    awk -F '\t' '$1 == "packer" { exit } { print }' $bench/atlas.tsv > $new/atlas.tsv
+    rows $new/atlas.tsv
+}
 
 # ---- taking over
 

@@ -45,7 +45,7 @@ const char gl_morphing_vertex[] = VERTEX_HEAD
     "    return position.y + factor * (move.x + dot(move.yz, along));\n"
     "}\n" VERTEX_MAIN;
 
-/* Fragment shaders of terrain: this head, the text that shades (gl_terrain_desc.shading), a main. */
+/* Fragment shaders of terrain: this head, the text that shades, as in gl_terrain_desc, a main. */
 #define FRAGMENT_HEAD               \
     "#version 330 core\n"           \
     "uniform sampler2D lightmap;\n" \
