@@ -68,7 +68,7 @@ static void box_nodes(recording *r, const terrimp_heightfield *field)
 {
     uint32_t level, x, z, node = 0;
     for (level = 0; level < LEVELS; level++) {
-        uint32_t width = CHUNK << level, side = (uint32_t)CHUNKS >> level;
+        uint32_t width = (uint32_t)CHUNK << level, side = (uint32_t)CHUNKS >> level;
         r->level_first[level] = node;
         for (z = 0; z < side; z++)
             for (x = 0; x < side; x++) {
