@@ -651,6 +651,7 @@ static void measure(const run *r, const context *frame)
     for (i = 1; i < count; i++)
         write_pictures(r, &ways[i]);
     say("\n(%.0f s)\n", (clock_ms() - start) * 1e-3);
+    fflush(NULL); /* the figures of a scene stay, whatever becomes of the next */
     fine_close(&f);
     quad_close(&q);
     for (i = 0; i < count; i++)
