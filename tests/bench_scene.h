@@ -45,7 +45,8 @@ typedef struct scene {
     void *bake[SCENE_CHUNKS];               /* that it lies in, when it was read from a file */
     double build_s[SCENE_CHUNKS];           /* what building it took; 0: it was read */
     size_t vertex_bytes;                    /* of gl_terrain_desc */
-    gl_terrain gl[SCENE_CHUNKS];            /* of ways that keep no pictures */
+    gl_terrain gl[SCENE_CHUNKS];            /* of ways that keep no pictures, or of all */
+    uint32_t shared_atlas;                  /* its atlas, when all ways share it; else 0 */
     int is_open[SCENE_CHUNKS];
 } scene;
 
@@ -212,11 +213,12 @@ static void scene_open_gl(scene *s, int terrain, uint32_t atlas_size, gl_terrain
         bench_stop(s->desc->name, trouble);
 }
 
-/* The OpenGL side for ways that keep no pictures: its atlases are as small as may be. */
+/* The OpenGL side for ways that keep no pictures: its atlases are as small as may be, unless a way
+   that keeps some shares it. */
 static gl_terrain *scene_shared_gl(scene *s, int terrain)
 {
     if (!s->is_open[terrain])
-        scene_open_gl(s, terrain, 64, &s->gl[terrain]);
+        scene_open_gl(s, terrain, s->shared_atlas ? s->shared_atlas : 64, &s->gl[terrain]);
     s->is_open[terrain] = 1;
     return &s->gl[terrain];
 }

@@ -87,7 +87,7 @@ static void contender_open(contender *c, const way *w, scene *s, look *l)
     } else {
         need(terrimp_view_create(s->terrain[terrain], &desc, NULL, &c->view));
     }
-    if (!way_has_memory(w) && w->morph_ratio <= 1.0f) {
+    if ((!way_has_memory(w) || s->shared_atlas == desc.atlas_size) && w->morph_ratio <= 1.0f) {
         c->gl = scene_shared_gl(s, terrain);
         return;
     }
