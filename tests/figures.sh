@@ -155,7 +155,7 @@ atlas()
 # ---- taking over
 
 for file in $bench/*.md $bench/*.tsv $bench/*.svg; do
-    case $file in */frame_times.tsv) continue ;; esac
+    case $file in */frame_times.tsv | *'*'*) continue ;; esac
     cp "$file" $results/ || exit 1
 done
 for plot in $results/*.svg; do # shown where the text names it
@@ -163,11 +163,21 @@ for plot in $results/*.svg; do # shown where the text names it
     sed -i "s|^Plot: $bench/$name\$|![$name]($name)|" $results/*.md
 done
 
+# A table of which nothing was measured stays as it is: two lines are its headings.
 for name in $(sed -n 's/^<!-- figures \([a-z]*\) -->$/\1/p' README.md); do
-    $name > $new/$name.md || exit 1
+    $name > $new/$name.md 2> /dev/null
+    if [ "$(wc -l < $new/$name.md)" -lt 3 ]; then
+        echo "figures: $name: not measured, its table stays"
+        rm -f $new/$name.md
+    fi
 done
 awk -v new=$new '
-    /^<!-- figures / { print; file = new "/" $3 ".md"; while ((getline line < file) > 0) print line
-                       close(file); skip = 1; next }
+    /^<!-- figures / {
+        print
+        file = new "/" $3 ".md"
+        while ((getline line < file) > 0) { print line; skip = 1 }
+        close(file)
+        next
+    }
     /^<!-- end -->/ { skip = 0 }
     !skip' README.md > $new/README.md && cp $new/README.md README.md
