@@ -118,14 +118,14 @@ rows() # file.tsv
 
 scale()
 {
-    awk -F '\t' '$1 == "samples" { table++ } table == 1' $bench/scale.tsv |
+    awk -F '\t' '$1 == "samples" { table++ } table == 1' $results/scale.tsv |
         cut -f 1-3,7,9-14 > $new/scale.tsv
     rows $new/scale.tsv
 }
 
 growth()
 {
-    awk -F '\t' '$1 == "samples" { table++ } table == 3' $bench/scale.tsv > $new/growth.tsv
+    awk -F '\t' '$1 == "samples" { table++ } table == 3' $results/scale.tsv > $new/growth.tsv
     rows $new/growth.tsv
 }
 
@@ -154,8 +154,14 @@ atlas()
 
 # ---- taking over
 
+# The sizes that only BENCH_ALL measures are not lost to a run without it.
+kept=none
+if grep -q '^16385' $results/scale.tsv && ! grep -q '^16385' $bench/scale.tsv; then
+    echo "figures: scale: without 16385 x 16385, what there was stays"
+    kept="$bench/scale.*"
+fi 2> /dev/null
 for file in $bench/*.md $bench/*.tsv $bench/*.svg; do
-    case $file in */frame_times.tsv | *'*'*) continue ;; esac
+    case $file in */frame_times.tsv | *'*'* | $kept) continue ;; esac
     cp "$file" $results/ || exit 1
 done
 for plot in $results/*.svg; do # shown where the text names it
