@@ -9,6 +9,7 @@
 ## make bench     measures; tables and plots also go to build/bench/
 ##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
 ##                  BENCH_ALL=1      the whole protocol, for hours
+## make figures   takes what bench left over into README.md and tests/results
 ## make check-portable   every compiler, other machines under an emulator, no operating system
 ## make sizes     bytes of code for small machines
 ## make fuzz SECONDS=60   looks for input that breaks the library, so long for each fuzzer
@@ -82,7 +83,13 @@ test: | $(DEPS)
 	@sh tests/run.sh
 
 bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
-	@for name in $(BENCHES); do echo "---- $$name"; $(BUILD)/$$name || exit 1; done
+	@for name in $(BENCHES); do \
+	    start=$$(date +%s); echo; echo "---- $$name"; $(BUILD)/$$name || exit 1; \
+	    echo "---- $$name took $$(($$(date +%s) - start)) s"; \
+	done
+
+figures:
+	@sh tests/figures.sh
 
 # The rough terrain on which other engines have been measured.
 build/bench/rough.hgt: ../shared/tools/rough.c
@@ -135,6 +142,6 @@ $(BUILD)/parallel_build: LIBS = -lpthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
-.PHONY: all help deps demo test bench clean deps-portable check-portable sizes coverage analyse fuzz \
+.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz \
         $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
 .SECONDARY:

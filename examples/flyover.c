@@ -9,17 +9,14 @@
 #include "terrimp.h"
 
 #include "host/context.h"
-#include "host/dem.h"
-#include "host/flight.h"
 #include "host/gl_terrain.h"
 #include "host/image.h"
 #include "host/lightmap.h"
 #include "host/options.h"
-#include "host/procedural.h"
 #include "host/stats.h"
+#include "host/tour.h"
 
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,13 +37,11 @@ typedef struct contender {
 
 typedef struct flyover {
     options options;
-    dem dem;                      /* owns the samples of the field */
-    terrimp_heightfield field;
+    tour tour;                    /* samples and flight */
     terrimp_terrain *terrain;
     terrimp_terrain_info info;
     context context;
     gl_terrain gl;
-    flight flight;
     contender chosen, full;       /* full takes part with --compare only */
     FILE *table;
     stats psnr, psnr_terrain;     /* of each compared frame [dB] */
@@ -84,67 +79,61 @@ static void *allocate(size_t bytes)
 
 /* ---- The terrain -------------------------------------------------------- */
 
-/* Samples from a file; voids are filled in place. */
-static void load_dem(flyover *f)
+static void load_samples(flyover *f)
 {
-    const char *trouble;
-    size_t filled;
-    if (!dem_load(&f->dem, f->options.dem, &f->options.file))
-        stop(f->dem.error);
-    filled = dem_fill_voids(&f->dem, &trouble);
-    if (trouble)
-        stop(trouble);
-    f->field = dem_heightfield(&f->dem);
-    printf("voids_filled %zu\n", filled);
-}
-
-static void make_procedural(flyover *f)
-{
-    uint32_t size = f->options.terrain_size;
-    f->dem.samples = procedural_terrain(size, size, f->options.seed);
-    if (!f->dem.samples)
-        stop("no memory for the terrain");
-    f->dem.width = f->dem.depth = size;
-    f->dem.format = TERRIMP_FORMAT_U16;
-    f->dem.spacing_x = f->dem.spacing_z = 1.0f;
-    f->field = dem_heightfield(&f->dem);
-    f->field.height_scale = PROCEDURAL_HEIGHT_SCALE;
+    const options *o = &f->options;
+    tour_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.dem = o->dem;
+    desc.file = o->file;
+    desc.size = o->terrain_size;
+    desc.seed = o->seed;
+    memcpy(desc.spacing, o->spacing, sizeof desc.spacing);
+    desc.height_scale = o->height_scale;
+    desc.path = o->path;
+    desc.frames = o->frames;
+    desc.speed = o->speed;
+    desc.fps = o->fps;
+    desc.fov_y_rad = o->fov_degrees * DEGREE;
+    desc.width = o->width;
+    desc.height = o->height;
+    if (!tour_load(&f->tour, &desc))
+        stop(f->tour.error);
+    if (o->dem)
+        printf("voids_filled %zu\n", f->tour.voids_filled);
 }
 
 static void build_terrain(flyover *f)
 {
     terrimp_terrain_desc desc;
     double start;
-    if (f->options.dem)
-        load_dem(f);
-    else
-        make_procedural(f);
-    if (f->options.spacing[0] > 0.0f) {
-        f->field.spacing_x = f->options.spacing[0];
-        f->field.spacing_z = f->options.spacing[1];
-    }
-    if (f->options.height_scale > 0.0f)
-        f->field.height_scale = f->options.height_scale;
+    load_samples(f);
     memset(&desc, 0, sizeof desc);
-    desc.field = f->field;
+    desc.field = f->tour.field;
     desc.chunk_quads = f->options.chunk;
     start = clock_ms();
     need(terrimp_terrain_create(&desc, NULL, &f->terrain));
     need(terrimp_terrain_get_info(f->terrain, &f->info));
-    printf("samples %ux%u\nchunks %u\nbuild_ms %.1f\n", f->field.width, f->field.depth,
-           f->info.chunks_x * f->info.chunks_z, clock_ms() - start);
+    printf("samples %ux%u\nchunks %u\nbuild_ms %.1f\n", f->tour.field.width,
+           f->tour.field.depth, f->info.chunks_x * f->info.chunks_z, clock_ms() - start);
 }
 
 static void open_graphics(flyover *f)
 {
-    uint8_t *lightmap = lightmap_bake(&f->field);
+    uint8_t *lightmap = lightmap_bake(&f->tour.field);
+    gl_terrain_desc desc;
     const char *trouble;
     if (!lightmap)
         stop("no memory for the lightmap");
+    memset(&desc, 0, sizeof desc);
+    desc.frame = &f->context;
+    desc.terrain = f->terrain;
+    desc.field = &f->tour.field;
+    desc.lightmap = lightmap;
+    desc.atlas_size = f->chosen.desc.atlas_size;
     trouble = context_open(&f->context, (int)f->options.width, (int)f->options.height);
     if (!trouble)
-        trouble = gl_terrain_open(&f->gl, &f->context, f->terrain, &f->field, lightmap,
-                                  f->chosen.desc.atlas_size);
+        trouble = gl_terrain_open(&f->gl, &desc);
     if (!trouble && f->chosen.desc.morph_ratio > 1.0f)
         trouble = gl_terrain_use_morphing(&f->gl);
     if (trouble)
@@ -153,7 +142,7 @@ static void open_graphics(flyover *f)
     printf("renderer %s\n", context_renderer());
 }
 
-/* ---- The views and the flight ------------------------------------------- */
+/* ---- The views ---------------------------------------------------------- */
 
 static void open_contender(flyover *f, contender *c, const char *name, int mode)
 {
@@ -184,58 +173,7 @@ static void open_contender(flyover *f, contender *c, const char *name, int mode)
     need(terrimp_view_create(f->terrain, &desc, NULL, &c->view));
 }
 
-static void plan_flight(flyover *f)
-{
-    float speed = f->options.speed, spacing = f->dem.spacing_x;
-    size_t count = f->options.frames;
-    int ok;
-    if (f->options.spacing[0] > 0.0f)
-        spacing = f->options.spacing[0];
-    if (!(speed > 0.0f))
-        speed = 80.0f * spacing;
-    if (f->options.path)
-        ok = flight_load(&f->flight, f->options.path);
-    else
-        ok = flight_circle(&f->flight, &f->field, count ? count : 600, speed / f->options.fps);
-    if (!ok)
-        stop(f->flight.error);
-    if (count && count < f->flight.count)
-        f->flight.count = count;
-}
-
-/* The camera of a frame; its clip distances hold the whole terrain. */
-static terrimp_camera camera_of(const flyover *f, size_t frame)
-{
-    const flight_pose *pose = &f->flight.poses[frame];
-    terrimp_camera camera;
-    int i;
-    memset(&camera, 0, sizeof camera);
-    for (i = 0; i < 3; i++) {
-        camera.eye[i] = pose->eye[i];
-        camera.forward[i] = pose->target[i] - pose->eye[i];
-    }
-    camera.fov_y_rad = f->options.fov_degrees * DEGREE;
-    camera.width_px = f->options.width;
-    camera.height_px = f->options.height;
-    camera.z_far = terrimp_box_farthest(&f->info.box, camera.eye) * 1.2f;
-    camera.z_near = camera.z_far * (1.0f / 8192.0f);
-    return camera;
-}
-
 /* ---- A frame ------------------------------------------------------------ */
-
-/* Brings the clip distances to what the update says is needed: the depth buffer's precision goes
-   where there is something to draw. */
-static void tighten(terrimp_camera *camera, const terrimp_stats *now)
-{
-    float up = tanf(0.5f * camera->fov_y_rad);
-    float right = up * (float)camera->width_px / (float)camera->height_px;
-    float corner = 1.0f / sqrtf(1.0f + up * up + right * right); /* depth of a ray of length 1 */
-    if (now->z_near * corner > camera->z_near)
-        camera->z_near = now->z_near * corner;
-    if (now->z_far > camera->z_near)
-        camera->z_far = now->z_far * 1.01f;
-}
 
 /* Draws a frame; what is timed is all that a host would do for it. */
 static double draw_frame(flyover *f, contender *c, terrimp_camera camera)
@@ -244,7 +182,7 @@ static double draw_frame(flyover *f, contender *c, terrimp_camera camera)
     double start = clock_ms(), ms;
     need(terrimp_view_update(c->view, &camera));
     need(terrimp_view_get_stats(c->view, &c->now));
-    tighten(&camera, &c->now);
+    tour_tighten(&camera, &c->now);
     need(gl_terrain_begin(&f->gl, &camera, f->options.sky));
     need(terrimp_view_render(c->view, &callbacks));
     gl_terrain_end(&f->gl);
@@ -356,23 +294,13 @@ static void note_frame(flyover *f, size_t frame, double ms, double full_ms)
 static void show_progress(const flyover *f, size_t frame, double ms)
 {
     if (isatty(2))
-        fprintf(stderr, "\rframe %zu of %zu, %.1f ms%s", frame + 1, f->flight.count, ms,
-                frame + 1 == f->flight.count ? "        \n" : "        ");
-}
-
-static double smallest(const stats *s)
-{
-    double least = s->values[0];
-    size_t i;
-    for (i = 1; i < s->count; i++)
-        if (s->values[i] < least)
-            least = s->values[i];
-    return least;
+        fprintf(stderr, "\rframe %zu of %zu, %.1f ms%s", frame + 1, f->tour.flight.count, ms,
+                frame + 1 == f->tour.flight.count ? "        \n" : "        ");
 }
 
 static void print_summary(const flyover *f)
 {
-    double frames = (double)f->flight.count;
+    double frames = (double)f->tour.flight.count;
     stats_summary summary = stats_summarise(&f->chosen.ms);
     printf("mode %s\nframes %.0f\n", f->options.mode, frames);
     stats_print(stdout, "ms", summary);
@@ -386,11 +314,11 @@ static void print_summary(const flyover *f)
     printf("worst_parallax_px %.3f\n", (double)f->worst_parallax_px);
     if (f->options.compare) {
         stats_summary full = stats_summarise(&f->full.ms);
+        stats_summary psnr = stats_summarise(&f->psnr);
+        stats_summary terrain = stats_summarise(&f->psnr_terrain);
         stats_print(stdout, "full_ms", full);
-        printf("psnr_mean %.2f\npsnr_worst %.2f\n", stats_summarise(&f->psnr).mean,
-               smallest(&f->psnr));
-        printf("psnr_terrain_mean %.2f\npsnr_terrain_worst %.2f\n",
-               stats_summarise(&f->psnr_terrain).mean, smallest(&f->psnr_terrain));
+        printf("psnr_mean %.2f\npsnr_worst %.2f\n", psnr.mean, psnr.least);
+        printf("psnr_terrain_mean %.2f\npsnr_terrain_worst %.2f\n", terrain.mean, terrain.least);
         printf("speed_up %.2f\n", full.median / summary.median);
     }
 }
@@ -400,8 +328,8 @@ static void print_summary(const flyover *f)
 static void fly(flyover *f)
 {
     size_t frame;
-    for (frame = 0; frame < f->flight.count; frame++) {
-        terrimp_camera camera = camera_of(f, frame);
+    for (frame = 0; frame < f->tour.flight.count; frame++) {
+        terrimp_camera camera = tour_camera(&f->tour, &f->info.box, frame);
         double ms = run_contender(f, &f->chosen, &camera, frame), full_ms = 0.0;
         if (f->options.compare) {
             full_ms = run_contender(f, &f->full, &camera, frame);
@@ -427,11 +355,10 @@ static void close_all(flyover *f)
     close_contender(&f->full);
     stats_free(&f->psnr);
     stats_free(&f->psnr_terrain);
-    flight_free(&f->flight);
     gl_terrain_close(&f->gl);
     context_close(&f->context);
     terrimp_terrain_destroy(f->terrain);
-    dem_free(&f->dem);
+    tour_close(&f->tour);
 }
 
 int main(int argc, char **argv)
@@ -444,7 +371,8 @@ int main(int argc, char **argv)
         return 0;
     }
     build_terrain(&f);
-    plan_flight(&f);
+    if (!tour_plan(&f.tour))
+        stop(f.tour.error);
     open_contender(&f, &f.chosen, f.options.mode, f.options.terrimp_mode);
     if (f.options.compare)
         open_contender(&f, &f.full, "full", TERRIMP_MODE_FULL);

@@ -10,21 +10,18 @@
    Churn     Slots of random sizes are allocated; when one does not fit, others are freed until it
              does. How full the atlas is then, and the time of one allocation or freeing.
 
-   Build:  cc -O2 -std=c99 -I. tests/bench_atlas.c examples/host/flight.c \
-               examples/host/procedural.c -lm -o bench_atlas
-   Run:    ./bench_atlas     (BENCH_FRAMES is the number of frames of a flight [1200]) */
-#define _POSIX_C_SOURCE 199309L
+   Build:  make bench_atlas
+   Use:    build/bench_atlas   (BENCH_FRAMES is the number of frames of a flight [900])
+   Leaves: build/bench/atlas.md (what it prints), atlas.tsv (its rows) */
+#define _POSIX_C_SOURCE 200112L
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
-#include "examples/host/flight.h"
-#include "examples/host/procedural.h"
+#include "bench_say.h"
+
+#include "examples/host/tour.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <time.h>
 
 #ifdef __has_include
 #if __has_include(<stb/stb_rect_pack.h>)
@@ -43,9 +40,7 @@ enum { MAX_NODES = CHUNKS * CHUNKS * 4 / 3 + 1, PAIR_SIDE = 2048, MARGIN = 2, LA
 
 static double now_us(void)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
+    return clock_cpu_ms() * 1e3;
 }
 
 /* ---- what a flight sees ---- */
@@ -64,25 +59,16 @@ typedef struct recording {
     uint32_t frame_count;
 } recording;
 
-static void fail(const char *why)
-{
-    fprintf(stderr, "bench_atlas: %s\n", why);
-    exit(1);
-}
-
 static void *allocate(size_t bytes)
 {
-    void *memory = calloc(1, bytes);
-    if (!memory)
-        fail("no memory");
-    return memory;
+    return memset(need_memory(bytes), 0, bytes);
 }
 
 static void box_nodes(recording *r, const terrimp_heightfield *field)
 {
     uint32_t level, x, z, node = 0;
     for (level = 0; level < LEVELS; level++) {
-        uint32_t width = CHUNK << level, side = (uint32_t)CHUNKS >> level;
+        uint32_t width = (uint32_t)CHUNK << level, side = (uint32_t)CHUNKS >> level;
         r->level_first[level] = node;
         for (z = 0; z < side; z++)
             for (x = 0; x < side; x++) {
@@ -118,34 +104,28 @@ static void see(const recording *r, frame *f, const terrimp_frustum *frustum, ui
 
 static void fly(recording *r, uint32_t top_level, uint32_t frame_count)
 {
-    terrimp_heightfield field;
-    uint16_t *samples = procedural_terrain(SIDE, SIDE, 1);
-    flight path;
+    const terrimp_box anywhere = {{0.0f, 0.0f, 0.0f}, {1.0f, 1.0f, 1.0f}};
+    tour_desc desc;
+    tour path;
     uint32_t i;
     int k;
-    if (!samples)
-        fail("no memory");
-    memset(&field, 0, sizeof field);
-    field.samples = samples;
-    field.width = field.depth = SIDE;
-    field.format = TERRIMP_FORMAT_U16;
-    field.height_scale = PROCEDURAL_HEIGHT_SCALE;
-    box_nodes(r, &field);
-    if (!flight_circle(&path, &field, frame_count, 80.0f / 60.0f))
-        fail(path.error);
+    memset(&desc, 0, sizeof desc);
+    desc.size = SIDE;
+    desc.seed = 1;
+    desc.frames = frame_count;
+    desc.width = 1280;
+    desc.height = 1024;
+    if (!tour_load(&path, &desc) || !tour_plan(&path))
+        bench_stop("the flight", path.error);
+    box_nodes(r, &path.field);
     r->frames = (frame *)allocate(frame_count * sizeof *r->frames);
     r->frame_count = frame_count;
     for (i = 0; i < frame_count; i++) {
         frame *f = &r->frames[i];
-        terrimp_camera camera;
+        terrimp_camera camera = tour_camera(&path, &anywhere, i);
         terrimp_frustum frustum;
-        memset(&camera, 0, sizeof camera);
-        for (k = 0; k < 3; k++) {
-            f->eye[k] = camera.eye[k] = path.poses[i].eye[k];
-            camera.forward[k] = path.poses[i].target[k] - path.poses[i].eye[k];
-        }
-        camera.width_px = 1280;
-        camera.height_px = 1024;
+        for (k = 0; k < 3; k++)
+            f->eye[k] = camera.eye[k];
         camera.z_near = 1.0f;
         camera.z_far = 1e5f;
         terrimp_camera_pixel_factor(&camera, &r->pixel_factor);
@@ -154,8 +134,7 @@ static void fly(recording *r, uint32_t top_level, uint32_t frame_count)
         see(r, f, &frustum, LEVELS - 1, 0, 0, top_level);
         f->nodes = (uint32_t *)realloc(f->nodes, (f->count + 1u) * sizeof *f->nodes);
     }
-    flight_free(&path);
-    free(samples);
+    tour_close(&path);
 }
 
 static void forget(recording *r)
@@ -186,7 +165,7 @@ typedef struct figures {
 } figures;
 
 typedef struct replay {
-    const recording *tour;
+    const recording *flown;
     const frame *now;
     uint32_t number;       /* of the frame */
     float texels_per_px;
@@ -200,17 +179,17 @@ static void size_of(const replay *p, uint32_t node, uint32_t size[2])
 {
     terrimp_capture capture;
     size[0] = size[1] = 0;
-    if (terrimp_capture_fit(&p->tour->boxes[node], p->now->eye, &capture) != TERRIMP_OK ||
-        terrimp_impostor_size(&capture, p->tour->pixel_factor, p->texels_per_px, 8, LARGEST, size,
+    if (terrimp_capture_fit(&p->flown->boxes[node], p->now->eye, &capture) != TERRIMP_OK ||
+        terrimp_impostor_size(&capture, p->flown->pixel_factor, p->texels_per_px, 8, LARGEST, size,
                               NULL) != TERRIMP_OK)
-        fail("an impostor has no size");
+        bench_stop("the flight", "an impostor has no size");
     size[0] += 2u * MARGIN;
     size[1] += 2u * MARGIN;
 }
 
 static float sharpness_of(const replay *p, uint32_t node)
 {
-    return p->texels_per_px / terrimp_box_distance(&p->tour->boxes[node], p->now->eye);
+    return p->texels_per_px / terrimp_box_distance(&p->flown->boxes[node], p->now->eye);
 }
 
 /* Whether a node needs a new picture: the criteria of terrimp's view, without the parallax. */
@@ -220,7 +199,7 @@ static int expired(const replay *p, uint32_t node)
     float angle, wanted = sharpness_of(p, node);
     if (is->size[0] == 0)
         return 1;
-    terrimp_view_angle(&p->tour->boxes[node], is->eye, p->now->eye, &angle);
+    terrimp_view_angle(&p->flown->boxes[node], is->eye, p->now->eye, &angle);
     return angle > MAX_ANGLE || wanted > 1.25f * is->sharpness || is->sharpness > 2.5f * wanted;
 }
 
@@ -308,7 +287,7 @@ static float worth(const replay *p, uint32_t node)
         return -1.0f;
     if (is->seen < p->number)
         return 0.1f * texels / (float)(p->number - is->seen);
-    terrimp_view_angle(&p->tour->boxes[node], is->eye, p->now->eye, &angle);
+    terrimp_view_angle(&p->flown->boxes[node], is->eye, p->now->eye, &angle);
     return texels * (1.1f - terrimpi_min(angle / MAX_ANGLE, 1.0f));
 }
 
@@ -478,7 +457,7 @@ static int assign_stb(pair_scheme *s, terrimp_pair_slot *slot, const uint32_t si
 /* Packs the outdated atlas for what is visible; pictures that only it held are lost. */
 static void repack_pair(replay *p, pair_scheme *s)
 {
-    uint32_t i, count = p->tour->node_count;
+    uint32_t i, count = p->flown->node_count;
     for (i = 0; i < count; i++) {
         uint32_t size[2] = {0, 0};
         if (p->pictures[i].seen == p->number)
@@ -557,23 +536,23 @@ static void renew_pair(replay *p, void *scheme)
 typedef void (*renew_function)(replay *p, void *scheme);
 
 /* Flies once and returns what was held; stops where something is lacking. */
-static figures run(const recording *tour, float texels_per_px, renew_function renew, void *scheme)
+static figures run(const recording *flown, float texels_per_px, renew_function renew, void *scheme)
 {
     replay p;
     uint32_t i, k;
-    double frames = (double)tour->frame_count;
+    double frames = (double)flown->frame_count;
     memset(&p, 0, sizeof p);
-    p.tour = tour;
+    p.flown = flown;
     p.texels_per_px = texels_per_px;
-    p.pictures = (picture *)allocate(tour->node_count * sizeof *p.pictures);
-    p.queue = (uint32_t *)allocate(tour->node_count * sizeof *p.queue);
-    for (i = 0; i < tour->frame_count && p.sum.lacking == 0; i++) {
+    p.pictures = (picture *)allocate(flown->node_count * sizeof *p.pictures);
+    p.queue = (uint32_t *)allocate(flown->node_count * sizeof *p.queue);
+    for (i = 0; i < flown->frame_count && p.sum.lacking == 0; i++) {
         double visible = 0.0;
-        p.now = &tour->frames[i];
+        p.now = &flown->frames[i];
         p.number = i + 1u;
         enqueue_expired(&p);
         renew(&p, scheme);
-        for (k = 0; k < tour->node_count; k++) {
+        for (k = 0; k < flown->node_count; k++) {
             double texels = (double)p.pictures[k].size[0] * (double)p.pictures[k].size[1];
             p.sum.texels += texels;
             visible += p.pictures[k].seen == p.number ? texels : 0.0;
@@ -591,25 +570,25 @@ static figures run(const recording *tour, float texels_per_px, renew_function re
 
 enum { LIVE, PAIR, PAIR_STB };
 
-static figures run_scheme(const recording *tour, float texels_per_px, int scheme)
+static figures run_scheme(const recording *flown, float texels_per_px, int scheme)
 {
     figures result;
     if (scheme == LIVE) {
         live_scheme live;
-        open_live(&live, 2 * PAIR_SIDE, PAIR_SIDE, tour->node_count);
-        result = run(tour, texels_per_px, renew_live, &live);
+        open_live(&live, 2 * PAIR_SIDE, PAIR_SIDE, flown->node_count);
+        result = run(flown, texels_per_px, renew_live, &live);
         close_live(&live);
     } else {
         pair_scheme pair;
-        open_pair(&pair, tour->node_count, scheme == PAIR_STB);
-        result = run(tour, texels_per_px, renew_pair, &pair);
+        open_pair(&pair, flown->node_count, scheme == PAIR_STB);
+        result = run(flown, texels_per_px, renew_pair, &pair);
         close_pair(&pair);
     }
     return result;
 }
 
 /* The last sharpness, within 2 %, at which a flight lacks nothing. */
-static figures sharpest(const recording *tour, int scheme, float *texels_per_px)
+static figures sharpest(const recording *flown, int scheme, float *texels_per_px)
 {
     figures best;
     float low = 0.1f, high = 8.0f;
@@ -617,7 +596,7 @@ static figures sharpest(const recording *tour, int scheme, float *texels_per_px)
     *texels_per_px = low;
     while (high > 1.02f * low) {
         float middle = sqrtf(low * high);
-        figures next = run_scheme(tour, middle, scheme);
+        figures next = run_scheme(flown, middle, scheme);
         if (next.lacking) {
             high = middle;
         } else {
@@ -631,33 +610,32 @@ static figures sharpest(const recording *tour, int scheme, float *texels_per_px)
 static void print_flight(const char *name, float texels_per_px, const figures *f, double thesis)
 {
     const double percent = 100.0 / (2.0 * PAIR_SIDE * PAIR_SIDE);
-    printf("| %s | %.2f | %.1f %% | %.1f %% | %.1f %% | %.2f | %.2f |\n", name,
+    say("| %s | %.2f | %.1f %% | %.1f %% | %.1f %% | %.2f | %.2f |\n", name,
            (double)texels_per_px, percent * f->visible, percent * f->most, percent * f->texels,
            f->captures, f->visible / thesis);
-    fflush(stdout);
 }
 
-static void compare_on_flight(const char *name, const recording *tour)
+static void compare_on_flight(const char *name, const recording *flown)
 {
     double visible = 0.0;
     float sharpness, thesis_sharpness;
     figures thesis, f;
     uint32_t i;
-    for (i = 0; i < tour->frame_count; i++)
-        visible += (double)tour->frames[i].count / (double)tour->frame_count;
-    printf("\n%s: %u frames, %.0f visible impostors in the mean, %u x %u texels\n\n", name,
-           tour->frame_count, visible, 2u * PAIR_SIDE, (unsigned)PAIR_SIDE);
-    printf("| atlas | texels per px | visible texels, mean | most | all texels, mean | captures a "
+    for (i = 0; i < flown->frame_count; i++)
+        visible += (double)flown->frames[i].count / (double)flown->frame_count;
+    say("\n%s: %u frames, %.0f visible impostors in the mean, %u x %u texels\n\n", name,
+           flown->frame_count, visible, 2u * PAIR_SIDE, (unsigned)PAIR_SIDE);
+    say("| atlas | texels per px | visible texels, mean | most | all texels, mean | captures a "
            "frame | against the thesis |\n|---|--:|--:|--:|--:|--:|--:|\n");
-    thesis = sharpest(tour, PAIR, &thesis_sharpness);
+    thesis = sharpest(flown, PAIR, &thesis_sharpness);
     print_flight("two in turn, FFDH (thesis)", thesis_sharpness, &thesis, thesis.visible);
 #ifdef HAVE_STB
-    f = sharpest(tour, PAIR_STB, &sharpness);
+    f = sharpest(flown, PAIR_STB, &sharpness);
     print_flight("two in turn, stb_rect_pack", sharpness, &f, thesis.visible);
 #endif
-    f = run_scheme(tour, thesis_sharpness, LIVE);
+    f = run_scheme(flown, thesis_sharpness, LIVE);
     print_flight("live, as sharp as the thesis'", thesis_sharpness, &f, thesis.visible);
-    f = sharpest(tour, LIVE, &sharpness);
+    f = sharpest(flown, LIVE, &sharpness);
     print_flight("live", sharpness, &f, thesis.visible);
 }
 
@@ -677,13 +655,13 @@ static void add_packing(packing *p, double texels, double top, double us)
 
 static void print_packing(const char *name, const packing *p)
 {
-    printf("| %s | %.1f %% | %.0f |\n", name, 100.0 * p->full / (double)p->frames,
+    say("| %s | %.1f %% | %.0f |\n", name, 100.0 * p->full / (double)p->frames,
            p->us / (double)p->frames);
 }
 
 /* The slots of all that is visible, into an empty atlas as high as they need, in every tenth frame.
    (The live atlas does not keep low: it has no part in this.) */
-static void compare_packing(const recording *tour)
+static void compare_packing(const recording *flown)
 {
     static terrimp_pack_item items[MAX_NODES];
     static terrimp_shelf rows[MAX_NODES];
@@ -699,13 +677,13 @@ static void compare_packing(const recording *tour)
     replay p;
     memset(&ffdh, 0, sizeof ffdh);
     memset(&p, 0, sizeof p);
-    p.tour = tour;
+    p.flown = flown;
     p.texels_per_px = 1.5f;
-    for (i = 0; i < tour->frame_count; i += 10) {
-        uint32_t count = tour->frames[i].count, placed;
+    for (i = 0; i < flown->frame_count; i += 10) {
+        uint32_t count = flown->frames[i].count, placed;
         terrimp_shelves shelves;
         double texels = 0.0, start;
-        p.now = &tour->frames[i];
+        p.now = &flown->frames[i];
         for (k = 0; k < count; k++) {
             uint32_t size[2];
             size_of(&p, p.now->nodes[k], size);
@@ -736,8 +714,8 @@ static void compare_packing(const recording *tour)
         }
 #endif
     }
-    printf("\nPacking at once what a frame of this flight shows\n\n");
-    printf("| packer | full | us |\n|---|--:|--:|\n");
+    say("\nPacking at once what a frame of this flight shows\n\n");
+    say("| packer | full | us |\n|---|--:|--:|\n");
     print_packing("FFDH", &ffdh);
 #ifdef HAVE_STB
     print_packing("stb_rect_pack", &stb);
@@ -844,18 +822,17 @@ static void churn_at(uint32_t smallest, uint32_t largest, float load)
             slots += (double)c.live.atlas.slot_count / (STEPS - STEPS / 3);
         }
     }
-    printf("| %u to %u | ", smallest, largest);
+    say("| %u to %u | ", smallest, largest);
     if (load > 0.0f)
-        printf("%.0f %% | %.1f %% | ", 100.0 * (double)load, 100.0 * full);
+        say("%.0f %% | %.1f %% | ", 100.0 * (double)load, 100.0 * full);
     else
-        printf("evict | %.1f %% | ", 100.0 * full);
-    printf("%.0f | %.1f %% | %.1f | %.1f | ", slots, 100.0 * c.failures / (double)c.allocs,
+        say("evict | %.1f %% | ", 100.0 * full);
+    say("%.0f | %.1f %% | %.1f | %.1f | ", slots, 100.0 * c.failures / (double)c.allocs,
            c.alloc_us / (double)c.allocs, c.free_us / (double)(c.frees ? c.frees : 1u));
     if (c.evicts)
-        printf("%.0f |\n", c.evict_us / (double)c.evicts);
+        say("%.0f |\n", c.evict_us / (double)c.evicts);
     else
-        printf("- |\n");
-    fflush(stdout);
+        say("- |\n");
     free(c.held);
     close_live(&c.live);
 }
@@ -865,10 +842,10 @@ static void compare_churn(void)
     static const uint32_t smallest[] = {20, 20, 100}, largest[] = {100, 300, 500};
     static const float loads[] = {0.6f, 0.7f, 0.8f, 0.9f, 0.0f};
     uint32_t i, k;
-    printf("\nSlots of random sizes in an atlas of %u x %u texels, freed at random above the "
+    say("\nSlots of random sizes in an atlas of %u x %u texels, freed at random above the "
            "load;\nwith 'evict', what does not fit makes room by evicting what is cheapest\n\n",
            (unsigned)PAIR_SIDE, (unsigned)PAIR_SIDE);
-    printf("| widths | load | full, mean | slots | fit nowhere | alloc us | free us | evict us |\n"
+    say("| widths | load | full, mean | slots | fit nowhere | alloc us | free us | evict us |\n"
            "|---|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < 3; i++)
         for (k = 0; k < 5; k++)
@@ -877,16 +854,18 @@ static void compare_churn(void)
 
 int main(void)
 {
-    static recording tour;
-    const char *wanted = getenv("BENCH_FRAMES");
-    uint32_t frames = wanted && atoi(wanted) > 0 ? (uint32_t)atoi(wanted) : 1200u;
-    fly(&tour, 0, frames);
-    compare_on_flight("Impostors of one chunk each, as in the thesis", &tour);
-    compare_packing(&tour);
-    forget(&tour);
-    fly(&tour, LEVELS - 1, frames);
-    compare_on_flight("Impostors of a quadtree", &tour);
-    forget(&tour);
+    static recording flown;
+    uint32_t frames = (uint32_t)bench_frames(900);
+    say_open("atlas", 1);
+    say_machine(NULL);
+    fly(&flown, 0, frames);
+    compare_on_flight("Impostors of one chunk each, as in the thesis", &flown);
+    compare_packing(&flown);
+    forget(&flown);
+    fly(&flown, LEVELS - 1, frames);
+    compare_on_flight("Impostors of a quadtree", &flown);
+    forget(&flown);
     compare_churn();
+    say_close();
     return 0;
 }

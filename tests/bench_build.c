@@ -2,23 +2,16 @@
    processor for a node, errors of the coarse meshes in % of the terrain's range of heights, samples
    that stand out of them by more than a millionth of it, and bytes.
 
-   Build and run: make bench_build && build/bench_build FILE.hgt... */
-#define _POSIX_C_SOURCE 199309L
+   Build:  make bench_build
+   Use:    build/bench_build [FILE.hgt...]     (none: two of the real tiles, if they are there)
+   Leaves: build/bench/build.md (what it prints), build.tsv (its rows) */
+#define _POSIX_C_SOURCE 200112L
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
+
+#include "bench_say.h"
+
 #include "examples/host/dem.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <time.h>
-
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
 
 /* The part of a node's samples that stand out of its mesh. */
 static double standing_out(const terrimp_terrain *t, uint32_t node, float slack)
@@ -60,26 +53,26 @@ static int bench(const terrimp_terrain_desc *desc)
     terrimp_terrain *t = NULL;
     terrimp_box box;
     uint32_t level, node;
-    double start = now_ms(), whole = start, range, *ms;
+    double start = clock_cpu_ms(), whole = start, range, *ms;
     if (!memory || !scratch || terrimp_terrain_init(desc, memory, bytes, &t) ||
         terrimp_terrain_build_begin(t))
         return 0;
     ms = calloc(t->tree.level_count, sizeof *ms);
-    printf("%u x %u samples, begin %.1f ms, scratch %.1f KiB\n", (unsigned)t->desc.field.width,
-           (unsigned)t->desc.field.depth, now_ms() - start, (double)scratch_bytes / 1024.0);
+    say("%u x %u samples, begin %.1f ms, scratch %.1f KiB\n", (unsigned)t->desc.field.width,
+           (unsigned)t->desc.field.depth, clock_cpu_ms() - start, (double)scratch_bytes / 1024.0);
     for (level = 0; level < t->tree.level_count; level++) {
-        start = now_ms();
+        start = clock_cpu_ms();
         for (node = t->tree.level_first[level]; node < t->tree.level_first[level + 1]; node++)
             if (terrimp_terrain_build_node(t, node, scratch, scratch_bytes))
                 return 0;
-        ms[level] = now_ms() - start;
+        ms[level] = clock_cpu_ms() - start;
     }
     terrimp_terrain_build_finish(t);
-    whole = now_ms() - whole;
+    whole = clock_cpu_ms() - whole;
     terrimp_terrain_get_box(t, t->tree.node_count - 1u, &box);
     range = (double)(t->sample_high - t->sample_low);
-    printf("level nodes  ms/node   ms all  max %%  mean max %%  mean rms %%  upper skirt %%  above "
-           "%%  clamped\n");
+    say("\n| level | nodes | ms a node | ms all | max %% | mean max %% | mean rms %% | "
+        "upper skirt %% | above %% | clamped |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (level = 0; level < t->tree.level_count; level++) {
         double most = 0, sum = 0, rms = 0, skirt = 0, above = 0;
         uint32_t nodes = t->tree.level_first[level + 1] - t->tree.level_first[level], clamped = 0;
@@ -94,12 +87,12 @@ static int bench(const terrimp_terrain_desc *desc)
             for (i = 0; i < mesh->vertex_count; i++)
                 clamped += t->points[(size_t)node * t->vertex_limit + i].height % 65535u == 0;
         }
-        printf("%3u %7u %8.2f %8.0f %6.2f %8.2f %11.3f %11.2f %12.3f %6u\n", (unsigned)level,
+        say("| %u | %u | %.2f | %.0f | %.2f | %.2f | %.3f | %.2f | %.3f | %u |\n", (unsigned)level,
                (unsigned)nodes, ms[level] / nodes, ms[level], 100 * most / range,
                100 * sum / nodes / range, 100 * rms / nodes / range, 100 * skirt / nodes / range,
                100 * above / nodes, (unsigned)clamped);
     }
-    printf("in all %.0f ms, %.2f times level 0; %.1f bytes a node, %.3f a sample\n", whole,
+    say("\nIn all %.0f ms, %.2f times level 0; %.1f bytes a node, %.3f a sample\n", whole,
            whole / ms[0], (double)bytes / t->tree.node_count,
            (double)bytes / ((double)t->desc.field.width * t->desc.field.depth));
     free(memory);
@@ -108,24 +101,42 @@ static int bench(const terrimp_terrain_desc *desc)
     return 1;
 }
 
+static void bench_file(const char *path)
+{
+    terrimp_terrain_desc desc = {0};
+    const dem_desc whole = {0};
+    const char *trouble = NULL;
+    dem d;
+    if (!dem_load(&d, path, &whole))
+        bench_stop(path, d.error);
+    dem_fill_voids(&d, &trouble);
+    desc.field = dem_heightfield(&d);
+    say("\n%s: ", path);
+    if (!bench(&desc))
+        bench_stop(path, "it cannot be built");
+    dem_free(&d);
+}
+
 int main(int argc, char **argv)
 {
+    static const char *const tiles[] = {"N42E001.hgt", "N49E011.hgt"};
     int i;
-    for (i = 1; i < argc; i++) {
-        terrimp_terrain_desc desc = {0};
-        const dem_desc whole = {0};
-        const char *trouble = NULL;
-        dem d;
-        if (!dem_load(&d, argv[i], &whole)) {
-            fprintf(stderr, "%s\n", d.error);
-            return 1;
+    say_open("build", 1);
+    say_machine(NULL);
+    for (i = 1; i < argc; i++)
+        bench_file(argv[i]);
+    for (i = 0; argc < 2 && i < 2; i++) {
+        char path[1024];
+        FILE *file;
+        snprintf(path, sizeof path, "%s/%s", bench_data(), tiles[i]);
+        file = fopen(path, "rb");
+        if (file) {
+            fclose(file);
+            bench_file(path);
+        } else {
+            say("\n%s is not there\n", path);
         }
-        dem_fill_voids(&d, &trouble);
-        desc.field = dem_heightfield(&d);
-        printf("%s: ", argv[i]);
-        if (!bench(&desc))
-            return 1;
-        dem_free(&d);
     }
+    say_close();
     return 0;
 }

@@ -13,16 +13,13 @@
 #include "terrimp.h"
 
 #include "bench_plot.h"
+#include "bench_say.h"
 
-#include "examples/host/flight.h"
 #include "examples/host/procedural.h"
-#include "examples/host/stats.h"
+#include "examples/host/tour.h"
 
 #include <pthread.h>
-#include <stdarg.h>
-#include <stdlib.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 
 enum { BASE = 1025, THREADED_UP_TO = 2049 };
 
@@ -45,52 +42,12 @@ enum { WAY_COUNT = sizeof ways / sizeof *ways };
 static const uint32_t sizes[] = { 513, 1025, 2049, 4097, 8193, 16385 };
 enum { SIZE_COUNT = sizeof sizes / sizeof *sizes, DEFAULT_SIZE_COUNT = 4 };
 
-static FILE *report, *table;
+static FILE *table;
 static plot frame_plot = { .title = "Deciding and issuing a frame, without graphics",
                            .x_label = "samples along a side", .y_label = "processor time [ms]",
                            .log_x = 1, .log_y = 1 };
 static plot memory_plot = { .title = "Memory of the library", .x_label = "samples along a side",
                             .y_label = "MiB", .log_x = 1, .log_y = 1 };
-
-static void stop(const char *trouble)
-{
-    fprintf(stderr, "bench_cpu: %s\n", trouble);
-    exit(2);
-}
-
-static void need(terrimp_result result)
-{
-    if (result != TERRIMP_OK)
-        stop(terrimp_result_text((int)result));
-}
-
-static void *need_memory(size_t bytes)
-{
-    void *memory = malloc(bytes);
-    if (!memory)
-        stop("out of memory");
-    return memory;
-}
-
-static void say(const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vprintf(format, arguments);
-    va_end(arguments);
-    va_start(arguments, format);
-    vfprintf(report, format, arguments);
-    va_end(arguments);
-    fflush(stdout);
-}
-
-static FILE *open_output(const char *path)
-{
-    FILE *file = fopen(path, "w");
-    if (!file)
-        stop(path);
-    return file;
-}
 
 /* ---- The terrain -------------------------------------------------------- */
 
@@ -107,7 +64,7 @@ static uint16_t *make_samples(uint32_t size)
     uint16_t *samples = need_memory((size_t)size * size * sizeof *samples), *out = samples;
     uint32_t x, z;
     if (!base)
-        stop("out of memory");
+        bench_stop("memory", "there is none");
     for (z = 0; z < size; z++)
         for (x = 0; x < size; x++)
             *out++ = base[(size_t)fold(z) * BASE + fold(x)];
@@ -165,7 +122,7 @@ static double build(const terrimp_terrain_desc *desc, void *memory, size_t bytes
         w[i].result = TERRIMP_OK;
     }
     if (threads == 2 && pthread_create(&thread, NULL, build_some, &w[1]) != 0)
-        stop("no second thread");
+        bench_stop("threads", "there is no second one");
     build_some(&w[0]);
     if (threads == 2)
         pthread_join(thread, NULL);
@@ -202,23 +159,6 @@ static void take_floor(void *user, const terrimp_floor_command *command)
     ++*(uint64_t *)user;
 }
 
-static terrimp_camera camera_of(const flight_pose *pose, const terrimp_box *box)
-{
-    terrimp_camera camera;
-    int i;
-    memset(&camera, 0, sizeof camera);
-    for (i = 0; i < 3; i++) {
-        camera.eye[i] = pose->eye[i];
-        camera.forward[i] = pose->target[i] - pose->eye[i];
-    }
-    camera.fov_y_rad = 1.0471976f;
-    camera.width_px = 1280;
-    camera.height_px = 1024;
-    camera.z_far = terrimp_box_farthest(box, camera.eye) * 1.2f;
-    camera.z_near = camera.z_far * (1.0f / 8192.0f);
-    return camera;
-}
-
 /* What a flight costs after its start, and how much memory the way keeps for it. */
 typedef struct cost {
     stats update, render; /* processor [ms] */
@@ -239,7 +179,7 @@ static int note_cost(cost *c, int at_start, double update_ms, double render_ms)
     return at_start;
 }
 
-static void fly_view(const terrimp_terrain *terrain, const way *w, const flight *f,
+static void fly_view(const terrimp_terrain *terrain, const way *w, const tour *t,
                      const terrimp_box *box, cost *c)
 {
     uint64_t commands = 0;
@@ -258,14 +198,14 @@ static void fly_view(const terrimp_terrain *terrain, const way *w, const flight 
     c->bytes = terrimp_view_bytes(terrain, &desc);
     memory = need_memory(c->bytes);
     need(terrimp_view_init(terrain, &desc, memory, c->bytes, &view));
-    for (i = 0; i < f->count; i++) {
-        terrimp_camera camera = camera_of(&f->poses[i], box);
+    for (i = 0; i < t->flight.count; i++) {
+        terrimp_camera camera = tour_camera(t, box, i);
         double start = clock_cpu_ms(), middle;
         need(terrimp_view_update(view, &camera));
         middle = clock_cpu_ms();
         need(terrimp_view_render(view, &callbacks));
         need(terrimp_view_get_stats(view, &now));
-        if (note_cost(c, i < f->count / 6, middle - start, clock_cpu_ms() - middle))
+        if (note_cost(c, i < t->flight.count / 6, middle - start, clock_cpu_ms() - middle))
             continue;
         c->draws += now.draws;
         c->triangles += now.triangles;
@@ -275,7 +215,7 @@ static void fly_view(const terrimp_terrain *terrain, const way *w, const flight 
 }
 
 /* The tree is built anew: its time is the geomip room's own. Returns that time [ms]. */
-static double fly_geomip(const terrimp_heightfield *field, const way *w, const flight *f,
+static double fly_geomip(const terrimp_heightfield *field, const way *w, const tour *t,
                          const terrimp_box *box, cost *c)
 {
     terrimp_geomip tree;
@@ -299,11 +239,11 @@ static double fly_geomip(const terrimp_heightfield *field, const way *w, const f
     c->bytes = view.draw_capacity * sizeof *view.draws
                + tree.node_count * (sizeof *tree.nodes + sizeof *view.distances
                                     + sizeof *view.marks);
-    for (i = 0; i < f->count; i++) {
-        terrimp_camera camera = camera_of(&f->poses[i], box);
+    for (i = 0; i < t->flight.count; i++) {
+        terrimp_camera camera = tour_camera(t, box, i);
         double start = clock_cpu_ms();
         need(terrimp_geomip_select(&tree, &view, &camera));
-        if (note_cost(c, i < f->count / 6, clock_cpu_ms() - start, 0.0))
+        if (note_cost(c, i < t->flight.count / 6, clock_cpu_ms() - start, 0.0))
             continue;
         c->draws += view.draw_count;
         c->triangles += view.triangle_count;
@@ -339,13 +279,6 @@ typedef struct built {
     size_t terrain_bytes, scratch_bytes;
 } built;
 
-static size_t frame_count(void)
-{
-    const char *frames = getenv("BENCH_FRAMES");
-    long count = frames ? strtol(frames, NULL, 10) : 0;
-    return count > 5 ? (size_t)count : 72;
-}
-
 /* Of a square quadtree with so many chunks along a side. */
 static uint32_t count_nodes(uint32_t chunks)
 {
@@ -363,7 +296,7 @@ static built measure(uint32_t size)
     terrimp_terrain_desc desc = describe(samples, size);
     terrimp_terrain_info info;
     terrimp_terrain *terrain;
-    flight f;
+    tour t;
     built b;
     void *memory;
     size_t i;
@@ -378,20 +311,25 @@ static built measure(uint32_t size)
     b.one_thread_ms = build(&desc, memory, b.terrain_bytes, 1, b.nodes, &terrain);
     b.one_thread_cpu_ms = clock_cpu_ms() - b.one_thread_cpu_ms;
     need(terrimp_terrain_get_info(terrain, &info));
-    if (!flight_circle(&f, &desc.field, frame_count(), 80.0f / 60.0f))
-        stop(f.error);
+    memset(&t, 0, sizeof t);
+    t.field = desc.field;
+    t.desc.frames = bench_frames(72);
+    t.desc.width = 1280;
+    t.desc.height = 1024;
+    if (!tour_plan(&t))
+        bench_stop("the flight", t.error);
     for (i = 0; i < WAY_COUNT; i++) {
         cost c;
         memset(&c, 0, sizeof c);
         if (ways[i].mode)
-            fly_view(terrain, &ways[i], &f, &info.box, &c);
+            fly_view(terrain, &ways[i], &t, &info.box, &c);
         else
-            b.geomip_cpu_ms = fly_geomip(&desc.field, &ways[i], &f, &info.box, &c);
+            b.geomip_cpu_ms = fly_geomip(&desc.field, &ways[i], &t, &info.box, &c);
         say_way(size, &ways[i], &c);
         stats_free(&c.update);
         stats_free(&c.render);
     }
-    flight_free(&f);
+    tour_close(&t);
     free(memory);
     free(samples);
     plot_add(&memory_plot, "terrain", size, (double)b.terrain_bytes / 1048576.0);
@@ -424,28 +362,26 @@ static void say_built(const built *all, size_t count)
 int main(void)
 {
     built all[SIZE_COUNT];
-    const char *whole = getenv("BENCH_ALL");
-    size_t count = whole && *whole && *whole != '0' ? SIZE_COUNT : DEFAULT_SIZE_COUNT, i;
+    size_t count = bench_all() ? SIZE_COUNT : DEFAULT_SIZE_COUNT, i;
     struct rusage usage;
-    mkdir("build", 0777);
-    mkdir("build/bench", 0777);
-    report = open_output("build/bench/cpu.md");
-    table = open_output("build/bench/cpu.tsv");
+    say_open("cpu", 0);
+    say_machine(NULL);
+    table = bench_output("cpu", ".tsv");
     fprintf(table, "size\tway\tupdate_median_ms\tupdate_p99_ms\trender_median_ms\trender_p99_ms\t"
             "start_worst_ms\tdraws\ttriangles\tcaptures\tbytes\n");
-    say("A frame without graphics, %zu frames of the thesis' circle; processor times, ms:\n\n"
+    say("\nA frame without graphics, %zu frames of the thesis' circle; processor times, ms:\n\n"
         "| size | way | update | 99 %% | render | 99 %% | start | draws | triangles | captures | "
-        "KiB |\n|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n", frame_count());
+        "KiB |\n|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n", bench_frames(72));
     for (i = 0; i < count; i++)
         all[i] = measure(sizes[i]);
     say_built(all, count);
     if (!plot_write(&frame_plot, "build/bench/cpu_frame.svg")
         || !plot_write(&memory_plot, "build/bench/cpu_memory.svg"))
-        stop("a plot cannot be written");
+        bench_stop("a plot", "it cannot be written");
     getrusage(RUSAGE_SELF, &usage);
     say("\nMost memory that the process ever had: %.0f MiB. Plots: build/bench/cpu_frame.svg, "
         "cpu_memory.svg\n", (double)usage.ru_maxrss / 1024.0);
     fclose(table);
-    fclose(report);
+    say_close();
     return 0;
 }

@@ -8,7 +8,7 @@
            mesh, the way, their difference), *_pop.png (around its worst pop: the full mesh before
            and after, the way before and after), *_hole.png (around its first hole, if any)
 
-   BENCH_FRAMES=n   frames of a flight [each scene's own, 40 to 80]; the thesis has 10000
+   BENCH_FRAMES=n   frames of a flight [each scene's own, 24 to 64]; the thesis has 10000
    BENCH_ALL=1      the thesis' whole protocol, and every frame compared, not only some
    BENCH_ONLY=text  only scenes with this in their key (the names of the files)
    BENCH_WAYS=text  only ways with this in their name, and the full mesh
@@ -20,15 +20,13 @@
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
-#include "bench_gl.h"
+#include "bench_fine.h"
 #include "bench_peers.h"
 #include "bench_plot.h"
+#include "bench_quad.h"
 #include "bench_way.h"
 
 #include "examples/host/image.h"
-
-#include <stdarg.h>
-#include <sys/stat.h>
 
 /* ---- What is measured --------------------------------------------------- */
 
@@ -49,19 +47,22 @@
 #define MORPHING(tolerance_)                                                              \
     { .name = "geomip " #tolerance_ " px, morphing", .family = "geomip morphing",         \
       .mode = TERRIMP_MODE_GEOMIP, .tolerance_px = (float)tolerance_, .morph_ratio = 1.5f }
-/* As in the thesis but for the atlas; foreground and chunk width as in its tables: "200, 64". */
+/* As in the thesis; foreground and chunk width as in its tables: "200, 64". */
 #define HESS(foreground_, chunk_)                                                         \
     { .name = "Hess " #foreground_ ", " #chunk_, .family = "Hess " #chunk_,               \
       .mode = TERRIMP_MODE_IMPOSTOR, .chunk_quads = chunk_, .foreground = foreground_,    \
-      .angle_alone = 1 }
+      .hess = 1, .texels_per_px = 1.0f }
 
 static const way path_ways[] = {
-    FULL, AUTO(0.5), AUTO(1), AUTO(2), AUTO(4), AUTO(8),
-    { .name = "Hess, foreground 2 chunks", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR,
-      .angle_alone = 1 },
+    FULL, AUTO(0.5), AUTO(1), AUTO(2), AUTO(4),
+    { .name = "Hess", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR, .hess = 1,
+      .texels_per_px = 1.0f },
+    { .name = "Hess, 2 texels a px", .family = "Hess", .mode = TERRIMP_MODE_IMPOSTOR, .hess = 1 },
     IMPOSTOR(1),
     GEOMIP(0.25), GEOMIP(0.5), GEOMIP(1), GEOMIP(2), GEOMIP(4), GEOMIP(8),
-    BOUND(1), BOUND(2), BOUND(4), BOUND(8), MORPHING(1)
+    BOUND(2), BOUND(4), BOUND(8), MORPHING(1),
+    /* only with BENCH_ALL: */
+    AUTO(8), BOUND(1)
 };
 
 static const way look_ways[] = {
@@ -74,7 +75,9 @@ static const way tile_ways[] = { FULL, AUTO(1), AUTO(2), IMPOSTOR(1), GEOMIP(1),
 static const way thesis_ways[] = {
     FULL, AUTO(1), GEOMIP(1), HESS(400, 64), HESS(400, 128),
     /* only with BENCH_ALL, or on the terrain of 2049: */
-    HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128)
+    HESS(200, 64), HESS(600, 64), HESS(200, 128), HESS(600, 128),
+    /* only with BENCH_ALL: */
+    GEOMIP(0.5), GEOMIP(2), GEOMIP(4), GEOMIP(8), IMPOSTOR(1)
 };
 
 enum { WAYS_MAX = 32 }; /* in a run */
@@ -100,96 +103,47 @@ typedef struct run {
 
 static const run runs[] = {
     { { .name = "Pyrenees 1025 x 1025, straight flight", .key = "pyrenees", PYRENEES },
-      LOOK_LIGHTMAP, WAYS(path_ways), 80, 10, 1, 0 },
+      LOOK_LIGHTMAP, path_ways, 18, 20, 48, 8, 1, 0 },
     { { .name = "rough 2049 x 2049, straight flight", .key = "rough", ROUGH },
-      LOOK_LIGHTMAP, WAYS(path_ways), 80, 10, 1, 0 },
+      LOOK_LIGHTMAP, path_ways, 18, 20, 64, 9, 1, 0 },
     { { .name = "rough, three materials and moving clouds", .key = "materials", ROUGH },
-      LOOK_MATERIALS, WAYS(look_ways), 48, 10, 1, 0 },
+      LOOK_MATERIALS, WAYS(look_ways), 30, 8, 1, 0 },
     { { .name = "rough, with trees", .key = "trees", ROUGH },
-      LOOK_TREES, WAYS(look_ways), 48, 10, 1, 0 },
+      LOOK_TREES, WAYS(look_ways), 30, 8, 1, 0 },
     { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
-      LOOK_LIGHTMAP, WAYS(tile_ways), 40, 8, 0, 0 },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 24, 7, 0, 0 },
     { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
-      LOOK_LIGHTMAP, WAYS(tile_ways), 40, 8, 0, 0 },
+      LOOK_LIGHTMAP, WAYS(tile_ways), 24, 7, 0, 0 },
     { { .name = "procedural 1025 x 1025, circle as Hess", .key = "hess1025", .size = 1025 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 0 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 14, 24, 7, 0, 0 },
     { { .name = "procedural 2049 x 2049, circle as Hess", .key = "hess2049", .size = 2049 },
-      LOOK_LIGHTMAP, thesis_ways, 9, 9, 40, 8, 0, 0 },
+      LOOK_LIGHTMAP, thesis_ways, 9, 14, 30, 8, 0, 0 },
     { { .name = "procedural 3073 x 3073, circle as Hess", .key = "hess3073", .size = 3073 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 1 },
+      LOOK_LIGHTMAP, thesis_ways, 5, 14, 30, 8, 0, 1 },
     { { .name = "procedural 4097 x 4097, circle as Hess", .key = "hess4097", .size = 4097 },
-      LOOK_LIGHTMAP, thesis_ways, 5, 9, 40, 8, 0, 0 }
+      LOOK_LIGHTMAP, thesis_ways, 5, 14, 24, 7, 0, 0 }
 };
 
 /* ---- Output ------------------------------------------------------------- */
 
-static const char work[] = "build/bench";
-static FILE *report, *figures, *times;
+static FILE *figures, *times;
 
-static FILE *open_output(const char *name)
+static void say_protocol(void)
 {
-    char path[256];
-    FILE *file;
-    snprintf(path, sizeof path, "%s/%s", work, name);
-    file = fopen(path, "w");
-    if (!file)
-        scene_stop(path, "cannot be written");
-    return file;
-}
-
-/* To the terminal and to the report. */
-static void say(const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vprintf(format, arguments);
-    va_end(arguments);
-    va_start(arguments, format);
-    vfprintf(report, format, arguments);
-    va_end(arguments);
-    fflush(stdout);
-}
-
-static void say_machine(void)
-{
-    char line[256] = "", load[64] = "";
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    while (file && fgets(line, sizeof line, file) && strncmp(line, "model name", 10) != 0)
-        ;
-    if (file)
-        fclose(file);
-    file = fopen("/proc/loadavg", "r");
-    if (file && fscanf(file, "%63s", load) != 1)
-        load[0] = 0;
-    if (file)
-        fclose(file);
-    line[strcspn(line, "\n")] = 0;
-    say("Machine: %s; load at the start %s\nRenderer: %s\n",
-        strchr(line, ':') ? strchr(line, ':') + 2 : "unknown", load, context_renderer());
-    say("Pictures of %d x %d, 60 degrees. Ratio: mean of a frame's time over that of the full mesh "
-        "at about the same moment;\nCPU ratio: mean processor time over that of the full mesh. The "
-        "columns from mean to start are in multiples of the full\nmesh's median. The first sixth "
-        "of a flight, 20 frames at most, is its start, when pictures are new: its mean has a "
-        "column,\nand no other figure has it in. PSNR [dB] is over terrain unless it says "
-        "picture.\n", SCENE_WIDTH, SCENE_HEIGHT);
+    say_machine(context_renderer());
+    say("Pictures of %d x %d, 60 degrees. The columns from median to worst are ratios: a frame's "
+        "time over that of the full mesh at\nabout the same moment. CPU: mean processor time over "
+        "that of the full mesh. The first sixth of a flight, 20 frames at most,\nis its start, "
+        "when pictures are new: its mean, over the full mesh's median, has a column, and no other "
+        "figure has it in.\nquads: median time over that of a textured quad over the whole "
+        "picture. reuse: frames that a picture is drawn.\nPSNR [dB] is over terrain unless it says "
+        "picture; 4 x 4: against the full mesh with as many samples a pixel. From frame\nto frame, "
+        "beyond what the full mesh changes: shimmer, the mean over all pixels; pop, the worst mean "
+        "over 16 x 16 pixels;\npixel, the worst pixel. holes: in the worst frame; low: pixels of "
+        "sky above a silhouette that is too low.\n", SCENE_WIDTH, SCENE_HEIGHT);
 }
 
 /* ---- Quality ------------------------------------------------------------ */
-
-/* The smallest of a list; 0 when it is empty. */
-static double smallest(const stats *s)
-{
-    double least = s->count ? s->values[0] : 0.0;
-    size_t i;
-    for (i = 1; i < s->count; i++)
-        least = s->values[i] < least ? s->values[i] : least;
-    return least;
-}
-
-static double mean(const stats *s)
-{
-    return stats_summarise(s).mean;
-}
 
 static double psnr_of(const uint8_t *a, const uint8_t *b, const uint8_t *sky)
 {
@@ -234,7 +188,7 @@ static void compare_holes(contender *c, const contender *full, size_t frame)
     size_t holes = quality_holes(c->picture, full->picture, SCENE_WIDTH, SCENE_HEIGHT, scene_sky,
                                  &low, &first);
     if (holes == SIZE_MAX)
-        scene_stop("holes", "out of memory");
+        bench_stop("holes", "out of memory");
     if (holes > 0 && c->holes <= 0.0) {
         int x = (int)(first % SCENE_WIDTH), y = (int)(first / SCENE_WIDTH);
         crop_around(full->picture, x, y, &c->hole_crops[0]);
@@ -336,7 +290,7 @@ static double full_ms(const contender *full)
 static void draw_frame(contender *ways, size_t count, const scene *s, size_t frame,
                        frame_plan plan)
 {
-    terrimp_camera camera = scene_camera(s, frame);
+    terrimp_camera camera = tour_camera(&s->tour, &s->box, frame);
     size_t i;
     for (i = 0; i < count; i++) {
         contender *c = &ways[i];
@@ -356,14 +310,14 @@ static void fly(const run *r, contender *ways, size_t count, const scene *s, qua
 {
     look *l = ways[0].look;
     size_t frame, i;
-    for (frame = 0; frame < s->flight.count; frame++) {
-        frame_plan plan = plan_frame(r, frame, s->flight.count, stride);
+    for (frame = 0; frame < s->tour.flight.count; frame++) {
+        frame_plan plan = plan_frame(r, frame, s->tour.flight.count, stride);
         l->seconds = (float)frame / SCENE_FPS;
         draw_frame(ways, count, s, frame, plan);
         if (plan.look)
             quad_draw(q, s->context, ways[0].gl->lightmap);
         if (plan.fine)
-            fine_draw(f, l, ways[0].gl, ways[0].view, scene_camera(s, frame));
+            fine_draw(f, l, ways[0].gl, ways[0].view, tour_camera(&s->tour, &s->box, frame));
         for (i = 0; i < count; i++) {
             if (plan.look)
                 compare(&ways[i], &ways[0], frame, plan.ssim);
@@ -388,21 +342,26 @@ static void print_times(const contender *ways, size_t count, double quad_ms)
 {
     double unit = stats_summarise(&ways[0].ms).median;
     size_t i;
-    say("\n| way | ms | ratio | CPU ratio | mean | sd | 95 %% | 99 %% | worst | start | quads | "
+    say("\n| way | ms | median | mean | sd | 95 %% | 99 %% | worst | CPU | start | quads | "
         "triangles | draws | captures | ktexels | reuse |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < count; i++) {
         const contender *c = &ways[i];
-        stats_summary ms = stats_summarise(&c->ms);
+        stats_summary ms = stats_summarise(&c->ms), ratio = stats_summarise(&c->ratio);
         double n = c->frames;
-        say("| %s | %.1f | %.3f | %.3f | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f | %.1f | %.0f | "
-            "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, cost_of(c, &ways[0], 0),
-            cost_of(c, &ways[0], 1), ms.mean / unit, ms.deviation / unit, ms.p95 / unit,
-            ms.p99 / unit, ms.worst / unit, mean(&c->start_ms) / unit, ms.median / quad_ms,
-            c->triangles / n, c->draws / n, c->captures / n, c->captured_texels / n / 1e3,
-            (double)c->now.reuse);
+        say("| %s | %.1f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %.1f | %.0f | "
+            "%.0f | %.2f | %.0f | %.0f |\n", c->way->name, ms.median, ratio.median, ratio.mean,
+            ratio.deviation, ratio.p95, ratio.p99, ratio.worst, cost_of(c, &ways[0], 1),
+            mean(&c->start_ms) / unit, ms.median / quad_ms, c->triangles / n, c->draws / n,
+            c->captures / n, c->captured_texels / n / 1e3, (double)c->now.reuse);
     }
     say("\nA textured quad over the whole picture: %.1f ms.\n", quad_ms);
+    for (i = 0; i < count; i++)
+        if (ways[i].hess)
+            say("%s: its atlases were packed %u times, %u of these before all pictures had moved; "
+                "sides were reduced to %.2f at worst.\n", ways[i].way->name,
+                (unsigned)ways[i].hess->pair.repacks, (unsigned)ways[i].hess->early_packs,
+                (double)ways[i].hess->least_scale);
 }
 
 static void print_quality(const contender *ways, size_t count)
@@ -413,7 +372,7 @@ static void print_quality(const contender *ways, size_t count)
     for (i = 0; i < count; i++) {
         const contender *c = &ways[i];
         say("| %s | %.2f | %.2f | %.2f | %.4f | ", c->way->name, mean(&c->psnr_terrain),
-            smallest(&c->psnr_terrain), mean(&c->psnr), mean(&c->ssim));
+            stats_summarise(&c->psnr_terrain).least, mean(&c->psnr), mean(&c->ssim));
         if (c->fine_psnr.count)
             say("%.2f | %.4f | ", mean(&c->fine_psnr), mean(&c->fine_ssim));
         else
@@ -430,17 +389,16 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
     size_t i;
     for (i = 0; i < count; i++) {
         const contender *c = &ways[i];
-        stats_summary ms = stats_summarise(&c->ms);
+        stats_summary ms = stats_summarise(&c->ms), ratio = stats_summarise(&c->ratio);
         double n = c->frames;
         fprintf(figures, "%s\t%s\t%s\t%zu\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t"
                 "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
-                cost_of(c, &ways[0], 0), cost_of(c, &ways[0], 1), ms.mean / unit,
-                ms.deviation / unit, ms.p95 / unit, ms.p99 / unit, ms.worst / unit,
-                mean(&c->start_ms) / unit, quad_ms);
+                ratio.median, ratio.mean, ratio.deviation, ratio.p95, ratio.p99, ratio.worst,
+                cost_of(c, &ways[0], 1), mean(&c->start_ms) / unit, quad_ms);
         fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t%.2f\t", c->triangles / n, c->draws / n,
                 c->captures / n, c->captured_texels / n, (double)c->now.reuse, c->waiting / n);
         fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
-                mean(&c->psnr_terrain), smallest(&c->psnr_terrain), mean(&c->psnr),
+                mean(&c->psnr_terrain), stats_summarise(&c->psnr_terrain).least, mean(&c->psnr),
                 mean(&c->ssim), mean(&c->fine_psnr), mean(&c->fine_ssim), mean(&c->shimmer),
                 stats_summarise(&c->pop_block).worst, stats_summarise(&c->pop_pixel).worst,
                 c->holes, c->low_pixels / (double)c->psnr.count);
@@ -449,8 +407,9 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
 
 static void write_headings(void)
 {
-    fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio\tcpu_ratio\tmean\tdeviation\t"
-            "p95\tp99\tworst\tstart\tquad_ms\ttriangles\tdraws\tcaptures\tcaptured_texels\t"
+    fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio_median\tratio_mean\t"
+            "ratio_deviation\tratio_p95\tratio_p99\tratio_worst\tcpu_ratio\tstart\tquad_ms\t"
+            "triangles\tdraws\tcaptures\tcaptured_texels\t"
             "reuse\twaiting\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\t"
             "ssim_4x4\tshimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");
     fprintf(times, "scene\tway\tframe\tstart\tms\ttriangles\tdraws\tcaptures\t"
@@ -562,9 +521,9 @@ static void plot_peers(plot *p, const char *key)
 static void write_plot(const plot *p, const char *key, const char *kind)
 {
     char path[256];
-    snprintf(path, sizeof path, "%s/%s_%s.svg", work, key, kind);
+    snprintf(path, sizeof path, "%s/%s_%s.svg", bench_folder, key, kind);
     if (!plot_write(p, path))
-        scene_stop(path, "cannot be written");
+        bench_stop(path, "cannot be written");
     say("\nPlot: %s\n", path);
 }
 
@@ -617,13 +576,13 @@ static void write_side_by_side(const run *r, const contender *c, const char *suf
             memcpy(to, pictures[column / width]
                        + ((size_t)(y / factor * width) + (size_t)(column % width)) * 3, 3);
         }
-    snprintf(path, sizeof path, "%s/%s_%s%s.png", work, r->scene.key, c->way->name, suffix);
+    snprintf(path, sizeof path, "%s/%s_%s%s.png", bench_folder, r->scene.key, c->way->name, suffix);
     for (letter = path; *letter; letter++)
         if (*letter == ' ' || *letter == ',')
             *letter = '_';
     trouble = image_write_png(path, out, wide, high);
     if (trouble)
-        scene_stop(path, trouble);
+        bench_stop(path, trouble);
     free(out);
 }
 
@@ -651,23 +610,10 @@ static void write_pictures(const run *r, const contender *c)
 
 /* ---- All of it ---------------------------------------------------------- */
 
-static int whole_protocol(void)
-{
-    const char *all = getenv("BENCH_ALL");
-    return all && *all && *all != '0';
-}
-
-static size_t frames_of(const run *r)
-{
-    const char *frames = getenv("BENCH_FRAMES");
-    long count = frames ? strtol(frames, NULL, 10) : 0;
-    return count > 0 ? (size_t)count : r->frames;
-}
-
 /* Opens the ways that are wanted, the full mesh first; returns how many. */
 static size_t open_ways(const run *r, contender *ways, scene *s, look *l)
 {
-    size_t offered = whole_protocol() ? r->all_way_count : r->way_count, count = 0, i;
+    size_t offered = bench_all() ? r->all_way_count : r->way_count, count = 0, i;
     const char *wanted = getenv("BENCH_WAYS");
     for (i = 0; i < offered; i++)
         if (i == 0 || !wanted || strstr(r->ways[i].name, wanted))
@@ -679,18 +625,18 @@ static void measure(const run *r, const context *frame)
 {
     contender *ways = need_memory(WAYS_MAX * sizeof *ways);
     size_t count, i;
-    double quad_ms;
+    double quad_ms, start = clock_ms();
     scene s;
     quad q;
     fine f;
     look l;
-    scene_open(&s, &r->scene, frame, frames_of(r));
+    scene_open(&s, &r->scene, frame, bench_frames(r->frames));
     look_open(&l, r->look, &s);
     count = open_ways(r, ways, &s, &l);
     quad_open(&q);
     fine_open(&f, frame);
-    say("\n## %s, %zu frames\n", r->scene.name, s.flight.count);
-    fly(r, ways, count, &s, &q, &f, whole_protocol() ? 1 : r->stride);
+    say("\n## %s, %zu frames\n", r->scene.name, s.tour.flight.count);
+    fly(r, ways, count, &s, &q, &f, bench_all() ? 1 : r->stride);
     quad_ms = stats_summarise(&q.ms).median;
     print_times(ways, count, quad_ms);
     print_quality(ways, count);
@@ -704,6 +650,8 @@ static void measure(const run *r, const context *frame)
         note_size(r, ways, count);
     for (i = 1; i < count; i++)
         write_pictures(r, &ways[i]);
+    say("\n(%.0f s)\n", (clock_ms() - start) * 1e-3);
+    fflush(NULL); /* the figures of a scene stay, whatever becomes of the next */
     fine_close(&f);
     quad_close(&q);
     for (i = 0; i < count; i++)
@@ -713,12 +661,25 @@ static void measure(const run *r, const context *frame)
     scene_close(&s);
 }
 
+static int file_is_there(const char *name)
+{
+    char path[1024];
+    FILE *file;
+    if (!name)
+        return 1;
+    scene_data_path(name, path, sizeof path);
+    file = fopen(path, "rb");
+    if (file)
+        fclose(file);
+    return file != NULL;
+}
+
 static int is_wanted(const run *r)
 {
     const char *only = getenv("BENCH_ONLY");
     if (only && *only)
         return strstr(r->scene.key, only) != NULL;
-    return whole_protocol() || !r->only_all;
+    return bench_all() || !r->only_all;
 }
 
 int main(void)
@@ -728,18 +689,16 @@ int main(void)
     double start = clock_ms();
     size_t i;
     if (trouble)
-        scene_stop("OpenGL", trouble);
-    mkdir("build", 0777);
-    mkdir(work, 0777);
-    report = open_output("frames.md");
-    figures = open_output("frames.tsv");
-    times = open_output("frame_times.tsv");
-    say_machine();
+        bench_stop("OpenGL", trouble);
+    say_open("frames", 0);
+    figures = bench_output("frames", ".tsv");
+    times = bench_output("frame_times", ".tsv");
+    say_protocol();
     write_headings();
     for (i = 0; i < sizeof runs / sizeof *runs; i++) {
         if (!is_wanted(&runs[i]))
             continue;
-        if (scene_file_is_there(runs[i].scene.file) && scene_file_is_there(runs[i].scene.path))
+        if (file_is_there(runs[i].scene.file) && file_is_there(runs[i].scene.path))
             measure(&runs[i], &frame);
         else
             say("\n## %s: its files are not here\n", runs[i].scene.name);
@@ -749,7 +708,7 @@ int main(void)
     say("\nAll of it took %.0f s.\n", (clock_ms() - start) * 1e-3);
     fclose(times);
     fclose(figures);
-    fclose(report);
+    say_close();
     context_close(&frame);
     return 0;
 }

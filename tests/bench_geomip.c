@@ -2,36 +2,23 @@
    culling and the list of draws, over a flight. Terrains of 4097 x 4097 samples: the procedural one
    (peaks and valleys) and a rough one (noise of all wavelengths); 1280 x 1024 pixels, 60 degrees.
    Times are of the processor; a frame's is the median over the flight, the least of three rounds.
-   Build:  make bench_geomip */
-#define _POSIX_C_SOURCE 199309L
+   Build:  make bench_geomip
+   Leaves: build/bench/geomip.md (what it prints), geomip.tsv (its rows) */
+#define _POSIX_C_SOURCE 200112L
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
+
+#include "bench_say.h"
 
 #include "examples/host/procedural.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <time.h>
 
 enum { SIDE = 4097, FRAMES = 200, ROUNDS = 3 };
 
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
-
 static void *allocate(size_t count, size_t size)
 {
-    void *memory = calloc(count, size);
-    if (!memory) {
-        fprintf(stderr, "bench_geomip: no memory\n");
-        exit(2);
-    }
-    return memory;
+    return memset(need_memory(count * size), 0, count * size);
 }
 
 /* Midpoint displacement: each halving of the step adds two thirds as much. */
@@ -58,12 +45,6 @@ static uint16_t *rough_terrain(void)
     return samples;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* A circle over the middle of the terrain, 60 units above the highest ground below, looking ahead
    and somewhat down. */
 static terrimp_camera camera_at(const terrimp_geomip *tree, int frame)
@@ -88,26 +69,27 @@ static terrimp_camera camera_at(const terrimp_geomip *tree, int frame)
 
 static void bench_rule(const terrimp_geomip *tree, terrimp_geomip_view *view, const char *name)
 {
-    double ms[FRAMES], median = 1e9, draws = 0.0, triangles = 0.0;
+    double median = 1e9, draws = 0.0, triangles = 0.0;
     uint32_t most = 0;
     int round, frame;
     for (round = 0; round < ROUNDS; round++) {
+        stats ms = { NULL, 0, 0 };
         draws = triangles = 0.0;
         for (frame = 0; frame < FRAMES; frame++) {
             terrimp_camera camera = camera_at(tree, frame);
-            double start = now_ms();
+            double start = clock_cpu_ms();
             terrimp_result result = terrimp_geomip_select(tree, view, &camera);
-            ms[frame] = now_ms() - start;
+            stats_add(&ms, clock_cpu_ms() - start);
             if (result != TERRIMP_OK)
                 exit(2);
             draws += view->draw_count;
             triangles += view->triangle_count;
             most = view->draw_count > most ? view->draw_count : most;
         }
-        qsort(ms, FRAMES, sizeof *ms, ascending);
-        median = fmin(median, ms[FRAMES / 2]);
+        median = fmin(median, stats_summarise(&ms).median);
+        stats_free(&ms);
     }
-    printf("| %s, %g px | %.4f | %.0f | %u | %.0f |\n", name, (double)view->tolerance_px, median,
+    say("| %s, %g px | %.4f | %.0f | %u | %.0f |\n", name, (double)view->tolerance_px, median,
            draws / FRAMES, (unsigned)most, triangles / FRAMES);
 }
 
@@ -136,14 +118,14 @@ static void bench_terrain(const char *name, uint16_t *samples, float scale, uint
     view.marks = allocate(tree.node_count, sizeof *view.marks);
     view.draw_capacity = tree.level_first[1];
     view.draws = allocate(view.draw_capacity, sizeof *view.draws);
-    start = now_ms();
+    start = clock_cpu_ms();
     terrimp_geomip_fit(&tree, scratch);
-    fit_ms = now_ms() - start;
+    fit_ms = clock_cpu_ms() - start;
     if (terrimp_geomip_build(&tree, scratch) != TERRIMP_OK)
         exit(2);
-    printf("\n%s, chunks of %u: fits %.0f ms, all of the tree %.0f ms\n", name, (unsigned)quads,
-           fit_ms, now_ms() - start - fit_ms);
-    printf("| rule | select ms | draws | most | triangles |\n|---|--:|--:|--:|--:|\n");
+    say("\n%s, chunks of %u: fits %.0f ms, all of the tree %.0f ms\n", name, (unsigned)quads,
+           fit_ms, clock_cpu_ms() - start - fit_ms);
+    say("| rule | select ms | draws | most | triangles |\n|---|--:|--:|--:|--:|\n");
     for (rule = TERRIMP_GEOMIP_PICTURE; rule < (int)TERRIMP_GEOMIP_RULE_COUNT; rule++)
         for (i = 0; i < 2; i++) {
             view.rule = rule;
@@ -162,13 +144,16 @@ int main(void)
 {
     uint16_t *procedural = procedural_terrain(SIDE, SIDE, 1), *rough = rough_terrain();
     uint32_t quads;
+    say_open("geomip", 1);
+    say_machine(NULL);
     if (!procedural)
-        return 2;
+        bench_stop("memory", "there is none");
     for (quads = 64; quads >= 32; quads /= 2) {
         bench_terrain("procedural", procedural, PROCEDURAL_HEIGHT_SCALE, quads);
         bench_terrain("rough", rough, 1.0f / 64.0f, quads);
     }
     free(procedural);
     free(rough);
+    say_close();
     return 0;
 }

@@ -22,7 +22,7 @@ typedef struct look {
 static void look_need(const char *trouble)
 {
     if (trouble)
-        scene_stop("the looks of the scene", trouble);
+        bench_stop("the looks of the scene", trouble);
 }
 
 static void look_open(look *l, int kind, scene *s)
@@ -30,35 +30,29 @@ static void look_open(look *l, int kind, scene *s)
     memset(l, 0, sizeof *l);
     l->kind = kind;
     if (kind == LOOK_MATERIALS)
-        look_need(shading_open(&l->shading, &s->field, s->lightmap));
+        look_need(shading_open(&l->shading, &s->tour.field, s->lightmap));
+    s->shading = kind == LOOK_MATERIALS ? shading_source : NULL;
     if (kind == LOOK_TREES) {
         l->chunks = scene_terrain(s, scene_chunk_quads[0]);
-        look_need(trees_open(&l->trees, s->terrain[l->chunks], &s->field, LOOK_TREE_COUNT));
+        look_need(trees_open(&l->trees, s->terrain[l->chunks], &s->tour.field, LOOK_TREE_COUNT));
     }
 }
 
-/* Once for each terrain of OpenGL's. */
-static void look_dress(const look *l, gl_terrain *gl)
-{
-    if (l->kind == LOOK_MATERIALS && !shading_dress(gl))
-        scene_stop("shading", "a dressed shader does not compile");
-}
-
-/* Draws a view, between gl_terrain_begin and gl_terrain_end. */
-static terrimp_result look_render(look *l, gl_terrain *gl, terrimp_view *view)
+/* The callbacks for a frame, between gl_terrain_begin and gl_terrain_end. */
+static terrimp_callbacks look_begin(look *l, gl_terrain *gl)
 {
     terrimp_callbacks callbacks = gl_terrain_callbacks(gl);
-    terrimp_result result;
-    if (l->kind == LOOK_MATERIALS) {
+    if (l->kind == LOOK_MATERIALS)
         shading_begin(&l->shading, gl, l->seconds);
-        callbacks = shading_callbacks(&l->shading, gl, callbacks);
-    }
     if (l->kind == LOOK_TREES)
         callbacks = trees_callbacks(&l->trees, gl, callbacks);
-    result = terrimp_view_render(view, &callbacks);
+    return callbacks;
+}
+
+static void look_end(look *l)
+{
     if (l->kind == LOOK_TREES)
         trees_end(&l->trees);
-    return result;
 }
 
 static void look_close(look *l)

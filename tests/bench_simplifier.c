@@ -3,18 +3,16 @@
    least 50 m of relief; times are of the processor, in ms a chunk. A border serves two chunks, so
    half of the time for the four borders counts.
 
-   Build:  cc -O2 -std=c99 -I. tests/bench_simplifier.c -lm -o bench_simplifier
-   With meshoptimizer:  add -DTERRIMP_HAVE_MESHOPT -lmeshoptimizer
-   Run:    ./bench_simplifier [directory of .hgt tiles]   (or TERRIMP_DATA; else ../shared/data) */
-#define _POSIX_C_SOURCE 199309L
+   Build:  make bench_simplifier    (with meshoptimizer where that is installed)
+   Use:    build/bench_simplifier [directory of .hgt tiles]   (or TERRIMP_DATA; else ../shared/data)
+   Leaves: build/bench/simplifier.md (what it prints), simplifier.tsv (its rows) */
+#define _POSIX_C_SOURCE 200112L
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
+#include "bench_say.h"
+
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <time.h>
 
 #ifdef TERRIMP_HAVE_MESHOPT
 #include <meshoptimizer.h>
@@ -37,13 +35,6 @@ typedef struct tally {
 
 static const char *const tile_names[] = {"N42E001.hgt", "N41E001.hgt", "N49E011.hgt",
                                          "N48W125.hgt"};
-
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
 
 /* Reads a square tile of big-endian 16-bit metres; voids become NaN. */
 static int tile_read(const char *folder, const char *name, tile *out)
@@ -171,7 +162,7 @@ static void run_terrimp(const float *chunk, float relief, tally *sum)
         line[2][k] = chunk_at(chunk, 0, k);
         line[3][k] = chunk_at(chunk, SIDE - 1, k);
     }
-    start = now_ms();
+    start = clock_cpu_ms();
     desc.heights = chunk;
     desc.cols = desc.rows = SIDE;
     desc.triangle_budget = BUDGET;
@@ -184,11 +175,11 @@ static void run_terrimp(const float *chunk, float relief, tally *sum)
     mesh.vertex_capacity = 1000;
     mesh.indices = indices;
     mesh.index_capacity = 3000;
-    ms = now_ms() - start;
+    ms = clock_cpu_ms() - start;
     start += 0.5 * ms; /* each border serves two chunks */
     if (terrimp_simplify(&desc, scratch, sizeof scratch, &mesh) != TERRIMP_OK)
         exit(1);
-    ms = now_ms() - start;
+    ms = clock_cpu_ms() - start;
     for (i = 0; i < mesh.vertex_count; i++) {
         xyz[3 * i] = vertices[i].x;
         xyz[3 * i + 1] = vertices[i].height;
@@ -222,9 +213,9 @@ static void run_meshopt(const tile *t, const float *chunk, float relief, tally *
             indices[n++] = a, indices[n++] = b, indices[n++] = b + 1;
             indices[n++] = a, indices[n++] = b + 1, indices[n++] = a + 1;
         }
-    start = now_ms();
+    start = clock_cpu_ms();
     left = meshopt_simplify(out, indices, n, xyz, SAMPLES, 12, 3 * BUDGET, 1e9f, 0, NULL);
-    ms = now_ms() - start;
+    ms = clock_cpu_ms() - start;
     judge(chunk, relief, grid, out, left, ms, sum);
 }
 #endif
@@ -232,22 +223,22 @@ static void run_meshopt(const tile *t, const float *chunk, float relief, tally *
 static void print_tally(const char *name, const tally *sum)
 {
     double n = sum->chunks > 0 ? sum->chunks : 1;
-    printf("%-24s %8.2f %8.3f %8d %8d %8.3f %8.1f %7d\n", name, sum->max_percent / n,
+    say("| %s | %.2f | %.3f | %d | %d | %.3f | %.1f | %d |\n", name, sum->max_percent / n,
            sum->rms_percent / n, sum->folded, sum->not_square, sum->ms / n, sum->triangles / n,
            sum->chunks);
 }
 
 int main(int argc, char **argv)
 {
-    const char *folder = argc > 1 ? argv[1] : getenv("TERRIMP_DATA");
+    const char *folder = argc > 1 ? argv[1] : bench_data();
     tally ours, theirs;
     float chunk[SAMPLES];
     size_t i;
     int found = 0;
+    say_open("simplifier", 1);
+    say_machine(NULL);
     memset(&ours, 0, sizeof ours);
     memset(&theirs, 0, sizeof theirs);
-    if (!folder)
-        folder = "../shared/data";
     for (i = 0; i < sizeof tile_names / sizeof *tile_names; i++) {
         tile t;
         int cx, cz, z;
@@ -271,15 +262,17 @@ int main(int argc, char **argv)
         free(t.heights);
     }
     if (!found) {
-        printf("bench_simplifier: no tiles at %s: skipped\n", folder);
+        say("No tiles at %s: skipped\n", folder);
+        say_close();
         return 0;
     }
-    printf("%-24s %8s %8s %8s %8s %8s %8s %7s\n", "method", "max %", "rms %", "folded", "unsquare",
-           "ms", "tri", "chunks");
+    say("\n| method | max %% | rms %% | folded | not square | ms | triangles | chunks |\n"
+        "|---|--:|--:|--:|--:|--:|--:|--:|\n");
     print_tally("terrimp_simplify", &ours);
     if (theirs.chunks) {
         print_tally("meshoptimizer", &theirs);
-        printf("time in terms of meshoptimizer's: %.3f\n", ours.ms / theirs.ms);
+        say("\nTime in terms of meshoptimizer's: %.3f\n", ours.ms / theirs.ms);
     }
+    say_close();
     return 0;
 }

@@ -2,6 +2,7 @@
 #ifndef BENCH_WAY_H
 #define BENCH_WAY_H
 
+#include "bench_hess.h"
 #include "bench_look.h"
 #include "bench_scene.h"
 
@@ -18,8 +19,7 @@ typedef struct way {
     uint32_t chunk_quads;       /* 64 or 128; 0: 64 */
     float foreground;           /* [wu] where ground has ended; it fades over the last quarter */
     float texels_per_px;
-    int angle_alone;            /* as in the thesis: only the view angle outdates a picture, which
-                                   is made from where the eye is when it is outdated */
+    int hess;                   /* as in the thesis: by bench_hess.h, not by a view */
 } way;
 
 /* Pictures of one moment are only kept while they are compared. */
@@ -27,6 +27,7 @@ typedef struct contender {
     const way *way;
     look *look;                 /* not its own */
     terrimp_view *view;
+    hess *hess;                 /* instead of the view */
     gl_terrain *gl, own_gl;     /* own: when the way keeps pictures */
     terrimp_stats now;          /* of the newest frame */
     stats start_ms;             /* of the start of the flight, when its pictures are new */
@@ -51,16 +52,6 @@ static int way_has_memory(const way *w)
     return w->mode != TERRIMP_MODE_FULL && w->mode != TERRIMP_MODE_GEOMIP;
 }
 
-/* The OpenGL side of ways that keep no pictures; the first of them dresses it. */
-static gl_terrain *open_shared_gl(const contender *c, scene *s, int terrain)
-{
-    int is_new = !s->is_open[terrain];
-    gl_terrain *gl = scene_shared_gl(s, terrain);
-    if (is_new)
-        look_dress(c->look, gl);
-    return gl;
-}
-
 static terrimp_view_desc way_describe(const way *w)
 {
     terrimp_view_desc desc;
@@ -74,10 +65,6 @@ static terrimp_view_desc way_describe(const way *w)
     desc.fade_start = w->foreground * 0.75f;
     desc.fade_end = w->foreground;
     desc.texels_per_px = w->texels_per_px;
-    if (w->angle_alone) {
-        desc.tolerance_px = 100.0f;
-        desc.no_lookahead = desc.no_spreading = desc.no_splits = 1;
-    }
     return desc;
 }
 
@@ -94,16 +81,20 @@ static void contender_open(contender *c, const way *w, scene *s, look *l)
     c->picture_frame = c->worst_frame = c->pop_frame = SIZE_MAX;
     c->pop.block = -255.0;
     need(terrimp_view_desc_resolve(s->terrain[terrain], &desc, &desc));
-    need(terrimp_view_create(s->terrain[terrain], &desc, NULL, &c->view));
-    if (!way_has_memory(w) && w->morph_ratio <= 1.0f) {
-        c->gl = open_shared_gl(c, s, terrain);
+    if (w->hess) {
+        c->hess = need_memory(sizeof *c->hess);
+        hess_open(c->hess, s->terrain[terrain], &desc);
+    } else {
+        need(terrimp_view_create(s->terrain[terrain], &desc, NULL, &c->view));
+    }
+    if ((!way_has_memory(w) || s->shared_atlas == desc.atlas_size) && w->morph_ratio <= 1.0f) {
+        c->gl = scene_shared_gl(s, terrain);
         return;
     }
     c->gl = &c->own_gl;
-    scene_open_gl(s, terrain, desc.atlas_size, c->gl);
+    scene_open_gl(s, terrain, c->hess ? c->hess->atlas_size : desc.atlas_size, c->gl);
     if (w->morph_ratio > 1.0f)
         look_need(gl_terrain_use_morphing(c->gl));
-    look_dress(l, c->gl);
 }
 
 static void contender_note(contender *c, double ms, double cpu_ms)
@@ -118,15 +109,31 @@ static void contender_note(contender *c, double ms, double cpu_ms)
     c->captured_texels += c->now.captured_texels;
 }
 
+static void contender_update(contender *c, const terrimp_camera *camera)
+{
+    if (c->hess) {
+        hess_update(c->hess, camera);
+        c->now = c->hess->stats;
+    } else {
+        need(terrimp_view_update(c->view, camera));
+        need(terrimp_view_get_stats(c->view, &c->now));
+    }
+}
+
 /* Draws a frame; what is timed is all that a host would do for it. */
 static void contender_draw(contender *c, terrimp_camera camera, int at_start)
 {
     double start = clock_ms(), cpu_start = clock_cpu_ms();
-    need(terrimp_view_update(c->view, &camera));
-    need(terrimp_view_get_stats(c->view, &c->now));
-    scene_tighten(&camera, &c->now);
+    terrimp_callbacks callbacks;
+    contender_update(c, &camera);
+    tour_tighten(&camera, &c->now);
     need(gl_terrain_begin(c->gl, &camera, scene_sky));
-    need(look_render(c->look, c->gl, c->view));
+    callbacks = look_begin(c->look, c->gl);
+    if (c->hess)
+        hess_render(c->hess, &callbacks);
+    else
+        need(terrimp_view_render(c->view, &callbacks));
+    look_end(c->look);
     gl_terrain_end(c->gl);
     if (at_start)
         stats_add(&c->start_ms, clock_ms() - start);
@@ -162,6 +169,9 @@ static void contender_close(contender *c)
     lists[11] = &c->ratio;
     for (i = 0; i < 12; i++)
         stats_free(lists[i]);
+    if (c->hess)
+        hess_close(c->hess);
+    free(c->hess);
     terrimp_view_destroy(c->view);
     if (c->gl == &c->own_gl)
         gl_terrain_close(&c->own_gl);

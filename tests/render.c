@@ -88,8 +88,15 @@ static void scene_build(scene *s, const char *name, uint32_t chunk_quads)
 static void scene_fill(scene *s, uint32_t atlas)
 {
     uint8_t *lightmap = lightmap_bake(&s->field);
+    gl_terrain_desc desc;
     need(lightmap ? NULL : "no lightmap");
-    need(gl_terrain_open(&s->gl, &s->context, s->terrain, &s->field, lightmap, atlas));
+    memset(&desc, 0, sizeof desc);
+    desc.frame = &s->context;
+    desc.terrain = s->terrain;
+    desc.field = &s->field;
+    desc.lightmap = lightmap;
+    desc.atlas_size = atlas;
+    need(gl_terrain_open(&s->gl, &desc));
     free(lightmap);
 }
 

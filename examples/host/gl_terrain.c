@@ -18,10 +18,11 @@
     "uniform float scale;\n"                                      \
     "uniform vec4 field;\n"                                       \
     "out vec2 uv;\n"                                              \
+    "out vec3 place;\n"                                           \
     "void main() {\n"                                             \
-    "    vec3 p = vec3(position.x, height(), position.z) - eye;\n" \
+    "    place = vec3(position.x, height(), position.z);\n"       \
     "    uv = position.xz * field.xy + field.zw;\n"               \
-    "    gl_Position = matrix * vec4(p * scale, 1.0);\n"          \
+    "    gl_Position = matrix * vec4((place - eye) * scale, 1.0);\n" \
     "}\n"
 
 const char gl_ground_vertex[] = VERTEX_HEAD
@@ -44,20 +45,35 @@ const char gl_morphing_vertex[] = VERTEX_HEAD
     "    return position.y + factor * (move.x + dot(move.yz, along));\n"
     "}\n" VERTEX_MAIN;
 
-const char gl_ground_fragment[] =
-    "#version 330 core\n"
-    "uniform sampler2D lightmap;\n"
-    "in vec2 uv;\n"
+/* Fragment shaders of terrain: this head, the text that shades, as in gl_terrain_desc, a main. */
+#define FRAGMENT_HEAD               \
+    "#version 330 core\n"           \
+    "uniform sampler2D lightmap;\n" \
+    "uniform float on_screen;\n"    \
+    "in vec2 uv;\n"                 \
+    "in vec3 place;\n"              \
     "out vec4 colour;\n"
-    "void main() { colour = vec4(texture(lightmap, uv).rgb, 1.0); }\n";
 
-static const char fading_fragment[] =
-    "#version 330 core\n"
-    "uniform sampler2D lightmap;\n"
+#define LIGHTMAP_ALONE                                                          \
+    "vec3 shade(vec2 uv, vec3 position) { return texture(lightmap, uv).rgb; }\n" \
+    "vec3 shadow(vec3 colour, vec3 position) { return colour; }\n"
+
+#define GROUND_MAIN                                     \
+    "vec3 ground() {\n"                                 \
+    "    vec3 c = shade(uv, place);\n"                  \
+    "    return on_screen > 0.0 ? shadow(c, place) : c;\n" \
+    "}\n"                                               \
+    "void main() { colour = vec4(ground(), 1.0); }\n"
+
+static const char fragment_head[] = FRAGMENT_HEAD, lightmap_alone[] = LIGHTMAP_ALONE,
+                  ground_main[] = GROUND_MAIN;
+
+const char gl_ground_fragment[] = FRAGMENT_HEAD LIGHTMAP_ALONE GROUND_MAIN;
+
+/* It is never part of a picture. */
+static const char fading_main[] =
     "uniform float alpha;\n"
-    "in vec2 uv;\n"
-    "out vec4 colour;\n"
-    "void main() { colour = vec4(texture(lightmap, uv).rgb, alpha); }\n";
+    "void main() { colour = vec4(shadow(shade(uv, place), place), alpha); }\n";
 
 static const char impostor_vertex[] =
     "#version 330 core\n"
@@ -65,23 +81,25 @@ static const char impostor_vertex[] =
     "uniform mat4 matrix, texture_matrix;\n"
     "uniform vec3 eye;\n"
     "uniform float scale;\n"
+    "out vec2 uv;\n"
+    "out vec3 place;\n"
     "out vec4 strq;\n"
     "void main() {\n"
+    "    uv = vec2(0.0);\n"
+    "    place = position;\n"
     "    strq = texture_matrix * vec4(position, 1.0);\n"
     "    gl_Position = matrix * vec4((position - eye) * scale, 1.0);\n"
     "}\n";
 
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
    them; the division brings them back. Of a picture in two parts each keeps to its own depths. */
-static const char impostor_fragment[] =
-    "#version 330 core\n"
+static const char impostor_main[] =
     "uniform sampler2D atlas;\n"
     "in vec4 strq;\n"
-    "out vec4 colour;\n"
     "void main() {\n"
     "    vec4 c = textureProj(atlas, strq.xyw);\n"
     "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
-    "    colour = vec4(c.rgb / c.a, 1.0);\n"
+    "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
     "}\n";
 
 const char gl_line_fragment[] =
@@ -90,11 +108,12 @@ const char gl_line_fragment[] =
     "out vec4 colour;\n"
     "void main() { colour = vec4(tint, 1.0); }\n";
 
-static GLuint compile(GLenum type, const char *source)
+/* Compiles a text that comes in parts. */
+static GLuint compile(GLenum type, const char *const *parts, GLsizei count)
 {
     GLuint shader = glCreateShader(type);
     GLint ok = 0;
-    glShaderSource(shader, 1, &source, NULL);
+    glShaderSource(shader, count, parts, NULL);
     glCompileShader(shader);
     glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
     if (!ok) {
@@ -105,10 +124,10 @@ static GLuint compile(GLenum type, const char *source)
     return shader;
 }
 
-gl_program gl_program_make(const char *vertex_source, const char *fragment_source)
+static gl_program make_program(const char *vertex_source, const char *const *parts, GLsizei count)
 {
-    GLuint vertex = compile(GL_VERTEX_SHADER, vertex_source);
-    GLuint fragment = compile(GL_FRAGMENT_SHADER, fragment_source);
+    GLuint vertex = compile(GL_VERTEX_SHADER, &vertex_source, 1);
+    GLuint fragment = compile(GL_FRAGMENT_SHADER, parts, count);
     GLint linked = 0;
     gl_program p;
     p.id = glCreateProgram();
@@ -133,6 +152,27 @@ gl_program gl_program_make(const char *vertex_source, const char *fragment_sourc
     p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
     p.tint = glGetUniformLocation(p.id, "tint");
+    p.on_screen = glGetUniformLocation(p.id, "on_screen");
+    return p;
+}
+
+gl_program gl_program_make(const char *vertex_source, const char *fragment_source)
+{
+    return make_program(vertex_source, &fragment_source, 1);
+}
+
+/* A program that shades as the terrain does. */
+static gl_program make_shaded(const gl_terrain *g, const char *vertex_source,
+                              const char *main_source)
+{
+    const char *parts[3];
+    gl_program p;
+    parts[0] = fragment_head;
+    parts[1] = g->shading;
+    parts[2] = main_source;
+    p = make_program(vertex_source, parts, 3);
+    glUseProgram(p.id);
+    glUniform4fv(p.field, 1, g->field);
     return p;
 }
 
@@ -156,9 +196,6 @@ static void make_array(GLuint *array, GLuint *vertices, GLuint *indices)
     glEnableVertexAttribArray(0);
     glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
 }
-
-/* Bytes of graphics memory that the vertices of ground may take. */
-#define POOL_BYTES ((size_t)400 << 20)
 
 /* Sends a node's vertices to a slot. */
 static terrimp_result fill_slot(gl_terrain *g, uint32_t node, uint32_t slot)
@@ -216,7 +253,8 @@ static uint32_t slot_of(gl_terrain *g, uint32_t node)
 
 /* Nodes stand one after the other in one buffer: a draw names its node by the base vertex. If all
    nodes fit they are made now, so that no frame pays for them. */
-static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *info)
+static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *info,
+                                  size_t vertex_bytes)
 {
     gl_pool *p = &g->pool;
     size_t bytes = info->ground_vertex_count * 3 * sizeof *p->xyz, i;
@@ -224,7 +262,7 @@ static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *inf
     uint16_t *indices;
     p->node_vertices = info->ground_vertex_count;
     p->node_count = info->node_count;
-    p->slot_count = (uint32_t)(POOL_BYTES / bytes);
+    p->slot_count = (uint32_t)(vertex_bytes / bytes);
     if (p->slot_count > p->node_count)
         p->slot_count = p->node_count;
     p->slot_of = malloc(p->node_count * sizeof *p->slot_of);
@@ -249,6 +287,12 @@ static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *inf
     return result;
 }
 
+/* Weights are the same in every node. */
+static void point_weight(GLuint location, GLint size, size_t offset)
+{
+    gl_point(location, size, GL_UNSIGNED_BYTE, sizeof(terrimp_geomip_weights), offset);
+}
+
 const char *gl_terrain_use_morphing(gl_terrain *g)
 {
     gl_pool *p = &g->pool;
@@ -259,12 +303,19 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
         return "no memory for the morph weights";
     terrimp_terrain_get_info(g->terrain, &info);
     terrimp_geomip_fill_weights(info.chunk_quads, TERRIMP_FORM_LIST, weights);
-    g->morphing = gl_program_make(gl_morphing_vertex, gl_ground_fragment);
+    g->morphing = make_shaded(g, gl_morphing_vertex, ground_main);
+    glGenVertexArrays(1, &p->morphing_array);
+    glBindVertexArray(p->morphing_array);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, g->ground_indices);
     glGenBuffers(1, &p->weights);
     glBindBuffer(GL_ARRAY_BUFFER, p->weights);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(p->node_vertices * sizeof *weights), weights,
                  GL_STATIC_DRAW);
     free(weights);
+    point_weight(2, 4, offsetof(terrimp_geomip_weights, odd));
+    point_weight(3, 4, offsetof(terrimp_geomip_weights, even));
+    point_weight(4, 4, offsetof(terrimp_geomip_weights, beside));
+    point_weight(5, 1, offsetof(terrimp_geomip_weights, self));
     glGenBuffers(1, &p->moves);
     glBindBuffer(GL_ARRAY_BUFFER, p->moves);
     glBufferData(GL_ARRAY_BUFFER,
@@ -274,8 +325,6 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
         fill_slot(g, p->node_of[i], i);
     if (!g->morphing.id)
         return "a shader does not compile";
-    glUseProgram(g->morphing.id);
-    glUniform4fv(g->morphing.field, 1, g->field);
     return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for morphing";
 }
 
@@ -367,57 +416,48 @@ static int make_atlas(gl_terrain *g, uint32_t i)
     return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-static void set_field(const gl_terrain *g, const gl_program *p)
+static const char *fill(gl_terrain *g, const gl_terrain_desc *desc,
+                        const terrimp_heightfield *field)
 {
-    glUseProgram(p->id);
-    glUniform4fv(p->field, 1, g->field);
-}
-
-static const char *fill(gl_terrain *g, const terrimp_terrain *terrain,
-                        const terrimp_heightfield *field, const uint8_t *lightmap,
-                        uint32_t atlas_size)
-{
+    size_t vertex_bytes = desc->vertex_bytes ? desc->vertex_bytes : (size_t)400 << 20;
     terrimp_terrain_info info;
     GLint limit = 0;
-    terrimp_result result = terrimp_terrain_get_info(terrain, &info);
-    g->terrain = terrain;
+    terrimp_result result = terrimp_terrain_get_info(g->terrain, &info);
     if (result == TERRIMP_OK)
-        result = fill_ground(g, &info);
+        result = fill_ground(g, &info, vertex_bytes);
     if (result == TERRIMP_OK)
-        result = fill_meshes(g, terrain, &info);
+        result = fill_meshes(g, g->terrain, &info);
     if (result != TERRIMP_OK)
         return terrimp_result_text((int)result);
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
-    if (atlas_size > (uint32_t)limit)
+    if (desc->atlas_size > (uint32_t)limit)
         return "the atlas is larger than OpenGL's largest texture";
-    if (!make_lightmap(g, field, lightmap, (uint32_t)limit))
+    if (!make_lightmap(g, field, desc->lightmap, (uint32_t)limit))
         return "no memory for the lightmap";
-    g->atlas_size = (GLsizei)atlas_size;
+    g->atlas_size = (GLsizei)desc->atlas_size;
     if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
-    g->ground = gl_program_make(gl_ground_vertex, gl_ground_fragment);
-    g->fading = gl_program_make(gl_ground_vertex, fading_fragment);
-    g->impostor = gl_program_make(impostor_vertex, impostor_fragment);
+    g->ground = make_shaded(g, gl_ground_vertex, ground_main);
+    g->fading = make_shaded(g, gl_ground_vertex, fading_main);
+    g->impostor = make_shaded(g, impostor_vertex, impostor_main);
     g->line = gl_program_make(gl_ground_vertex, gl_line_fragment);
     if (!g->ground.id || !g->fading.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
-    set_field(g, &g->ground);
-    set_field(g, &g->fading);
     return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for the terrain";
 }
 
-const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_terrain *terrain,
-                            const terrimp_heightfield *field, const uint8_t *lightmap,
-                            uint32_t atlas_size)
+const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc)
 {
     terrimp_heightfield resolved;
     const char *trouble;
     memset(g, 0, sizeof *g);
-    g->frame = frame;
+    g->frame = desc->frame;
+    g->terrain = desc->terrain;
+    g->shading = desc->shading ? desc->shading : lightmap_alone;
     g->target = GL_TO_NOTHING;
-    if (terrimp_heightfield_resolve(field, &resolved) != TERRIMP_OK)
+    if (terrimp_heightfield_resolve(desc->field, &resolved) != TERRIMP_OK)
         return "the heightfield is wrong";
-    trouble = fill(g, terrain, &resolved, lightmap, atlas_size);
+    trouble = fill(g, desc, &resolved);
     if (trouble)
         gl_terrain_close(g);
     return trouble;
@@ -426,10 +466,10 @@ const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_t
 void gl_terrain_close(gl_terrain *g)
 {
     gl_pool *p = &g->pool;
-    const GLuint arrays[2] = { p->array, g->mesh_array };
+    const GLuint arrays[3] = { p->array, p->morphing_array, g->mesh_array };
     const GLuint buffers[6] = { p->vertices, p->moves, p->weights, g->ground_indices,
                                 g->mesh_vertices, g->mesh_indices };
-    glDeleteVertexArrays(2, arrays);
+    glDeleteVertexArrays(3, arrays);
     glDeleteBuffers(6, buffers);
     glDeleteTextures(1, &g->lightmap);
     glDeleteTextures(GL_ATLASES, g->atlas);
@@ -463,8 +503,7 @@ static void multiply(const float a[16], const float b[16], float out[16])
         }
 }
 
-/* The matrix for positions relative to the eye: the view only turns. */
-static void relative_matrix(const float view[16], const float projection[16], float out[16])
+void gl_relative_matrix(const float view[16], const float projection[16], float out[16])
 {
     float turn[16];
     memcpy(turn, view, sizeof turn);
@@ -472,12 +511,13 @@ static void relative_matrix(const float view[16], const float projection[16], fl
     multiply(projection, turn, out);
 }
 
-static void use_program(const gl_program *p, const float matrix[16], const float eye[3])
+void gl_program_use(const gl_program *p, const float matrix[16], const float eye[3], int on_screen)
 {
     glUseProgram(p->id);
     glUniformMatrix4fv(p->matrix, 1, GL_FALSE, matrix);
     glUniform3fv(p->eye, 1, eye);
     glUniform1f(p->scale, 1.0f);
+    glUniform1f(p->on_screen, (float)on_screen);
 }
 
 /* Sends the waiting ground draws; they all have one state. */
@@ -518,12 +558,12 @@ void gl_terrain_turn_to_frame(gl_terrain *g)
         glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
         g->cleared = 1;
     }
-    use_program(&g->line, g->camera_matrix, g->camera_eye);
+    gl_program_use(&g->line, g->camera_matrix, g->camera_eye, 1);
     if (g->morphing.id)
-        use_program(&g->morphing, g->camera_matrix, g->camera_eye);
-    use_program(&g->impostor, g->camera_matrix, g->camera_eye);
-    use_program(&g->fading, g->camera_matrix, g->camera_eye);
-    use_program(&g->ground, g->camera_matrix, g->camera_eye);
+        gl_program_use(&g->morphing, g->camera_matrix, g->camera_eye, 1);
+    gl_program_use(&g->impostor, g->camera_matrix, g->camera_eye, 1);
+    gl_program_use(&g->fading, g->camera_matrix, g->camera_eye, 1);
+    gl_program_use(&g->ground, g->camera_matrix, g->camera_eye, 1);
 }
 
 /* Turns to an atlas. It stays bound from capture to capture: a change of target costs a software
@@ -553,8 +593,8 @@ static void begin_capture(void *user, const terrimp_capture_command *command)
     glViewport((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
     glScissor((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
     glClear((command->clear ? GL_COLOR_BUFFER_BIT : 0u) | GL_DEPTH_BUFFER_BIT);
-    relative_matrix(command->view, command->projection, matrix);
-    use_program(&g->ground, matrix, command->eye);
+    gl_relative_matrix(command->view, command->projection, matrix);
+    gl_program_use(&g->ground, matrix, command->eye, 0);
 }
 
 static void end_capture(void *user, const terrimp_capture_command *command)
@@ -613,7 +653,6 @@ static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32
 {
     const gl_pool *p = &g->pool;
     size_t vertices = (size_t)slot * p->node_vertices;
-    size_t stride = sizeof(terrimp_geomip_weights);
     flush(g);
     glUseProgram(g->morphing.id);
     glBindTexture(GL_TEXTURE_2D, g->lightmap);
@@ -621,21 +660,14 @@ static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32
     glUniform1f(g->morphing.morph, c->morph);
     glUniform4fv(g->morphing.side, 1, c->side);
     glUniform4fv(g->morphing.side_coarse, 1, c->side_coarse);
-    glBindVertexArray(p->array);
+    glBindVertexArray(p->morphing_array);
     glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
     gl_point(0, 3, GL_FLOAT, 0, vertices * 3 * sizeof(float));
     glBindBuffer(GL_ARRAY_BUFFER, p->moves);
     gl_point(1, 3, GL_FLOAT, sizeof *p->morph,
-          vertices * sizeof *p->morph + offsetof(terrimp_geomip_vertex, move));
-    glBindBuffer(GL_ARRAY_BUFFER, p->weights);
-    gl_point(2, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, odd));
-    gl_point(3, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, even));
-    gl_point(4, 4, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, beside));
-    gl_point(5, 1, GL_UNSIGNED_BYTE, stride, offsetof(terrimp_geomip_weights, self));
+             vertices * sizeof *p->morph + offsetof(terrimp_geomip_vertex, move));
     glDrawElements(GL_TRIANGLES, (GLsizei)c->index_count, GL_UNSIGNED_SHORT,
                    index_offset(c->first_index));
-    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
-    gl_point(0, 3, GL_FLOAT, 0, 0);
 }
 
 static void draw_ground(void *user, const terrimp_ground_command *command)
@@ -706,7 +738,7 @@ terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
     terrimp_result result = terrimp_camera_matrices(camera, view, projection);
     if (result != TERRIMP_OK)
         return result;
-    relative_matrix(view, projection, g->camera_matrix);
+    gl_relative_matrix(view, projection, g->camera_matrix);
     memcpy(g->camera_eye, camera->eye, sizeof g->camera_eye);
     memcpy(g->sky, sky, sizeof g->sky);
     g->target = GL_TO_NOTHING;

@@ -14,16 +14,23 @@ typedef struct gl_program {
     GLint morph, side, side_coarse;  /* morphing ground */
     GLint texture_matrix;            /* impostors */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
+    GLint on_screen;                 /* terrain: 0 in a capture, 1 on the screen */
 } gl_program;
 
 /* Vertices of ground as they are, and morphing ones by the formula of terrimp_geomip_weights. */
 extern const char gl_ground_vertex[], gl_morphing_vertex[];
 
-/* The shading of opaque ground, alike in every mode: the lightmap at `uv`. And outlines. */
+/* Opaque ground with no shading but the lightmap at `uv`; and outlines. */
 extern const char gl_ground_fragment[], gl_line_fragment[];
 
 /* Makes a program whose input `position` is at location 0; the id is 0 when it does not compile. */
 gl_program gl_program_make(const char *vertex_source, const char *fragment_source);
+
+/* Uses a program with a matrix for positions relative to the eye, at scale 1. */
+void gl_program_use(const gl_program *p, const float matrix[16], const float eye[3], int on_screen);
+
+/* That matrix, column-major: of the view only the turn is left. */
+void gl_relative_matrix(const float view[16], const float projection[16], float out[16]);
 
 /* Enables an attribute of the bound vertex array and points it into the bound buffer. */
 void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset);
@@ -42,7 +49,8 @@ typedef struct gl_batch {
 
 /* The vertices of ground nodes: as many as fit its buffer, those that were drawn last. */
 typedef struct gl_pool {
-    GLuint array, vertices, moves, weights; /* moves and weights: with morphing */
+    GLuint array, vertices;
+    GLuint morphing_array, moves, weights; /* with morphing */
     uint32_t node_vertices;          /* of one node */
     uint32_t slot_count, node_count;
     uint32_t filled;                 /* slots that have been filled so far */
@@ -54,9 +62,28 @@ typedef struct gl_pool {
 
 enum { GL_ATLASES = 16 };
 
+/* What a terrain is drawn with. The lightmap lies over the whole terrain; its field is the
+   terrain's, or for less memory one of every n-th sample. */
+typedef struct gl_terrain_desc {
+    const context *frame;
+    const terrimp_terrain *terrain;   /* built; outlives what is opened */
+    const terrimp_heightfield *field; /* of the lightmap */
+    const uint8_t *lightmap;          /* rgb[depth][width][3] of the field's size */
+    uint32_t atlas_size;
+    size_t vertex_bytes;              /* of graphics memory, for ground [Default 0 -> 400 MiB] */
+    const char *shading;              /* GLSL that defines, beside `uniform sampler2D lightmap`:
+                                         vec3 shade(vec2 uv, vec3 position)
+                                           the colour of the ground, which pictures keep
+                                         vec3 shadow(vec3 colour, vec3 position)
+                                           what moves over it, which pictures leave out
+                                         uv: of the lightmap; position [wu]. It outlives what is
+                                         opened [Default null -> the lightmap alone] */
+} gl_terrain_desc;
+
 typedef struct gl_terrain {
     const context *frame;
     const terrimp_terrain *terrain;
+    const char *shading;
     gl_pool pool;
     uint32_t frame_number;
     GLuint ground_indices;
@@ -76,12 +103,9 @@ typedef struct gl_terrain {
     int lines;                       /* draw outlines, and no captures */
 } gl_terrain;
 
-/* Fills the buffers of a built terrain, which outlives them. The lightmap is rgb[depth][width][3]
-   of the field's size. Returns null, or one line that says what is wrong; then there is nothing to
-   close. */
-const char *gl_terrain_open(gl_terrain *g, const context *frame, const terrimp_terrain *terrain,
-                            const terrimp_heightfield *field, const uint8_t *lightmap,
-                            uint32_t atlas_size);
+/* Fills buffers and textures. Returns null, or one line that says what is wrong; then there is
+   nothing to close. */
+const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc);
 
 /* Prepares for ground commands that morph. Returns null, or what is wrong. */
 const char *gl_terrain_use_morphing(gl_terrain *g);

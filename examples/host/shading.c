@@ -4,134 +4,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DETAIL = 256, SOURCE = 4096 }; /* texels of a repeated texture; bytes of a shader's text */
+enum { DETAIL = 256 }; /* texels of a repeated texture */
 
 #define MATERIAL_REPEAT 24.0f /* samples that a material covers once */
 #define CLOUD_REPEAT 1200.0f
 #define CLOUD_SPEED 0.02f     /* repeats a second */
 
-/* ---- Shaders ------------------------------------------------------------ */
-
-static const char vertex_head[] =
-    "out vec2 place;\n";
-
-static const char fragment_head[] =
-    "in vec2 place;\n"
+/* repeats: of materials, of clouds, drift along x and z */
+const char shading_source[] =
     "uniform sampler2D material_a, material_b, material_c, cover_b, cover_c, clouds;\n"
-    "uniform vec4 repeats;\n" /* of materials, of clouds, drift along x and z */
-    "uniform float cloudiness;\n"
-    "vec3 ground(vec3 light_a, vec2 at) {\n"
-    "    vec2 t = place * repeats.x;\n"
-    "    vec4 light_b = texture(cover_b, at), light_c = texture(cover_c, at);\n"
+    "uniform vec4 repeats;\n"
+    "vec3 shade(vec2 uv, vec3 position) {\n"
+    "    vec2 t = position.xz * repeats.x;\n"
+    "    vec3 light_a = texture(lightmap, uv).rgb;\n"
+    "    vec4 light_b = texture(cover_b, uv), light_c = texture(cover_c, uv);\n"
     "    vec3 c = light_a * texture(material_a, t).rgb;\n"
     "    c = mix(c, light_b.rgb * texture(material_b, t * 1.7).rgb, light_b.a);\n"
     "    c = mix(c, light_c.rgb * texture(material_c, t * 0.6).rgb, light_c.a);\n"
     "    return 2.0 * c;\n"
     "}\n"
-    "vec3 under_clouds(vec3 c) {\n"
-    "    if (cloudiness == 0.0) return c;\n"
-    "    return c * (1.0 - cloudiness * texture(clouds, place * repeats.y + repeats.zw).r);\n"
+    "vec3 shadow(vec3 c, vec3 position) {\n"
+    "    return c * (1.0 - texture(clouds, position.xz * repeats.y + repeats.zw).r);\n"
     "}\n";
-
-/* Replaces the first `from` in text[SOURCE] by `to`; returns 0 when there is none, or no room. */
-static int replace(char *text, const char *from, const char *to)
-{
-    char *at = strstr(text, from);
-    size_t removed = strlen(from), added = strlen(to);
-    if (!at || strlen(text) + added >= SOURCE)
-        return 0;
-    memmove(at + added, at + removed, strlen(at + removed) + 1);
-    memcpy(at, to, added);
-    return 1;
-}
-
-/* Puts lines behind the first one, which is the version. */
-static int insert_head(char *text, const char *head)
-{
-    char *end = strchr(text, '\n');
-    size_t added = strlen(head);
-    if (!end || strlen(text) + added >= SOURCE)
-        return 0;
-    memmove(end + 1 + added, end + 1, strlen(end + 1) + 1);
-    memcpy(end + 1, head, added);
-    return 1;
-}
-
-static int append(char *text, const char *tail)
-{
-    if (strlen(text) + strlen(tail) >= SOURCE)
-        return 0;
-    strcat(text, tail);
-    return 1;
-}
-
-static int read_source(GLuint program, GLenum wanted, char text[SOURCE])
-{
-    GLuint shaders[2];
-    GLsizei count = 0, length = 0, i;
-    glGetAttachedShaders(program, 2, &count, shaders);
-    for (i = 0; i < count; i++) {
-        GLint type = 0;
-        glGetShaderiv(shaders[i], GL_SHADER_TYPE, &type);
-        if ((GLenum)type == wanted)
-            glGetShaderSource(shaders[i], SOURCE, &length, text);
-    }
-    return length > 0;
-}
-
-static void set_samplers(GLuint program)
-{
-    static const char *const names[6] = { "material_a", "material_b", "material_c", "cover_b",
-                                          "cover_c", "clouds" };
-    int i;
-    glUseProgram(program);
-    for (i = 0; i < 6; i++)
-        glUniform1i(glGetUniformLocation(program, names[i]), i + 1);
-}
-
-/* The program's own shaders go on doing all that they did; where they looked the lightmap up they
-   ask for the ground, and what they paint lies under the clouds. So a change of how positions are
-   made, or alpha, needs no change here. */
-static int dress(gl_program *program)
-{
-    char vertex[SOURCE], fragment[SOURCE];
-    gl_program dressed;
-    if (!read_source(program->id, GL_VERTEX_SHADER, vertex)
-        || !read_source(program->id, GL_FRAGMENT_SHADER, fragment)
-        || !insert_head(vertex, vertex_head)
-        || !replace(vertex, "void main() {", "void main() {\n    place = position.xz;")
-        || !insert_head(fragment, fragment_head)
-        || !replace(fragment, "void main() {", "void paint() {")
-        || !append(fragment, "void main() { paint(); colour.rgb = under_clouds(colour.rgb); }\n"))
-        return 0;
-    replace(fragment, "texture(lightmap, uv).rgb", "ground(texture(lightmap, uv).rgb, uv)");
-    dressed = gl_program_make(vertex, fragment);
-    if (!dressed.id)
-        return 0;
-    set_samplers(dressed.id);
-    glDeleteProgram(program->id);
-    *program = dressed;
-    return 1;
-}
-
-static void set_field(const gl_terrain *g, const gl_program *p)
-{
-    glUseProgram(p->id);
-    glUniform4fv(p->field, 1, g->field);
-}
-
-int shading_dress(gl_terrain *g)
-{
-    if (!dress(&g->ground) || !dress(&g->fading) || !dress(&g->impostor))
-        return 0;
-    if (g->morphing.id && !dress(&g->morphing))
-        return 0;
-    set_field(g, &g->ground);
-    set_field(g, &g->fading);
-    if (g->morphing.id)
-        set_field(g, &g->morphing);
-    return 1;
-}
 
 /* ---- Textures ----------------------------------------------------------- */
 
@@ -279,14 +173,17 @@ void shading_close(shading *s)
 
 /* ---- A frame ------------------------------------------------------------ */
 
-/* Strength: 0 none, 1 as they are. */
-static void set_clouds(const shading *s, const gl_program *program, float strength)
+static void set_uniforms(const shading *s, const gl_program *program)
 {
+    static const char *const samplers[6] = { "material_a", "material_b", "material_c", "cover_b",
+                                             "cover_c", "clouds" };
+    int i;
     glUseProgram(program->id);
+    for (i = 0; i < 6; i++)
+        glUniform1i(glGetUniformLocation(program->id, samplers[i]), i + 1);
     glUniform4f(glGetUniformLocation(program->id, "repeats"),
                 1.0f / (MATERIAL_REPEAT * s->spacing), 1.0f / (CLOUD_REPEAT * s->spacing),
                 s->drift[0], s->drift[1]);
-    glUniform1f(glGetUniformLocation(program->id, "cloudiness"), strength);
 }
 
 void shading_begin(shading *s, const gl_terrain *g, float seconds)
@@ -303,56 +200,9 @@ void shading_begin(shading *s, const gl_terrain *g, float seconds)
     glActiveTexture(GL_TEXTURE0);
     s->drift[0] = fmodf(seconds * CLOUD_SPEED, 1.0f);
     s->drift[1] = fmodf(seconds * CLOUD_SPEED * 0.6f, 1.0f);
-    set_clouds(s, &g->ground, 1.0f);
-    set_clouds(s, &g->fading, 1.0f);
-    set_clouds(s, &g->impostor, 1.0f);
+    set_uniforms(s, &g->ground);
+    set_uniforms(s, &g->fading);
+    set_uniforms(s, &g->impostor);
     if (g->morphing.id)
-        set_clouds(s, &g->morphing, 1.0f);
-}
-
-static void begin_capture(void *user, const terrimp_capture_command *command)
-{
-    shading *s = user;
-    s->inner.begin_capture(s->inner.user, command);
-    set_clouds(s, &s->gl->ground, 0.0f);
-}
-
-static void end_capture(void *user, const terrimp_capture_command *command)
-{
-    shading *s = user;
-    s->inner.end_capture(s->inner.user, command);
-    set_clouds(s, &s->gl->ground, 1.0f);
-}
-
-static void draw_impostor(void *user, const terrimp_impostor_command *command)
-{
-    shading *s = user;
-    s->inner.draw_impostor(s->inner.user, command);
-}
-
-static void draw_ground(void *user, const terrimp_ground_command *command)
-{
-    shading *s = user;
-    s->inner.draw_ground(s->inner.user, command);
-}
-
-static void draw_floor(void *user, const terrimp_floor_command *command)
-{
-    shading *s = user;
-    s->inner.draw_floor(s->inner.user, command);
-}
-
-terrimp_callbacks shading_callbacks(shading *s, const gl_terrain *g, terrimp_callbacks inner)
-{
-    terrimp_callbacks callbacks;
-    s->gl = g;
-    s->inner = inner;
-    memset(&callbacks, 0, sizeof callbacks);
-    callbacks.user = s;
-    callbacks.begin_capture = begin_capture;
-    callbacks.end_capture = end_capture;
-    callbacks.draw_impostor = draw_impostor;
-    callbacks.draw_ground = draw_ground;
-    callbacks.draw_floor = draw_floor;
-    return callbacks;
+        set_uniforms(s, &g->morphing);
 }

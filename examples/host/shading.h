@@ -16,22 +16,16 @@ typedef struct shading {
     GLuint clouds;
     float spacing;           /* [wu] between samples: what the repeats are measured in */
     float drift[2];          /* of the clouds, in repeats */
-    const gl_terrain *gl;    /* for the callbacks */
-    terrimp_callbacks inner;
 } shading;
+
+/* For gl_terrain_desc. */
+extern const char shading_source[];
 
 /* Makes the textures; field and lightmap as for gl_terrain_open. Returns null, or what is wrong. */
 const char *shading_open(shading *s, const terrimp_heightfield *field, const uint8_t *lightmap);
 
-/* Has all programs of a terrain shade like this; after gl_terrain_use_morphing, if that is used.
-   Returns 0 when one does not compile. */
-int shading_dress(gl_terrain *g);
-
 /* Before a frame: binds the textures, to units 1 and up, and sets where the clouds are. */
 void shading_begin(shading *s, const gl_terrain *g, float seconds);
-
-/* Callbacks around gl_terrain's that leave the clouds out of captures. */
-terrimp_callbacks shading_callbacks(shading *s, const gl_terrain *g, terrimp_callbacks inner);
 
 void shading_close(shading *s);
 

@@ -71,7 +71,7 @@ static double deviation_of(const double *values, size_t count, double mean)
 
 stats_summary stats_summarise(const stats *s)
 {
-    stats_summary out = { 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0 };
+    stats_summary out = { 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0 };
     size_t n = s->count;
     double *sorted = n ? malloc(n * sizeof *sorted) : NULL;
     if (!sorted)
@@ -85,6 +85,7 @@ stats_summary stats_summarise(const stats *s)
     out.p95 = percentile(sorted, n, 95);
     out.p99 = percentile(sorted, n, 99);
     out.worst = sorted[n - 1];
+    out.least = sorted[0];
     free(sorted);
     return out;
 }

@@ -22,6 +22,7 @@ typedef struct stats_summary {
     size_t count;
     double median, mean, deviation; /* deviation: of the sample, n - 1 below */
     double p95, p99, worst;         /* percentiles by nearest rank; worst = largest */
+    double least;
 } stats_summary;
 
 /* Appends a value; when memory runs out the value is dropped and 0 returned, else 1. */

@@ -133,17 +133,6 @@ static void make_buffers(trees *t, const float *sorted)
     glVertexAttribDivisor(1, 1);
 }
 
-static int make_program(trees *t)
-{
-    gl_program p = gl_program_make(tree_vertex, tree_fragment);
-    t->program = p.id;
-    t->matrix = p.matrix;
-    t->eye = p.eye;
-    t->alpha = p.alpha;
-    t->clip = glGetUniformLocation(p.id, "clip");
-    return p.id != 0;
-}
-
 const char *trees_open(trees *t, const terrimp_terrain *terrain, const terrimp_heightfield *field,
                        uint32_t count)
 {
@@ -163,7 +152,9 @@ const char *trees_open(trees *t, const terrimp_terrain *terrain, const terrimp_h
     t->draws = malloc(chunks * sizeof *t->draws);
     next = malloc(chunks * sizeof *next);
     sorted = malloc((size_t)count * TREE_FLOATS * sizeof *sorted);
-    if (t->first && t->draws && next && sorted && make_program(t)) {
+    t->program = gl_program_make(tree_vertex, tree_fragment);
+    t->clip = glGetUniformLocation(t->program.id, "clip");
+    if (t->first && t->draws && next && sorted && t->program.id) {
         plant_all(t, &resolved, info.chunk_quads, count, sorted, next);
         make_buffers(t, sorted);
     }
@@ -180,7 +171,7 @@ void trees_close(trees *t)
     glDeleteVertexArrays(1, &t->array);
     glDeleteBuffers(1, &t->vertices);
     glDeleteBuffers(1, &t->instances);
-    glDeleteProgram(t->program);
+    glDeleteProgram(t->program.id);
     free(t->first);
     free(t->draws);
     memset(t, 0, sizeof *t);
@@ -192,11 +183,9 @@ void trees_close(trees *t)
    to cut by distances that are disabled. */
 static void use(const trees *t, const float matrix[16], const float eye[3])
 {
-    glUseProgram(t->program);
+    gl_program_use(&t->program, matrix, eye, 1);
     glBindVertexArray(t->array);
-    glUniformMatrix4fv(t->matrix, 1, GL_FALSE, matrix);
-    glUniform3fv(t->eye, 1, eye);
-    glUniform1f(t->alpha, 1.0f);
+    glUniform1f(t->program.alpha, 1.0f);
     glUniform4f(t->clip, -1e30f, -1e30f, 1e30f, 1e30f);
 }
 
@@ -210,19 +199,6 @@ static void draw_chunk(const trees *t, uint32_t chunk)
     glVertexAttribPointer(1, TREE_FLOATS, GL_FLOAT, GL_FALSE, 0,
                           (const void *)(uintptr_t)(first * TREE_FLOATS * sizeof(float)));
     glDrawArraysInstanced(GL_TRIANGLES, 0, TREE_VERTICES, (GLsizei)count);
-}
-
-/* out = projection * (view without its translation), column-major */
-static void relative_matrix(const float view[16], const float projection[16], float out[16])
-{
-    int column, row, k;
-    for (column = 0; column < 4; column++)
-        for (row = 0; row < 4; row++) {
-            float sum = column == 3 ? projection[12 + row] : 0.0f;
-            for (k = 0; column < 3 && k < 3; k++)
-                sum += projection[k * 4 + row] * view[column * 4 + k];
-            out[column * 4 + row] = sum;
-        }
 }
 
 /* Draws the trees of all chunks under a node, and of so many more around it. Nodes are numbered
@@ -248,7 +224,7 @@ static void draw_captured(trees *t, const terrimp_capture_command *c)
 {
     float matrix[16];
     GLenum i;
-    relative_matrix(c->view, c->projection, matrix);
+    gl_relative_matrix(c->view, c->projection, matrix);
     use(t, matrix, c->eye);
     glUniform4f(t->clip, c->clip_min[0], c->clip_min[1], c->clip_max[0], c->clip_max[1]);
     for (i = 0; i < 4; i++)
@@ -322,7 +298,7 @@ void trees_end(trees *t)
     use(t, t->gl->camera_matrix, t->gl->camera_eye);
     for (i = 0; i < t->draw_count; i++) {
         const trees_draw *draw = &t->draws[i];
-        glUniform1f(t->alpha, draw->alpha);
+        glUniform1f(t->program.alpha, draw->alpha);
         if (draw->alpha < 1.0f)
             glEnable(GL_BLEND);
         draw_node(t, draw->node, draw->level, 0);

@@ -15,8 +15,9 @@ typedef struct trees_draw {
 typedef struct trees {
     uint32_t chunks_x, chunks_z;
     uint32_t *first;         /* [chunks + 1] where a chunk's instances begin */
-    GLuint array, vertices, instances, program;
-    GLint matrix, eye, clip, alpha; /* places of the uniforms */
+    GLuint array, vertices, instances;
+    gl_program program;
+    GLint clip;              /* its uniform */
     gl_terrain *gl;          /* for the callbacks, with what they go round */
     terrimp_callbacks inner;
     trees_draw *draws;       /* [chunks] of the frame, in the order of the ground commands */

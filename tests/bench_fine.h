@@ -1,62 +1,10 @@
-/* Two things that the frame benchmark draws itself: the floor under all frame times, one textured
-   quad over the whole screen; and the full mesh with 4 x 4 samples a pixel. */
-#ifndef BENCH_GL_H
-#define BENCH_GL_H
+/* The full mesh with 4 x 4 samples a pixel. */
+#ifndef BENCH_FINE_H
+#define BENCH_FINE_H
 
 #include "bench_look.h"
 
 #include "examples/host/quality.h"
-
-/* ---- The quad ----------------------------------------------------------- */
-
-static const char quad_vertex[] =
-    "#version 330 core\n"
-    "out vec2 uv;\n"
-    "void main() {\n"
-    "    uv = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));\n"
-    "    gl_Position = vec4(uv * 2.0 - 1.0, 0.0, 1.0);\n"
-    "}\n";
-
-typedef struct quad {
-    gl_program program;
-    GLuint array;
-    stats ms;
-} quad;
-
-static void quad_open(quad *q)
-{
-    memset(q, 0, sizeof *q);
-    q->program = gl_program_make(quad_vertex, gl_ground_fragment);
-    if (!q->program.id)
-        scene_stop("the quad", "a shader does not compile");
-    glGenVertexArrays(1, &q->array);
-}
-
-/* Draws and times it, textured with the scene's lightmap. */
-static void quad_draw(quad *q, const context *frame, GLuint texture)
-{
-    double start = clock_ms();
-    context_bind(frame);
-    glDisable(GL_SCISSOR_TEST);
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_CULL_FACE);
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    glUseProgram(q->program.id);
-    glBindVertexArray(q->array);
-    glBindTexture(GL_TEXTURE_2D, texture);
-    glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
-    glFinish();
-    stats_add(&q->ms, clock_ms() - start);
-}
-
-static void quad_close(quad *q)
-{
-    glDeleteProgram(q->program.id);
-    glDeleteVertexArrays(1, &q->array);
-    stats_free(&q->ms);
-}
-
-/* ---- The full mesh, supersampled ---------------------------------------- */
 
 enum { FINE = 4 };
 
@@ -85,7 +33,7 @@ static void fine_open(fine *f, const context *frame)
     glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, f->frame.width, f->frame.height);
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, f->frame.depth);
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-        scene_stop("the supersampled reference", "its framebuffer is not complete");
+        bench_stop("the supersampled reference", "its framebuffer is not complete");
 }
 
 /* Leaves the supersampled picture of what a view of the full mesh has decided last. */
@@ -93,14 +41,17 @@ static void fine_draw(fine *f, look *l, gl_terrain *gl, terrimp_view *full,
                       terrimp_camera camera)
 {
     const context *frame = gl->frame;
+    terrimp_callbacks callbacks;
     terrimp_stats now;
     need(terrimp_view_get_stats(full, &now));
-    scene_tighten(&camera, &now);
+    tour_tighten(&camera, &now);
     camera.width_px *= FINE;
     camera.height_px *= FINE;
     gl->frame = &f->frame;
     need(gl_terrain_begin(gl, &camera, scene_sky));
-    need(look_render(l, gl, full));
+    callbacks = look_begin(l, gl);
+    need(terrimp_view_render(full, &callbacks));
+    look_end(l);
     gl_terrain_end(gl);
     gl->frame = frame;
     context_read(&f->frame, f->large);

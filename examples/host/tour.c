@@ -1,0 +1,107 @@
+#include "tour.h"
+
+#include "procedural.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int fail(tour *t, const char *trouble)
+{
+    snprintf(t->error, sizeof t->error, "%s", trouble);
+    return 0;
+}
+
+static int load_file(tour *t)
+{
+    const char *trouble;
+    if (!dem_load(&t->dem, t->desc.dem, &t->desc.file))
+        return fail(t, t->dem.error);
+    t->voids_filled = dem_fill_voids(&t->dem, &trouble);
+    if (trouble)
+        return fail(t, trouble);
+    t->field = dem_heightfield(&t->dem);
+    return 1;
+}
+
+static int make_up(tour *t)
+{
+    uint32_t size = t->desc.size;
+    t->dem.samples = procedural_terrain(size, size, t->desc.seed);
+    if (!t->dem.samples)
+        return fail(t, "no memory for the terrain");
+    t->dem.width = t->dem.depth = size;
+    t->dem.format = TERRIMP_FORMAT_U16;
+    t->dem.spacing_x = t->dem.spacing_z = 1.0f;
+    t->field = dem_heightfield(&t->dem);
+    t->field.height_scale = PROCEDURAL_HEIGHT_SCALE;
+    return 1;
+}
+
+int tour_load(tour *t, const tour_desc *desc)
+{
+    memset(t, 0, sizeof *t);
+    t->desc = *desc;
+    if (!(desc->dem ? load_file(t) : make_up(t)))
+        return 0;
+    if (desc->spacing[0] > 0.0f) {
+        t->field.spacing_x = desc->spacing[0];
+        t->field.spacing_z = desc->spacing[1];
+    }
+    if (desc->height_scale > 0.0f)
+        t->field.height_scale = desc->height_scale;
+    return 1;
+}
+
+int tour_plan(tour *t)
+{
+    const tour_desc *d = &t->desc;
+    terrimp_heightfield field;
+    float speed = d->speed, fps = d->fps > 0.0f ? d->fps : 60.0f;
+    int ok;
+    if (terrimp_heightfield_resolve(&t->field, &field) != TERRIMP_OK)
+        return fail(t, "the heightfield is wrong");
+    if (!(speed > 0.0f))
+        speed = 80.0f * field.spacing_x;
+    if (d->path)
+        ok = flight_load(&t->flight, d->path);
+    else
+        ok = flight_circle(&t->flight, &field, d->frames ? d->frames : 600, speed / fps);
+    if (!ok)
+        return fail(t, t->flight.error);
+    if (d->frames && d->frames < t->flight.count)
+        t->flight.count = d->frames;
+    return 1;
+}
+
+terrimp_camera tour_camera(const tour *t, const terrimp_box *box, size_t frame)
+{
+    const flight_pose *pose = &t->flight.poses[frame];
+    terrimp_camera camera;
+    int i;
+    memset(&camera, 0, sizeof camera);
+    for (i = 0; i < 3; i++) {
+        camera.eye[i] = pose->eye[i];
+        camera.forward[i] = pose->target[i] - pose->eye[i];
+    }
+    camera.fov_y_rad = t->desc.fov_y_rad;
+    camera.width_px = t->desc.width;
+    camera.height_px = t->desc.height;
+    camera.z_far = terrimp_box_farthest(box, camera.eye) * 1.2f;
+    camera.z_near = camera.z_far * (1.0f / 8192.0f);
+    return camera;
+}
+
+void tour_tighten(terrimp_camera *camera, const terrimp_stats *now)
+{
+    if (now->z_near > camera->z_near)
+        camera->z_near = now->z_near;
+    if (now->z_far > camera->z_near)
+        camera->z_far = now->z_far * 1.01f;
+}
+
+void tour_close(tour *t)
+{
+    flight_free(&t->flight);
+    dem_free(&t->dem);
+}
