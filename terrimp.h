@@ -10171,9 +10171,9 @@ static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)
     return TERRIMP_OK;
 }
 
-/* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels that
-   live for longer and begin closer to the eye. (Measured on the rough terrain of 4097 samples: at
-   4 px 0.035 of the full mesh's time at 30 dB; with the settings of 1 px it was 0.075 at 32 dB.) */
+/* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels
+   that live for longer and begin closer to the eye. (Measured on the rough terrain of 4097 samples:
+   at 4 px 0.035 of the full mesh's time at 30 dB; before that 0.075 at 32 dB.) */
 static void terrimpi_view_defaults(const terrimp_terrain *t, terrimp_view_desc *d)
 {
     uint32_t chunks = t->tree.level_first[1];

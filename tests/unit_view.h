@@ -1145,8 +1145,8 @@ static void view_defaults_are_those_of_the_table(void)
     land_free(&l);
 }
 
-/* In AUTO the tolerance alone makes pictures coarser: fewer texels, longer lives, closer to the eye;
-   what is set stays. Other modes keep Hess' settings. */
+/* In AUTO the tolerance alone makes pictures coarser: fewer texels, longer lives, closer to the
+   eye; what is set stays. Other modes keep Hess' settings. */
 static void the_tolerance_rules_the_pictures_of_auto(void)
 {
     static const struct {
