@@ -905,16 +905,6 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-/* What one skirt appends to a mesh whose loop has so many vertices: as many vertices again, and
-   two triangles for each of them.
-
-   border_vertex_count  as in the mesh
-   vertex_count         out
-   index_count          out
-   Errors               NULL, RANGE (3 vertices or fewer); outputs untouched */
-TERRIMP_API terrimp_result terrimp_skirt_counts(uint32_t border_vertex_count,
-                                                uint32_t *vertex_count, uint32_t *index_count);
-
 /* Appends the lower skirt: a wall from the border down to one height, facing outwards. It fills
    the gap to a neighbour of another level.
 
@@ -941,25 +931,11 @@ typedef struct terrimp_raise_desc {
     uint32_t cols;        /* (required) as then */
     uint32_t rows;        /* (required) as then */
     float amount;         /* 0: not at all; 1: until no sample is above [Limits: 0..1] */
-    float corner_raise[4]; /* [wu] raise of the corners, in loop order: (0, 0), (0, last row),
-                              (last column, last row), (last column, 0); four tiles must agree on
-                              it, terrimp_border_corner_raise helps [Limits: >= 0] */
 } terrimp_raise_desc;
 
-/* How far the two ends of a border polyline must be raised so that no sample beside them asks for
-   more: the largest height of a sample above the polyline, between each end and the kept point
-   next to it. The largest of the (up to four) borders that meet in a corner is its raise.
-
-   heights      [count] as in terrimp_border_simplify
-   border       its polyline
-   end_raise    [2] out: [wu] at the first and at the last point
-   Errors       NULL, RANGE, NOT_FINITE; outputs untouched */
-TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uint32_t count,
-                                                       const terrimp_border *border,
-                                                       float end_raise[2]);
-
 /* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
-   surface but for rounding, except beside vertices that may not be raised: a sample whose weight
+   surface but for rounding, except beside vertices that may not be raised. Corners stay where they
+   are, since four tiles share them; a sample whose weight
    hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
    Border vertices follow from the samples of their border alone, so that neighbours still meet.
    Starts from every vertex raised by the largest shortfall round it and lowers them together as
@@ -1954,6 +1930,40 @@ static size_t terrimpi_add(size_t a, size_t b, int *ok)
     return a + b;
 }
 
+#define TERRIMPI_ALIGN 8u /* of blocks of memory: pointers, and the simplifier's 64-bit sums */
+
+/* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
+static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
+{
+    size_t at = *offset;
+    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
+    *offset = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
+    return at;
+}
+
+/* A block of memory that is dealt out array by array: so one list of arrays serves both for laying
+   them out and, without a base, for counting the bytes. */
+typedef struct terrimpi_arena {
+    unsigned char *base;
+    size_t bytes;
+    int ok; /* nothing has overflowed */
+} terrimpi_arena;
+
+static terrimpi_arena terrimpi_arena_at(void *base)
+{
+    terrimpi_arena arena;
+    arena.base = (unsigned char *)base;
+    arena.bytes = 0;
+    arena.ok = 1;
+    return arena;
+}
+
+static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
+{
+    size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
+    return arena->base && arena->ok ? arena->base + at : NULL;
+}
+
 static float terrimpi_dot(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -2008,6 +2018,16 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
     }
     terrimpi_normalize(right);
     terrimpi_cross(right, forward, up);
+}
+
+static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+    terrimp_rect rect;
+    rect.x = x;
+    rect.y = y;
+    rect.width = width;
+    rect.height = height;
+    return rect;
 }
 
 /* Moves the ends of an interval apart by what rounding can have cost: a fraction of their size and
@@ -2304,24 +2324,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
 TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, float *height)
 {
-    terrimp_heightfield f;
-    float raw, value;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (height == NULL)
-        return TERRIMP_E_NULL;
-    if (x >= f.width || z >= f.depth)
-        return TERRIMP_E_RANGE;
-    raw = terrimpi_raw(&f, x, z);
-    value = terrimpi_sample(&f, x, z);
-    if (terrimpi_is_void(&f, raw))
-        return TERRIMP_E_VOID;
-    if (!terrimpi_finite(value))
-        return TERRIMP_E_NOT_FINITE;
-    *height = value;
-    return TERRIMP_OK;
+    return terrimp_heightfield_read(field, x, z, 1, 1, 1, height);
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
@@ -2349,12 +2352,31 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
     return result;
 }
 
+/* The range of the world heights of a rectangle of samples, cut at the last column and row.
+   Rounding keeps the order, and the scale is positive: the raw range maps to the exact one. */
+static terrimp_result terrimpi_height_range(const terrimp_heightfield *field, terrimp_rect samples,
+                                            int skip_voids, float *low, float *high)
+{
+    terrimpi_scan scan;
+    terrimp_result result;
+
+    scan.skip_voids = skip_voids;
+    result = terrimpi_scan_tile(field, samples.x, samples.y, samples.width, samples.height, 1,
+                                &scan);
+    if (result != TERRIMP_OK)
+        return result;
+    if (scan.low > scan.high)
+        return TERRIMP_E_VOID;
+    *low = terrimpi_world_height(field, scan.low);
+    *high = terrimpi_world_height(field, scan.high);
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, uint32_t cols, uint32_t rows,
                                                       float *low, float *high)
 {
     terrimp_heightfield f;
-    terrimpi_scan scan;
     terrimp_result result = terrimp_heightfield_resolve(field, &f);
 
     if (result != TERRIMP_OK)
@@ -2363,16 +2385,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
         return TERRIMP_E_NULL;
     if (x >= f.width || z >= f.depth || cols == 0 || rows == 0)
         return TERRIMP_E_RANGE;
-    scan.skip_voids = 1;
-    result = terrimpi_scan_tile(&f, x, z, cols, rows, 1, &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (scan.low > scan.high)
-        return TERRIMP_E_VOID;
-    /* Rounding keeps the order, and the scale is positive: the raw range maps to the exact one. */
-    *low = terrimpi_world_height(&f, scan.low);
-    *high = terrimpi_world_height(&f, scan.high);
-    return TERRIMP_OK;
+    return terrimpi_height_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
 }
 
 /* ---- voids ----
@@ -2404,7 +2417,7 @@ typedef struct terrimpi_fill {
 } terrimpi_fill;
 
 /* Lays the levels out behind each other: first all values, then, in the same order, all known
-   flags. Returns the bytes; 0 if they overflow. Without fill it only counts. */
+   flags. Returns the bytes; 0 if they overflow. */
 static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch,
                                    terrimpi_fill *fill)
 {
@@ -2415,10 +2428,8 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
     for (;;) {
         first[count] = cells;
         cells = terrimpi_add(cells, terrimpi_mul(w, rows, &ok), &ok);
-        if (fill != NULL) {
-            fill->level[count].width = w;
-            fill->level[count].depth = d;
-        }
+        fill->level[count].width = w;
+        fill->level[count].depth = d;
         ++count;
         if (w == 1u && d == 1u)
             break;
@@ -2426,12 +2437,10 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
         d = (d + 1u) / 2u;
         rows = d;
     }
-    if (fill != NULL) {
-        fill->level_count = count;
-        for (i = 0; i < count; ++i) {
-            fill->level[i].value = (float *)scratch + first[i];
-            fill->level[i].known = (uint8_t *)((float *)scratch + cells) + first[i];
-        }
+    fill->level_count = count;
+    for (i = 0; i < count && scratch != NULL; ++i) {
+        fill->level[i].value = (float *)scratch + first[i];
+        fill->level[i].known = (uint8_t *)((float *)scratch + cells) + first[i];
     }
     cells = terrimpi_mul(cells, sizeof(float) + 1u, &ok);
     return ok ? cells : 0;
@@ -2439,9 +2448,11 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
 
 TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, uint32_t depth)
 {
+    terrimpi_fill fill;
+
     if (width < 2u || width > TERRIMP_MAX_DIM || depth < 2u || depth > TERRIMP_MAX_DIM)
         return 0;
-    return terrimpi_fill_layout(width, depth, NULL, NULL);
+    return terrimpi_fill_layout(width, depth, NULL, &fill);
 }
 
 /* Brings row z of the field into the ring and marks its voids. */
@@ -2690,7 +2701,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 
 /* One quad: heights of its corners and where it lies. */
 typedef struct terrimpi_quad {
-    float h00, h10, h01, h11; /* hxz */
+    float h[4]; /* of (0, 0), (1, 0), (0, 1), (1, 1) */
     float x0, x1, z0, z1;
 } terrimpi_quad;
 
@@ -2716,25 +2727,20 @@ static int terrimpi_locate(float origin, float spacing, uint32_t count, float at
 static terrimp_result terrimpi_quad_load(const terrimp_heightfield *field, uint32_t x, uint32_t z,
                                          terrimpi_quad *quad)
 {
-    float raw[4], none;
-    int i;
+    float none = 0.0f;
+    uint32_t i;
 
     quad->x0 = terrimpi_line(field->origin_x, field->spacing_x, x);
     quad->x1 = terrimpi_line(field->origin_x, field->spacing_x, x + 1u);
     quad->z0 = terrimpi_line(field->origin_z, field->spacing_z, z);
     quad->z1 = terrimpi_line(field->origin_z, field->spacing_z, z + 1u);
-    raw[0] = terrimpi_raw(field, x, z);
-    raw[1] = terrimpi_raw(field, x + 1u, z);
-    raw[2] = terrimpi_raw(field, x, z + 1u);
-    raw[3] = terrimpi_raw(field, x + 1u, z + 1u);
-    for (i = 0; i < 4; ++i)
-        if (terrimpi_is_void(field, raw[i]))
+    for (i = 0; i < 4u; ++i) {
+        float raw = terrimpi_raw(field, x + (i & 1u), z + (i >> 1));
+        if (terrimpi_is_void(field, raw))
             return TERRIMP_E_VOID;
-    quad->h00 = terrimpi_world_height(field, raw[0]);
-    quad->h10 = terrimpi_world_height(field, raw[1]);
-    quad->h01 = terrimpi_world_height(field, raw[2]);
-    quad->h11 = terrimpi_world_height(field, raw[3]);
-    none = 0.0f * quad->h00 + 0.0f * quad->h10 + 0.0f * quad->h01 + 0.0f * quad->h11;
+        quad->h[i] = terrimpi_world_height(field, raw);
+        none += 0.0f * quad->h[i];
+    }
     return terrimpi_finite(none) ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
 
@@ -2755,15 +2761,15 @@ static int terrimpi_quad_side(float u, float v)
 static float terrimpi_quad_height(const terrimpi_quad *quad, int side, float u, float v)
 {
     if (side)
-        return quad->h00 * (1.0f - v) + quad->h01 * (v - u) + quad->h11 * u;
-    return quad->h00 * (1.0f - u) + quad->h10 * (u - v) + quad->h11 * v;
+        return quad->h[0] * (1.0f - v) + quad->h[2] * (v - u) + quad->h[3] * u;
+    return quad->h[0] * (1.0f - u) + quad->h[1] * (u - v) + quad->h[3] * v;
 }
 
 /* Height gained per world unit along x and along z. */
 static void terrimpi_quad_slope(const terrimpi_quad *quad, int side, float slope[2])
 {
-    float along_x = side ? quad->h11 - quad->h01 : quad->h10 - quad->h00;
-    float along_z = side ? quad->h01 - quad->h00 : quad->h11 - quad->h10;
+    float along_x = side ? quad->h[3] - quad->h[2] : quad->h[1] - quad->h[0];
+    float along_z = side ? quad->h[2] - quad->h[0] : quad->h[3] - quad->h[1];
     slope[0] = along_x / (quad->x1 - quad->x0);
     slope[1] = along_z / (quad->z1 - quad->z0);
 }
@@ -2947,10 +2953,9 @@ static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
                              float *t)
 {
     float off_a = a->v - a->u, off_b = b->v - b->u, s;
-    float low = terrimpi_min(terrimpi_min(quad->h00, quad->h10),
-                             terrimpi_min(quad->h01, quad->h11));
-    float high = terrimpi_max(terrimpi_max(quad->h00, quad->h10),
-                              terrimpi_max(quad->h01, quad->h11));
+    const float *h = quad->h;
+    float low = terrimpi_min(terrimpi_min(h[0], h[1]), terrimpi_min(h[2], h[3]));
+    float high = terrimpi_max(terrimpi_max(h[0], h[1]), terrimpi_max(h[2], h[3]));
     terrimpi_ray_point cut;
 
     if (terrimpi_min(a->y, b->y) > high || terrimpi_max(a->y, b->y) < low)
@@ -2968,12 +2973,6 @@ static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
     *side = !*side;
     return terrimpi_ray_meets(ray, quad, *side, &cut, b, t);
 }
-
-/* The quads along a ray: the present one, and where the ray enters it. */
-typedef struct terrimpi_ray_place {
-    uint32_t x, z;
-    terrimpi_ray_point enter;
-} terrimpi_ray_place;
 
 /* Where the ray crosses the quad's border along one axis, counted from its start. */
 static float terrimpi_ray_leave(float start, float way, float low, float high)
@@ -3012,47 +3011,38 @@ static void terrimpi_ray_report(const terrimpi_ray *ray, const terrimpi_quad *qu
 /* Walks from quad to quad until one is hit. Each turn takes a step along x or z and never back, so
    there are at most width + depth turns. */
 static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const terrimpi_ray *ray,
-                                        terrimpi_ray_place place, terrimp_ray_hit *hit)
+                                        uint32_t x, uint32_t z, terrimp_ray_hit *hit)
 {
     terrimpi_quad quad;
-    terrimp_result loaded = terrimpi_quad_load(field, place.x, place.z, &quad);
+    terrimp_result loaded = terrimpi_quad_load(field, x, z, &quad);
+    terrimpi_ray_point enter = terrimpi_ray_at(ray, &quad, 0.0f);
 
-    place.enter = terrimpi_ray_at(ray, &quad, 0.0f);
     for (;;) {
         float leave_x = terrimpi_ray_leave(ray->start[0], ray->way[0], quad.x0, quad.x1);
         float leave_z = terrimpi_ray_leave(ray->start[2], ray->way[2], quad.z0, quad.z1);
         float next = terrimpi_min(leave_x, leave_z), t;
         int along_x = leave_x <= leave_z, ends = !(next < ray->length), side;
+        float way = along_x ? ray->way[0] : ray->way[2];
         terrimpi_ray_point leave =
-            terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, place.enter.t, ray->length));
+            terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, enter.t, ray->length));
+        float *across = along_x ? &leave.u : &leave.v;
 
-        /* The border is crossed at exactly 0 or 1, whatever the rounding. */
-        if (!ends && along_x)
-            leave.u = ray->way[0] > 0.0f ? 1.0f : 0.0f;
-        if (!ends && !along_x)
-            leave.v = ray->way[2] > 0.0f ? 1.0f : 0.0f;
-        if (loaded == TERRIMP_OK &&
-            terrimpi_ray_quad(ray, &quad, &place.enter, &leave, &side, &t)) {
+        if (!ends) /* the border is crossed at exactly 0 or 1, whatever the rounding */
+            *across = way > 0.0f ? 1.0f : 0.0f;
+        if (loaded == TERRIMP_OK && terrimpi_ray_quad(ray, &quad, &enter, &leave, &side, &t)) {
             if (hit != NULL) {
                 terrimpi_ray_report(ray, &quad, side, t, hit);
-                hit->x = place.x;
-                hit->z = place.z;
+                hit->x = x;
+                hit->z = z;
             }
             return TERRIMP_OK;
         }
-        if (ends)
+        if (ends || !terrimpi_ray_step(along_x ? &x : &z,
+                                       (along_x ? field->width : field->depth) - 2u, way))
             return TERRIMP_E_MISS;
-        if (along_x) {
-            if (!terrimpi_ray_step(&place.x, field->width - 2u, ray->way[0]))
-                return TERRIMP_E_MISS;
-            leave.u = 1.0f - leave.u;
-        } else {
-            if (!terrimpi_ray_step(&place.z, field->depth - 2u, ray->way[2]))
-                return TERRIMP_E_MISS;
-            leave.v = 1.0f - leave.v;
-        }
-        place.enter = leave;
-        loaded = terrimpi_quad_load(field, place.x, place.z, &quad);
+        *across = 1.0f - *across;
+        enter = leave;
+        loaded = terrimpi_quad_load(field, x, z, &quad);
     }
 }
 
@@ -3063,7 +3053,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 {
     terrimp_heightfield f;
     terrimpi_ray ray;
-    terrimpi_ray_place place;
+    uint32_t x, z;
     terrimp_result result = terrimp_heightfield_resolve(field, &f);
 
     if (result != TERRIMP_OK)
@@ -3076,10 +3066,10 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
     if (!(max_distance > 0.0f) || !terrimpi_ray_aim(direction, ray.way))
         return TERRIMP_E_RANGE;
     if (!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
-        !terrimpi_locate(f.origin_x, f.spacing_x, f.width, ray.start[0], &place.x) ||
-        !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, ray.start[2], &place.z))
+        !terrimpi_locate(f.origin_x, f.spacing_x, f.width, ray.start[0], &x) ||
+        !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, ray.start[2], &z))
         return TERRIMP_E_MISS;
-    return terrimpi_ray_walk(&f, &ray, place, hit);
+    return terrimpi_ray_walk(&f, &ray, x, z, hit);
 }
 
 /* ==== Camera ============================================================= >>impl-camera */
@@ -3775,15 +3765,10 @@ static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, in
 
 #define TERRIMPI_MIP_SWEEPS 4u
 
-/* Size of a level's lattice without what is off it at the far edges. */
+/* Columns of a level's lattice without what is off it at the far edges. */
 static uint32_t terrimpi_mip_cols(const terrimp_geomip *t, uint32_t level)
 {
     return ((t->field.width - 1u) >> level) + 1u;
-}
-
-static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
-{
-    return ((t->field.depth - 1u) >> level) + 1u;
 }
 
 /* Height of a level's lattice at sample (x, z), which belongs to that lattice. */
@@ -3828,6 +3813,12 @@ static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32
 }
 
 #ifndef TERRIMP_NO_BUILD
+
+/* The rows, likewise. */
+static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
+{
+    return ((t->field.depth - 1u) >> level) + 1u;
+}
 
 /* Loads of level 1, where rows are the samples two rows above to two below; in units of a twelfth
    of a small triangle's area, as all loads. */
@@ -4097,15 +4088,11 @@ static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_
 {
     terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, 0, p.x, p.z)];
     uint32_t quads = t->chunk_quads;
-    terrimpi_scan scan;
-    terrimp_result result;
-    scan.skip_voids = 0;
-    result = terrimpi_scan_tile(&t->field, p.x * quads, p.z * quads, quads + 1u, quads + 1u, 1,
-                                &scan);
+    terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
+    terrimp_result result =
+        terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high);
     if (result != TERRIMP_OK)
         return result;
-    node->low = terrimpi_world_height(&t->field, scan.low);
-    node->high = terrimpi_world_height(&t->field, scan.high);
     node->error = node->rms = 0.0f;
     if (t->fits)
         terrimpi_mip_drawn_range(t, p, node);
@@ -4869,22 +4856,19 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
 /* Writes the triangles of a wall along a loop of n vertices, whose rim is the vertices from
-   `rim` on. */
+   `rim` on. Facing outwards with the rim below, or inwards with the rim above. */
 static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwards)
 {
     uint32_t i;
-    for (i = 0; i < n; i++, t += 6) {
+    for (i = 0; i < n; i++) {
         uint16_t p = (uint16_t)i, q = (uint16_t)((i + 1) % n);
-        uint16_t p_rim = (uint16_t)(rim + p);
-        uint16_t q_rim = (uint16_t)(rim + q);
-        /* outwards, rim below: seen from outside the loop runs from left to right; inwards, rim
-           above: seen from inside it runs from right to left. The same order serves both. */
-        t[0] = inwards ? q : p;
-        t[1] = inwards ? p : p_rim;
-        t[2] = inwards ? p_rim : q_rim;
-        t[3] = inwards ? q : p;
-        t[4] = inwards ? p_rim : q_rim;
-        t[5] = inwards ? q_rim : q;
+        uint16_t p_rim = (uint16_t)(rim + p), q_rim = (uint16_t)(rim + q);
+        *t++ = inwards ? q : p;
+        *t++ = inwards ? p : p_rim;
+        *t++ = inwards ? p_rim : q_rim;
+        *t++ = inwards ? q : p;
+        *t++ = inwards ? p_rim : q_rim;
+        *t++ = inwards ? q_rim : q;
     }
 }
 
@@ -5049,6 +5033,27 @@ static terrimpi_walk terrimpi_walk_edge(int32_t x0, int32_t z0, int32_t x1, int3
         w.slope = (run < 0 ? run - (z1 - z0) + 1 : run) / (z1 - z0); /* rounds down */
     }
     return w;
+}
+
+/* Columns [left, right) of each row of [low, high) that belong to a triangle. */
+typedef struct terrimpi_span {
+    int32_t low, high;
+    int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
+} terrimpi_span;
+
+static void terrimpi_find_span(const terrimp_mesh_vertex corner[3], terrimpi_span *span)
+{
+    int32_t k;
+    span->low = span->high = corner[0].z;
+    for (k = 0; k < 3; k++) {
+        const terrimp_mesh_vertex *p = corner + k, *q = corner + (k + 1) % 3;
+        int16_t *side = p->z < q->z ? span->left : span->right;
+        terrimpi_walk w = terrimpi_walk_edge(p->x, p->z, q->x, q->z);
+        span->low = w.z < span->low ? w.z : span->low;
+        span->high = w.end > span->high ? w.end : span->high;
+        for (; w.z < w.end; w.z++, w.at += w.slope)
+            side[w.z] = (int16_t)(w.at >> 20);
+    }
 }
 
 /* Sums over the samples left of the edge between (x, z) and vertex b. */
@@ -5227,19 +5232,19 @@ static void terrimpi_forget(terrimpi_simplifier *s, const terrimpi_ring *ring)
         s->square[ring->spoke[i] >> 2] = -1.0f;
 }
 
-/* Squared error round v as a function of its height. */
+/* Squared error round v as a function of its height, and what it is made of, by triangle. */
 static terrimpi_parabola terrimpi_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                             const terrimpi_ring *ring, int32_t ref)
+                                             const terrimpi_ring *ring, int32_t ref,
+                                             terrimpi_local part[TERRIMPI_MAX_DEGREE])
 {
     terrimpi_parabola p = {0.0f, 0.0f, 0.0f};
     int32_t i;
     for (i = 0; i < ring->count; i++) {
         int32_t j = terrimpi_ring_next(ring, i);
         terrimpi_sums sums;
-        terrimpi_local l;
         terrimpi_sum_triangle(s, ring->spoke[i], &sums);
-        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, &l);
-        terrimpi_add_triangle(&l, &p);
+        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, part + i);
+        terrimpi_add_triangle(part + i, &p);
     }
     return p;
 }
@@ -5248,10 +5253,11 @@ static terrimpi_parabola terrimpi_ring_error(const terrimpi_simplifier *s, int32
 static void terrimpi_fit_height(terrimpi_simplifier *s, int32_t v)
 {
     int32_t ref = terrimpi_round(s->height[v]);
+    terrimpi_local part[TERRIMPI_MAX_DEGREE];
     terrimpi_parabola p;
     terrimpi_ring ring;
     terrimpi_find_ring(s, v, &ring);
-    p = terrimpi_ring_error(s, v, &ring, ref);
+    p = terrimpi_ring_error(s, v, &ring, ref, part);
     if (p.a > 0.0f)
         s->height[v] = (float)ref + p.b / p.a;
     terrimpi_forget(s, &ring);
@@ -5319,33 +5325,24 @@ static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring
                           float *dz)
 {
     int32_t ref = terrimpi_round(s->height[v]), i;
-    terrimpi_parabola p = {0.0f, 0.0f, 0.0f}, part[TERRIMPI_MAX_DEGREE];
-    terrimpi_local l[TERRIMPI_MAX_DEGREE];
+    terrimpi_local part[TERRIMPI_MAX_DEGREE];
+    terrimpi_parabola p = terrimpi_ring_error(s, v, ring, ref, part);
     float xx = 0.0f, xz = 0.0f, zz = 0.0f, xh = 0.0f, zh = 0.0f, rx = 0.0f, rz = 0.0f, d, det;
-    for (i = 0; i < ring->count; i++) {
-        int32_t j = terrimpi_ring_next(ring, i);
-        terrimpi_sums sums;
-        terrimpi_sum_triangle(s, ring->spoke[i], &sums);
-        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, l + i);
-        part[i].a = part[i].b = part[i].c = 0.0f;
-        terrimpi_add_triangle(l + i, part + i);
-        p.a += part[i].a;
-        p.b += part[i].b;
-        p.c += part[i].c;
-    }
     if (!(p.a > 0.0f))
         return -1.0f;
     d = p.b / p.a;
     s->height[v] = (float)ref + d;
     terrimpi_forget(s, ring);
     for (i = 0; i < ring->count; i++) {
-        float gx = l[i].gx + d * l[i].wx, gz = l[i].gz + d * l[i].wz;
-        float residual = part[i].b - d * part[i].a;
-        xx += part[i].a * gx * gx;
-        xz += part[i].a * gx * gz;
-        zz += part[i].a * gz * gz;
-        xh += part[i].a * gx;
-        zh += part[i].a * gz;
+        float gx = part[i].gx + d * part[i].wx, gz = part[i].gz + d * part[i].wz, residual;
+        terrimpi_parabola own = {0.0f, 0.0f, 0.0f};
+        terrimpi_add_triangle(part + i, &own);
+        residual = own.b - d * own.a;
+        xx += own.a * gx * gx;
+        xz += own.a * gx * gz;
+        zz += own.a * gz * gz;
+        xh += own.a * gx;
+        zh += own.a * gz;
         rx -= residual * gx;
         rz -= residual * gz;
     }
@@ -5402,17 +5399,18 @@ static void terrimpi_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32
     }
 }
 
-/* Would the two triangles beside half-edge e still face up with the other diagonal? */
-static int terrimpi_can_flip(const terrimpi_simplifier *s, int32_t e)
+/* Finds the corners a, b, c, d of the triangles abc and bad beside half-edge e = ab. Returns
+   whether adc and bcd, which have the other diagonal, would face up. */
+static int terrimpi_can_flip(const terrimpi_simplifier *s, int32_t e, int32_t v[4])
 {
-    int32_t f = s->twin[e], a, b, c, d;
+    int32_t f = s->twin[e];
     if (f < 0)
         return 0;
-    a = s->origin[e];
-    b = s->origin[f];
-    c = s->origin[terrimpi_prev(e)];
-    d = s->origin[terrimpi_prev(f)];
-    return terrimpi_faces_up(s, a, d, c) && terrimpi_faces_up(s, d, b, c);
+    v[0] = s->origin[e];
+    v[1] = s->origin[f];
+    v[2] = s->origin[terrimpi_prev(e)];
+    v[3] = s->origin[terrimpi_prev(f)];
+    return terrimpi_faces_up(s, v[0], v[3], v[2]) && terrimpi_faces_up(s, v[3], v[1], v[2]);
 }
 
 /* Triangles abc (half-edge e = ab) and bad become adc and bcd; `sums` are those of edge cd. */
@@ -5436,26 +5434,24 @@ static void terrimpi_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_sums
 /* Flips the edge of e if that lowers the squared error. */
 static void terrimpi_try_flip(terrimpi_simplifier *s, int32_t e)
 {
-    int32_t f = s->twin[e], a, b, c, d;
+    int32_t f = s->twin[e], v[4], az, bz, cz, dz;
     terrimpi_sums sums, fresh;
     float before, after;
     const terrimpi_sums *edge_sums = s->sums;
-    if (!terrimpi_can_flip(s, e))
+    if (!terrimpi_can_flip(s, e, v))
         return;
-    a = s->origin[e];
-    b = s->origin[f];
-    c = s->origin[terrimpi_prev(e)];
-    d = s->origin[terrimpi_prev(f)];
+    az = s->z[v[0]];
+    bz = s->z[v[1]];
+    cz = s->z[v[2]];
+    dz = s->z[v[3]];
     before = terrimpi_triangle_error(s, e) + terrimpi_triangle_error(s, f);
-    terrimpi_sum_edge(s, s->x[c], s->z[c], d, &fresh);
-    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_next(f)], s->z[d] - s->z[a], &fresh,
-                       s->z[c] - s->z[d], edge_sums + s->edge[terrimpi_prev(e)],
-                       s->z[a] - s->z[c], &sums);
-    after = terrimpi_square_error(s, &sums, a, d, c);
-    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_prev(f)], s->z[b] - s->z[d],
-                       edge_sums + s->edge[terrimpi_next(e)], s->z[c] - s->z[b], &fresh,
-                       s->z[d] - s->z[c], &sums);
-    after += terrimpi_square_error(s, &sums, d, b, c);
+    terrimpi_sum_edge(s, s->x[v[2]], cz, v[3], &fresh);
+    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_next(f)], dz - az, &fresh, cz - dz,
+                       edge_sums + s->edge[terrimpi_prev(e)], az - cz, &sums);
+    after = terrimpi_square_error(s, &sums, v[0], v[3], v[2]);
+    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_prev(f)], bz - dz,
+                       edge_sums + s->edge[terrimpi_next(e)], cz - bz, &fresh, dz - cz, &sums);
+    after += terrimpi_square_error(s, &sums, v[3], v[1], v[2]);
     if (after < TERRIMPI_GAIN * before)
         terrimpi_flip(s, e, &fresh);
 }
@@ -5631,11 +5627,11 @@ static int32_t terrimpi_force(terrimpi_simplifier *s)
             if (s->target[v] >= 0)
                 return v;
             do {
-                turned = terrimpi_can_flip(s, e);
+                int32_t corner[4];
+                turned = terrimpi_can_flip(s, e, corner);
                 if (turned) {
                     terrimpi_sums sums;
-                    int32_t c = s->origin[terrimpi_prev(e)];
-                    int32_t d = s->origin[terrimpi_prev(s->twin[e])];
+                    int32_t c = corner[2], d = corner[3];
                     terrimpi_sum_edge(s, s->x[c], s->z[c], d, &sums);
                     terrimpi_flip(s, e, &sums);
                     s->stale[c] = s->stale[d] = 1;
@@ -5689,58 +5685,39 @@ typedef struct terrimpi_spot {
     float score;
 } terrimpi_spot;
 
-static int terrimpi_is_corner(const terrimpi_simplifier *s, const int32_t v[3], int32_t x,
-                              int32_t z)
-{
-    return (s->x[v[0]] == x && s->z[v[0]] == z) || (s->x[v[1]] == x && s->z[v[1]] == z) ||
-           (s->x[v[2]] == x && s->z[v[2]] == z);
-}
-
-/* Whether a corner lies on a last column or row that is squeezed: then a sample within the triangle
-   on the grid may lie outside of the true one. */
-static int terrimpi_is_squeezed(const terrimpi_simplifier *s, const int32_t v[3])
-{
-    int k;
-    for (k = 0; s->squeeze && k < 3; k++)
-        if (s->x[v[k]] == s->cols - 1 || s->z[v[k]] == s->rows - 1)
-            return 1;
-    return 0;
-}
-
-/* Looks for the worst sample strictly inside the tile among those of e's triangle. */
+/* Looks for the worst sample strictly inside the tile among those of e's triangle. Not where a
+   corner lies on a last column or row that is squeezed: there a sample within the triangle on the
+   grid may lie outside of the true one. */
 static void terrimpi_scan_triangle(const terrimpi_simplifier *s, int32_t e, terrimpi_spot *best)
 {
-    int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
-    int32_t v[3], k, x, z, low = s->rows, high = 0, ox, oz;
+    const int32_t *corner = s->origin + e;
+    terrimp_mesh_vertex v[3];
+    terrimpi_span span;
+    int32_t k, x, z;
     float limit = best->score / s->square[e >> 2], h0, gx, gz;
     terrimpi_sums none;
     terrimpi_local l;
-    memset(&none, 0, sizeof none);
-    for (k = 0; k < 3; k++)
-        v[k] = s->origin[e + k];
-    if (terrimpi_is_squeezed(s, v))
-        return;
     for (k = 0; k < 3; k++) {
-        int32_t p = v[k], q = v[k == 2 ? 0 : k + 1];
-        int16_t *side = s->z[p] < s->z[q] ? left : right;
-        terrimpi_walk w = terrimpi_walk_edge(s->x[p], s->z[p], s->x[q], s->z[q]);
-        low = w.z < low ? w.z : low;
-        high = w.end > high ? w.end : high;
-        for (; w.z < w.end; w.z++, w.at += w.slope)
-            side[w.z] = (int16_t)(w.at >> 20);
+        v[k].x = (uint16_t)s->x[corner[k]];
+        v[k].z = (uint16_t)s->z[corner[k]];
+        if (s->squeeze && (v[k].x == s->cols - 1 || v[k].z == s->rows - 1))
+            return;
     }
-    ox = s->x[v[0]];
-    oz = s->z[v[0]];
-    terrimpi_localise(s, &none, v[0], v[1], v[2], 0, &l);
-    h0 = s->height[v[0]];
+    terrimpi_find_span(v, &span);
+    memset(&none, 0, sizeof none);
+    terrimpi_localise(s, &none, corner[0], corner[1], corner[2], 0, &l);
+    h0 = s->height[corner[0]];
     gx = l.gx + h0 * l.wx;
     gz = l.gz + h0 * l.wz;
-    for (z = low > 0 ? low : 1; z < high; z++) {
+    for (z = span.low > 0 ? span.low : 1; z < span.high; z++) {
         const terrimpi_row_sum *row = s->row_sums + z * s->cols;
-        float base = h0 + (float)(z - oz) * gz;
-        for (x = left[z] > 0 ? left[z] : 1; x < right[z]; x++) {
-            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - ox) * gx);
-            if (r * r > limit && !terrimpi_is_corner(s, v, x, z)) {
+        float base = h0 + (float)(z - v[0].z) * gz;
+        for (x = span.left[z] > 0 ? span.left[z] : 1; x < span.right[z]; x++) {
+            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - v[0].x) * gx);
+            for (k = 0; r * r > limit && k < 3; k++)
+                if (v[k].x == x && v[k].z == z)
+                    r = 0.0f; /* a corner */
+            if (r * r > limit) {
                 limit = r * r;
                 best->e = e;
                 best->x = x;
@@ -6119,35 +6096,15 @@ static void terrimpi_add_error(terrimpi_error *error, float difference)
     error->squares += difference * difference;
 }
 
-/* Columns [left, right) of each row that belong to a triangle of a mesh, and its plane. */
-typedef struct terrimpi_span {
-    int32_t low, high; /* rows [low, high) */
-    float gx, gz;
-    int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
-} terrimpi_span;
-
-static void terrimpi_find_span(const terrimp_mesh_vertex *a, const terrimp_mesh_vertex *b,
-                               const terrimp_mesh_vertex *c, terrimpi_span *span)
+/* The slopes of the plane through three vertices. */
+static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
 {
-    const terrimp_mesh_vertex *corner[4];
-    int32_t bx = b->x - a->x, bz = b->z - a->z, cx = c->x - a->x, cz = c->z - a->z, k;
+    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
+    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
     float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = b->height - a->height, hc = c->height - a->height;
-    span->gx = ((float)bz * hc - (float)cz * hb) * inverse;
-    span->gz = ((float)cx * hb - (float)bx * hc) * inverse;
-    span->low = span->high = a->z;
-    corner[0] = corner[3] = a;
-    corner[1] = b;
-    corner[2] = c;
-    for (k = 0; k < 3; k++) {
-        const terrimp_mesh_vertex *p = corner[k], *q = corner[k + 1];
-        int16_t *side = p->z < q->z ? span->left : span->right;
-        terrimpi_walk w = terrimpi_walk_edge(p->x, p->z, q->x, q->z);
-        span->low = w.z < span->low ? w.z : span->low;
-        span->high = w.end > span->high ? w.end : span->high;
-        for (; w.z < w.end; w.z++, w.at += w.slope)
-            side[w.z] = (int16_t)(w.at >> 20);
-    }
+    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
+    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
 }
 
 /* Errors of the samples of a border between two points of its polyline, without the last one. */
@@ -6166,19 +6123,22 @@ static void terrimpi_measure(const float *heights, int32_t cols, int32_t rows, t
 {
     const terrimp_mesh_vertex *v = mesh->vertices;
     terrimpi_error all = {0.0f, 0.0f, 0.0f};
-    float squares = 0.0f;
-    uint32_t i;
+    float squares = 0.0f, gx, gz;
+    uint32_t i, k;
     int32_t x, z;
     for (i = 0; i < mesh->surface_index_count; i += 3) {
-        const terrimp_mesh_vertex *a = v + mesh->indices[i];
+        terrimp_mesh_vertex a[3];
         terrimpi_span span;
-        terrimpi_find_span(a, v + mesh->indices[i + 1], v + mesh->indices[i + 2], &span);
+        for (k = 0; k < 3u; k++)
+            a[k] = v[mesh->indices[i + k]];
+        terrimpi_find_span(a, &span);
+        terrimpi_find_plane(a, &gx, &gz);
         all.squares = 0.0f; /* summed by triangle, as small sums round less */
         for (z = span.low; z < span.high; z++) {
             const float *row = heights + z * cols;
-            float base = a->height + (float)(z - a->z) * span.gz;
+            float base = a->height + (float)(z - a->z) * gz;
             for (x = span.left[z]; x < span.right[z]; x++)
-                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * span.gx));
+                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * gx));
         }
         squares += all.squares;
     }
@@ -6347,53 +6307,36 @@ static terrimpi_plan terrimpi_make_plan(uint32_t cols, uint32_t rows, uint32_t b
     return plan;
 }
 
-static size_t terrimpi_take(size_t *bytes, size_t count, size_t size)
+/* Lays the arrays out at `base`, or only counts their bytes when that is null. Every count is at
+   most a few times 65537, so nothing can overflow. */
+static size_t terrimpi_lay_out(terrimpi_simplifier *s, const terrimpi_plan *plan, void *base)
 {
-    size_t at = *bytes;
-    *bytes += (count * size + 7) & ~(size_t)7;
-    return at;
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t vertices = plan->lattice + plan->border, samples = (size_t)plan->cols * plan->rows;
+    size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_MAX_DEGREE;
+    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
+    s->sums = (terrimpi_sums *)terrimpi_take(&b, edges, sizeof *s->sums);
+    s->spare = (terrimpi_sums *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
+    s->row_sums = (terrimpi_row_sum *)terrimpi_take(&b, samples, sizeof *s->row_sums);
+    s->x = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->x);
+    s->z = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->z);
+    s->height = (float *)terrimpi_take(&b, vertices, sizeof *s->height);
+    s->out_edge = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->out_edge);
+    s->cost = (float *)terrimpi_take(&b, vertices, sizeof *s->cost);
+    s->target = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->target);
+    s->stale = (uint8_t *)terrimpi_take(&b, vertices, sizeof *s->stale);
+    s->origin = (int32_t *)terrimpi_take(&b, 4 * triangles, sizeof *s->origin);
+    s->twin = (int32_t *)terrimpi_take(&b, 4 * triangles, sizeof *s->twin);
+    s->edge = (int32_t *)terrimpi_take(&b, 4 * triangles, sizeof *s->edge);
+    s->square = (float *)terrimpi_take(&b, triangles, sizeof *s->square);
+    return b.bytes;
 }
 
-/* Lays the arrays out in `block`, or only counts their bytes when that is null. Every count is at
-   most a few times 65537, so nothing can overflow. */
-static size_t terrimpi_lay_out(terrimpi_simplifier *s, const terrimpi_plan *plan, void *block)
+static int terrimpi_all_finite(const float *values, uint32_t count)
 {
-    size_t vertices = plan->lattice + plan->border, bytes = 0;
-    size_t triangles = 2 * plan->lattice + plan->border;
-    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
-    size_t sums = terrimpi_take(&bytes, edges, sizeof *s->sums);
-    size_t spare = terrimpi_take(&bytes, TERRIMPI_MAX_DEGREE * TERRIMPI_MAX_DEGREE,
-                                 sizeof *s->spare);
-    size_t row_sums = terrimpi_take(&bytes, (size_t)plan->cols * plan->rows, sizeof *s->row_sums);
-    size_t x = terrimpi_take(&bytes, vertices, sizeof *s->x);
-    size_t z = terrimpi_take(&bytes, vertices, sizeof *s->z);
-    size_t height = terrimpi_take(&bytes, vertices, sizeof *s->height);
-    size_t out_edge = terrimpi_take(&bytes, vertices, sizeof *s->out_edge);
-    size_t cost = terrimpi_take(&bytes, vertices, sizeof *s->cost);
-    size_t target = terrimpi_take(&bytes, vertices, sizeof *s->target);
-    size_t stale = terrimpi_take(&bytes, vertices, sizeof *s->stale);
-    size_t origin = terrimpi_take(&bytes, 4 * triangles, sizeof *s->origin);
-    size_t twin = terrimpi_take(&bytes, 4 * triangles, sizeof *s->twin);
-    size_t edge = terrimpi_take(&bytes, 4 * triangles, sizeof *s->edge);
-    size_t square = terrimpi_take(&bytes, triangles, sizeof *s->square);
-    if (block) {
-        char *base = (char *)block;
-        s->sums = (terrimpi_sums *)(void *)(base + sums);
-        s->spare = (terrimpi_sums *)(void *)(base + spare);
-        s->row_sums = (terrimpi_row_sum *)(void *)(base + row_sums);
-        s->x = (int32_t *)(void *)(base + x);
-        s->z = (int32_t *)(void *)(base + z);
-        s->height = (float *)(void *)(base + height);
-        s->out_edge = (int32_t *)(void *)(base + out_edge);
-        s->cost = (float *)(void *)(base + cost);
-        s->target = (int32_t *)(void *)(base + target);
-        s->stale = (uint8_t *)(base + stale);
-        s->origin = (int32_t *)(void *)(base + origin);
-        s->twin = (int32_t *)(void *)(base + twin);
-        s->edge = (int32_t *)(void *)(base + edge);
-        s->square = (float *)(void *)(base + square);
-    }
-    return bytes;
+    while (count > 0 && terrimpi_finite(values[count - 1]))
+        count--;
+    return count == 0;
 }
 
 static int terrimpi_tile_size_ok(uint32_t cols, uint32_t rows)
@@ -6404,13 +6347,14 @@ static int terrimpi_tile_size_ok(uint32_t cols, uint32_t rows)
 TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
                                                   uint32_t triangle_budget)
 {
+    terrimpi_simplifier s;
     terrimpi_plan plan;
     if (!terrimpi_tile_size_ok(cols, rows) || triangle_budget == 1 ||
         triangle_budget > TERRIMP_MAX_TRIANGLES)
         return 0;
     plan = terrimpi_make_plan(cols, rows, triangle_budget, 4);
     plan.border = plan.budget + 2; /* whatever border comes, the arrays are large enough */
-    return terrimpi_lay_out(0, &plan, 0);
+    return terrimpi_lay_out(&s, &plan, NULL);
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
@@ -6446,15 +6390,6 @@ static terrimp_result terrimpi_check_border(const terrimp_border *border, uint32
     return TERRIMP_OK;
 }
 
-/* Do two borders have the same height in the corner they share? */
-static int terrimpi_corner_agrees(const terrimp_border *along_x, const terrimp_border *along_z,
-                                  int x_end, int z_end)
-{
-    const terrimp_border_point *p = along_x->points + (x_end ? along_x->point_count - 1 : 0);
-    const terrimp_border_point *q = along_z->points + (z_end ? along_z->point_count - 1 : 0);
-    return p->height <= q->height && p->height >= q->height;
-}
-
 static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
 {
     const terrimp_border *b = desc->borders;
@@ -6470,15 +6405,16 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
         if (r != TERRIMP_OK)
             return r;
     }
-    if (!terrimpi_corner_agrees(b + TERRIMP_BORDER_Z0, b + TERRIMP_BORDER_X0, 0, 0) ||
-        !terrimpi_corner_agrees(b + TERRIMP_BORDER_Z0, b + TERRIMP_BORDER_X1, 1, 0) ||
-        !terrimpi_corner_agrees(b + TERRIMP_BORDER_Z1, b + TERRIMP_BORDER_X0, 0, 1) ||
-        !terrimpi_corner_agrees(b + TERRIMP_BORDER_Z1, b + TERRIMP_BORDER_X1, 1, 1))
-        return TERRIMP_E_RANGE;
-    for (i = 0; i < desc->cols * desc->rows; i++)
-        if (!terrimpi_finite(desc->heights[i]))
-            return TERRIMP_E_NOT_FINITE;
-    return TERRIMP_OK;
+    for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
+        uint32_t x_end = i & 1u, z_end = i >> 1;
+        const terrimp_border *p = b + (z_end ? TERRIMP_BORDER_Z1 : TERRIMP_BORDER_Z0);
+        const terrimp_border *q = b + (x_end ? TERRIMP_BORDER_X1 : TERRIMP_BORDER_X0);
+        if (p->points[x_end ? p->point_count - 1 : 0].height !=
+            q->points[z_end ? q->point_count - 1 : 0].height)
+            return TERRIMP_E_RANGE;
+    }
+    return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
+                                                                       : TERRIMP_E_NOT_FINITE;
 }
 
 static terrimp_result terrimpi_check_mesh_arrays(const terrimp_mesh *mesh,
@@ -6583,18 +6519,6 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-TERRIMP_API terrimp_result terrimp_skirt_counts(uint32_t border_vertex_count,
-                                                uint32_t *vertex_count, uint32_t *index_count)
-{
-    if (!vertex_count || !index_count)
-        return TERRIMP_E_NULL;
-    if (border_vertex_count < 4 || border_vertex_count > TERRIMP_MAX_TRIANGLES + 2)
-        return TERRIMP_E_RANGE;
-    *vertex_count = border_vertex_count;
-    *index_count = 6 * border_vertex_count;
-    return TERRIMP_OK;
-}
-
 static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
 {
     if (!mesh || !mesh->vertices || !mesh->indices)
@@ -6608,59 +6532,40 @@ static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
     return TERRIMP_OK;
 }
 
-/* Appends a wall along the loop. Its free rim is a loop of new vertices, which are in place. */
-static void terrimpi_add_wall(terrimp_mesh *mesh, int inwards)
-{
-    uint32_t n = mesh->border_vertex_count;
-    terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, inwards);
-    mesh->vertex_count += n;
-    mesh->index_count += 6 * n;
-}
-
-static terrimp_result terrimpi_check_wall(const terrimp_mesh *mesh)
+/* Appends a wall along the loop: down to a height, or up by a rise. */
+static terrimp_result terrimpi_add_skirt(terrimp_mesh *mesh, float value, int upper)
 {
     terrimp_result result = terrimpi_check_surface(mesh);
-    if (result == TERRIMP_OK &&
-        (mesh->vertex_capacity - mesh->vertex_count < mesh->border_vertex_count ||
-         mesh->index_capacity - mesh->index_count < 6 * mesh->border_vertex_count))
-        result = TERRIMP_E_CAPACITY;
-    return result;
+    uint32_t i, n;
+    if (result != TERRIMP_OK)
+        return result;
+    n = mesh->border_vertex_count;
+    if (mesh->vertex_capacity - mesh->vertex_count < n ||
+        mesh->index_capacity - mesh->index_count < 6 * n)
+        return TERRIMP_E_CAPACITY;
+    if (!terrimpi_finite(value))
+        return TERRIMP_E_NOT_FINITE;
+    if (upper && value < 0.0f)
+        return TERRIMP_E_RANGE;
+    for (i = 0; i < n; i++) {
+        terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
+        *rim = mesh->vertices[i];
+        rim->height = upper ? rim->height + value : terrimpi_min(rim->height, value);
+    }
+    terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
+    mesh->vertex_count += n;
+    mesh->index_count += 6 * n;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height)
 {
-    terrimp_result result = terrimpi_check_wall(mesh);
-    uint32_t i;
-    if (result == TERRIMP_OK && !terrimpi_finite(height))
-        result = TERRIMP_E_NOT_FINITE;
-    if (result != TERRIMP_OK)
-        return result;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
-        *rim = mesh->vertices[i];
-        rim->height = terrimpi_min(rim->height, height);
-    }
-    terrimpi_add_wall(mesh, 0);
-    return TERRIMP_OK;
+    return terrimpi_add_skirt(mesh, height, 0);
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise)
 {
-    terrimp_result result = terrimpi_check_wall(mesh);
-    uint32_t i;
-    if (result == TERRIMP_OK && !terrimpi_finite(rise))
-        result = TERRIMP_E_NOT_FINITE;
-    if (result == TERRIMP_OK && rise < 0.0f)
-        result = TERRIMP_E_RANGE;
-    if (result != TERRIMP_OK)
-        return result;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
-        *rim = mesh->vertices[i];
-        rim->height += rise;
-    }
-    terrimpi_add_wall(mesh, 1);
-    return TERRIMP_OK;
+    return terrimpi_add_skirt(mesh, rise, 1);
 }
 
 /* --- standing proud (Hess 6.1) --- */
@@ -6692,37 +6597,43 @@ typedef struct terrimpi_rise {
     float change[TERRIMP_MAX_TILE_DIM];
 } terrimpi_rise;
 
-/* Goes once over the samples between points i and i + 1 of a border. Raising: change becomes the
-   raise that each end must have at least. Lowering: change becomes what each end may lose. */
-static void terrimpi_rise_segment(const float *samples, int32_t stride, float h0, float h1,
-                                  int32_t count, terrimpi_rise *rise, uint32_t i, int lowering)
+/* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
+   rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
+static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
+                                 float over, int lowering)
 {
-    int free0 = i > 0, free1 = i + 2 < rise->count;
-    int32_t k;
-    for (k = 0; k <= count; k++) {
-        float w1 = (float)k / (float)count, w0 = 1.0f - w1, surface, hold;
-        float *c0 = rise->change + i, *c1 = c0 + 1;
-        surface = w0 * (h0 + rise->raise[i]) + w1 * (h1 + rise->raise[i + 1]);
-        if (lowering) {
-            float slack = terrimpi_max(0.0f, surface - samples[k * stride]);
-            if (w0 > 0.0f)
-                *c0 = terrimpi_min(*c0, slack / (2.0f * w0));
-            if (w1 > 0.0f)
-                *c1 = terrimpi_min(*c1, slack / (2.0f * w1));
-        } else {
-            float short_of = samples[k * stride];
-            hold = (free0 ? w0 : 0.0f) + (free1 ? w1 : 0.0f);
-            surface = terrimpi_wanted_raise(short_of - surface, short_of - (w0 * h0 + w1 * h1),
-                                            hold);
-            if (free0 && w0 > 0.0f)
-                *c0 = terrimpi_max(*c0, surface);
-            if (free1 && w1 > 0.0f)
-                *c1 = terrimpi_max(*c1, surface);
-        }
+    int k;
+    for (k = 0; k < n; k++) {
+        if (!(w[k] > 1e-6f))
+            continue;
+        if (lowering)
+            *change[k] = terrimpi_min(*change[k], terrimpi_max(0.0f, over) / ((float)n * w[k]));
+        else
+            *change[k] = terrimpi_max(*change[k], wanted);
     }
 }
 
-/* Raises the inner points of one border: `raise` of both ends is given. */
+/* Goes once over the samples between points i and i + 1 of a border. */
+static void terrimpi_rise_segment(const float *samples, int32_t stride, float h0, float h1,
+                                  int32_t count, terrimpi_rise *rise, uint32_t i, int lowering)
+{
+    float *change[2], w[2];
+    int32_t k;
+    change[0] = rise->change + i;
+    change[1] = change[0] + 1;
+    for (k = 0; k <= count; k++) {
+        float sample = samples[k * stride], surface, wanted;
+        w[1] = (float)k / (float)count;
+        w[0] = 1.0f - w[1];
+        surface = w[0] * (h0 + rise->raise[i]) + w[1] * (h1 + rise->raise[i + 1]);
+        wanted = terrimpi_wanted_raise(
+            sample - surface, sample - (w[0] * h0 + w[1] * h1),
+            (i > 0 ? w[0] : 0.0f) + (i + 2 < rise->count ? w[1] : 0.0f));
+        terrimpi_rise_sample(w, change, 2, wanted, surface - sample, lowering);
+    }
+}
+
+/* Raises the inner points of one border. */
 static void terrimpi_raise_border(const float *samples, int32_t stride, int along_x,
                                   const terrimp_mesh_vertex *vertices, terrimpi_rise *rise)
 {
@@ -6765,8 +6676,6 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
             rise.vertex[i] = (uint16_t)((backwards ? last - i : first + i) % n);
             rise.raise[i] = 0.0f;
         }
-        rise.raise[0] = desc->corner_raise[backwards ? (side + 1) & 3 : side];
-        rise.raise[rise.count - 1] = desc->corner_raise[backwards ? side : side + 1];
         terrimpi_raise_border(desc->heights + offset, along_x ? 1 : cols, along_x, v, &rise);
         for (i = 0; i < rise.count; i++)
             raise[rise.vertex[i]] = rise.raise[i];
@@ -6774,59 +6683,41 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
     }
 }
 
-/* Passes one sample of a triangle, short_by above the raised surface, to the three corners, which
-   have the weights w in it. */
-static void terrimpi_rise_sample(const uint16_t *t, const float w[3], float hold, float short_by,
-                                 const float *raise, float *change, int lowering)
-{
-    float raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-    float wanted = terrimpi_wanted_raise(short_by, short_by + raised, hold);
-    int k;
-    for (k = 0; k < 3; k++) {
-        float *c = change + t[k];
-        if (!(w[k] > 1e-6f))
-            continue;
-        if (lowering)
-            *c = terrimpi_min(*c, terrimpi_max(0.0f, -short_by) / (3.0f * w[k]));
-        else
-            *c = terrimpi_max(*c, wanted);
-    }
-}
-
-/* Goes once over the samples of a triangle, as terrimpi_rise_segment does over a segment. */
+/* Goes once over the samples of a triangle. */
 static void terrimpi_rise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
                                    const uint16_t *t, const float *raise, float *change,
                                    int lowering)
 {
     terrimp_mesh_vertex v[3];
     terrimpi_span span;
-    float slope_x[3], slope_z[3], free_share[3]; /* of the weights; 1 for an inner vertex */
+    float slope_x[3], slope_z[3], gx, gz, *to[3];
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
-        free_share[k] = t[k] >= mesh->border_vertex_count ? 1.0f : 0.0f;
+        to[k] = change + t[k];
         v[k] = mesh->vertices[t[k]];
         v[k].height = 0.0f;
     }
-    for (k = 0; k < 3; k++) {
+    for (k = 0; k < 3; k++) { /* slopes of the weights */
         v[k].height = 1.0f;
-        terrimpi_find_span(v, v + 1, v + 2, &span);
-        slope_x[k] = span.gx;
-        slope_z[k] = span.gz;
+        terrimpi_find_plane(v, &slope_x[k], &slope_z[k]);
         v[k].height = 0.0f;
     }
     for (k = 0; k < 3; k++)
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
-    terrimpi_find_span(v, v + 1, v + 2, &span);
+    terrimpi_find_span(v, &span);
+    terrimpi_find_plane(v, &gx, &gz);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
             float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f;
-            float surface = v[0].height + dx * span.gx + dz * span.gz;
+            float short_by = heights[z * cols + x] - (v[0].height + dx * gx + dz * gz), raised;
             for (k = 0; k < 3; k++) {
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
-                hold += w[k] * free_share[k];
+                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
             }
-            terrimpi_rise_sample(t, w, hold, heights[z * cols + x] - surface, raise, change,
-                                 lowering);
+            raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
+            terrimpi_rise_sample(w, to, 3,
+                                 terrimpi_wanted_raise(short_by, short_by + raised, hold),
+                                 -short_by, lowering);
         }
 }
 
@@ -6845,12 +6736,6 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
         return TERRIMP_E_NOT_FINITE;
     if (desc->amount < 0.0f || desc->amount > 1.0f)
         return TERRIMP_E_RANGE;
-    for (i = 0; i < 4; i++) {
-        if (!terrimpi_finite(desc->corner_raise[i]))
-            return TERRIMP_E_NOT_FINITE;
-        if (desc->corner_raise[i] < 0.0f)
-            return TERRIMP_E_RANGE;
-    }
     if (mesh->vertex_count != mesh->surface_vertex_count)
         return TERRIMP_E_STATE;
     for (i = 0; i < mesh->surface_vertex_count; i++)
@@ -6859,10 +6744,8 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
     for (i = 0; i < mesh->surface_index_count; i++)
         if (mesh->indices[i] >= mesh->surface_vertex_count)
             return TERRIMP_E_RANGE;
-    for (i = 0; i < desc->cols * desc->rows; i++)
-        if (!terrimpi_finite(desc->heights[i]))
-            return TERRIMP_E_NOT_FINITE;
-    return TERRIMP_OK;
+    return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
+                                                                       : TERRIMP_E_NOT_FINITE;
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
@@ -6894,35 +6777,6 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     for (i = 0; i < n; i++)
         mesh->vertices[i].height += desc->amount * work[i];
     terrimpi_measure(desc->heights, (int32_t)desc->cols, (int32_t)desc->rows, mesh);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uint32_t count,
-                                                       const terrimp_border *border,
-                                                       float end_raise[2])
-{
-    terrimp_result result;
-    float raise[2] = {0.0f, 0.0f};
-    uint32_t i, end, k;
-    if (!heights || !border || !end_raise)
-        return TERRIMP_E_NULL;
-    if (count < 2 || count > TERRIMP_MAX_TILE_DIM)
-        return TERRIMP_E_RANGE;
-    result = terrimpi_check_border(border, count);
-    if (result != TERRIMP_OK)
-        return result;
-    for (i = 0; i < count; i++)
-        if (!terrimpi_finite(heights[i]))
-            return TERRIMP_E_NOT_FINITE;
-    for (end = 0; end < 2; end++) {
-        const terrimp_border_point *p = border->points + (end ? border->point_count - 2 : 0);
-        float slope = (p[1].height - p[0].height) / (float)(p[1].at - p[0].at);
-        for (k = p[0].at; k <= p[1].at; k++)
-            raise[end] = terrimpi_max(raise[end],
-                                      heights[k] - (p[0].height + slope * (float)(k - p[0].at)));
-    }
-    end_raise[0] = raise[0];
-    end_raise[1] = raise[1];
     return TERRIMP_OK;
 }
 
@@ -7535,16 +7389,6 @@ static int terrimpi_rect_contains(const terrimp_rect *outer, const terrimp_rect 
            inner->y + inner->height <= outer->y + outer->height;
 }
 
-static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
-{
-    terrimp_rect rect;
-    rect.x = x;
-    rect.y = y;
-    rect.width = width;
-    rect.height = height;
-    return rect;
-}
-
 /* The part of a rectangle to the left of, to the right of, below or above what overlaps it; of
    width or height 0 when there is none. */
 static terrimp_rect terrimpi_rect_beside(const terrimp_rect *rect, const terrimp_rect *taken,
@@ -8086,7 +7930,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *at
    What is built stands in four arrays with a fixed share for each node and without any pointer:
    so nodes can be built in any order, and the arrays can lie in read-only memory (room Bake). */
 
-#define TERRIMPI_ALIGN 8u           /* of blocks: pointers, and the simplifier's 64-bit sums */
 #define TERRIMPI_DIRECTIONS 8u      /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u    /* along a side of the floor at most: 2048 triangles in all */
 #define TERRIMPI_HEIGHT_STEPS 65535 /* of the heights of meshes */
@@ -8168,15 +8011,6 @@ static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
     return t->tree.level_x[t->floor_level] * t->tree.level_z[t->floor_level] * 6u;
 }
 
-/* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
-static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
-{
-    size_t at = *offset;
-    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
-    *offset = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
-    return at;
-}
-
 /* Inner points that a border keeps: those of 64 quads are the simplifier's default, and a budget
    that is larger or smaller moves them along, since a mesh's triangles go with the square. */
 static uint32_t terrimpi_border_points(uint32_t budget)
@@ -8214,20 +8048,16 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
    on overflow. */
 static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 {
-    size_t at = 0, nodes, meshes, points, corners, count;
-    int ok = terrimpi_terrain_count(t);
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t count;
+    b.ok = terrimpi_terrain_count(t);
     count = t->tree.node_count;
-    nodes = terrimpi_place(&at, count, sizeof *t->tree.nodes, &ok);
-    meshes = terrimpi_place(&at, count, sizeof *t->meshes, &ok);
-    points = terrimpi_place(&at, count, t->vertex_limit * sizeof *t->points, &ok);
-    corners = terrimpi_place(&at, count, t->index_limit, &ok);
-    if (base && ok) {
-        t->tree.nodes = (terrimp_geomip_node *)(void *)(base + nodes);
-        t->meshes = (terrimpi_mesh *)(void *)(base + meshes);
-        t->points = (terrimpi_point *)(void *)(base + points);
-        t->corners = base + corners;
-    }
-    return ok ? at : 0;
+    t->tree.nodes = (terrimp_geomip_node *)terrimpi_take(&b, count, sizeof *t->tree.nodes);
+    t->meshes = (terrimpi_mesh *)terrimpi_take(&b, count, sizeof *t->meshes);
+    t->points =
+        (terrimpi_point *)terrimpi_take(&b, count, t->vertex_limit * sizeof *t->points);
+    t->corners = (uint8_t *)terrimpi_take(&b, count, t->index_limit);
+    return b.ok ? b.bytes : 0;
 }
 
 static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
@@ -8300,7 +8130,7 @@ typedef struct terrimpi_facet {
 /* Scratch of one node. */
 typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
-    float *row;             /* samples of one row or column of the node */
+    float *row;             /* samples of one row or column of the node; scratch of its errors */
     float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
@@ -8311,34 +8141,28 @@ typedef struct terrimpi_build {
     size_t rest_bytes;
 } terrimpi_build;
 
-static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, unsigned char *base,
+static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base,
                                     terrimpi_build *build)
 {
-    size_t at = 0, tile, row, heights, work, vertices, indices, facets, rest, longest;
-    uint32_t side = desc->chunk_quads + 1u;
-    int ok = 1;
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t side = desc->chunk_quads + 1u, vertices, longest;
     terrimp_mesh_capacity(desc->triangle_budget, &build->vertex_capacity, &build->index_capacity);
-    build->rest_bytes = terrimp_simplify_scratch_bytes(side, side, desc->triangle_budget);
+    build->rest_bytes =
+        terrimp_simplify_scratch_bytes((uint32_t)side, (uint32_t)side, desc->triangle_budget);
+    vertices = build->vertex_capacity;
     longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
-    tile = terrimpi_place(&at, (size_t)side * side, sizeof *build->tile, &ok);
-    row = terrimpi_place(&at, longest, sizeof *build->row, &ok); /* also for the geomip errors */
-    heights = terrimpi_place(&at, build->vertex_capacity, sizeof *build->heights, &ok);
-    work = terrimpi_place(&at, 2u * (size_t)build->vertex_capacity, sizeof *build->work, &ok);
-    vertices = terrimpi_place(&at, build->vertex_capacity, sizeof *build->vertices, &ok);
-    indices = terrimpi_place(&at, build->index_capacity, sizeof *build->indices, &ok);
-    facets = terrimpi_place(&at, desc->triangle_budget, sizeof *build->facets, &ok);
-    rest = terrimpi_place(&at, build->rest_bytes, 1, &ok);
-    if (base) {
-        build->tile = (float *)(void *)(base + tile);
-        build->row = (float *)(void *)(base + row);
-        build->heights = (float *)(void *)(base + heights);
-        build->work = (float *)(void *)(base + work);
-        build->vertices = (terrimp_mesh_vertex *)(void *)(base + vertices);
-        build->indices = (uint16_t *)(void *)(base + indices);
-        build->facets = (terrimpi_facet *)(void *)(base + facets);
-        build->rest = base + rest;
-    }
-    return ok ? at : 0;
+    build->tile = (float *)terrimpi_take(&b, side * side, sizeof *build->tile);
+    build->row = (float *)terrimpi_take(&b, longest, sizeof *build->row);
+    build->heights = (float *)terrimpi_take(&b, vertices, sizeof *build->heights);
+    build->work = (float *)terrimpi_take(&b, 2u * vertices, sizeof *build->work);
+    build->vertices =
+        (terrimp_mesh_vertex *)terrimpi_take(&b, vertices, sizeof *build->vertices);
+    build->indices =
+        (uint16_t *)terrimpi_take(&b, build->index_capacity, sizeof *build->indices);
+    build->facets =
+        (terrimpi_facet *)terrimpi_take(&b, desc->triangle_budget, sizeof *build->facets);
+    build->rest = terrimpi_take(&b, build->rest_bytes, 1);
+    return b.ok ? b.bytes : 0;
 }
 
 /* The sample of a node that column or row k of its tile stands on. */
@@ -8664,7 +8488,6 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
     terrimp_result result;
     uint32_t i;
     terrimpi_fill_misses(t, p, counts, mesh, build);
-    memset(&raise, 0, sizeof raise); /* corners stay on their samples: four nodes agree on that */
     raise.heights = build->tile;
     raise.cols = p->cols;
     raise.rows = p->rows;
@@ -8844,14 +8667,10 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
     high = terrain->desc.height_high;
     if (low == 0.0f && high == 0.0f) {
         const terrimp_heightfield *f = &terrain->desc.field;
-        terrimpi_scan scan;
-        terrimp_result result;
-        scan.skip_voids = 0;
-        result = terrimpi_scan_tile(f, 0, 0, f->width, f->depth, 1, &scan);
+        terrimp_result result =
+            terrimpi_height_range(f, terrimpi_rect(0, 0, f->width, f->depth), 0, &low, &high);
         if (result != TERRIMP_OK)
             return result;
-        low = terrimpi_world_height(f, scan.low);
-        high = terrimpi_world_height(f, scan.high);
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
     step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
@@ -8880,7 +8699,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
         return result;
     if (!terrain->begun)
         return TERRIMP_E_STATE;
-    terrimpi_build_layout(&terrain->desc, (unsigned char *)scratch, &build);
+    terrimpi_build_layout(&terrain->desc, scratch, &build);
     result = terrimp_geomip_build_node(&terrain->tree, node, build.row);
     if (result != TERRIMP_OK)
         return result;
@@ -9088,10 +8907,9 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    size_t bytes)
 {
     terrimp_result result = terrimpi_check_touched(terrain, samples);
-    const terrimp_heightfield *f;
     terrimpi_build build;
-    terrimpi_scan scan;
     uint32_t level, x, z;
+    float low, high;
     if (result == TERRIMP_OK && terrain->baked)
         result = TERRIMP_E_STATE;
     if (result == TERRIMP_OK)
@@ -9099,16 +8917,10 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                       terrimpi_build_layout(&terrain->desc, NULL, &build));
     if (result != TERRIMP_OK)
         return result;
-    f = &terrain->desc.field;
-    scan.skip_voids = 0;
-    result = terrimpi_scan_tile(f, samples->x, samples->y,
-                                terrimpi_min_u32(samples->width, f->width - samples->x),
-                                terrimpi_min_u32(samples->height, f->depth - samples->y), 1,
-                                &scan);
+    result = terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high);
     if (result != TERRIMP_OK)
         return result;
-    if (terrimpi_world_height(f, scan.low) < terrain->sample_low ||
-        terrimpi_world_height(f, scan.high) > terrain->sample_high)
+    if (low < terrain->sample_low || high > terrain->sample_high)
         return TERRIMP_E_RANGE;
     for (level = 0; level < terrain->tree.level_count; level++) {
         /* errors are also against what a finer neighbour draws next to the border */
