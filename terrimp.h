@@ -3481,42 +3481,25 @@ static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
     return (int)(w->pattern >> side & 1u);
 }
 
-/* The vertex of the coarse border on `side` that is `along` quads from its beginning, itself if it
-   is not one of those. */
-static uint16_t terrimpi_mip_border_index(const terrimpi_mip_writer *w, int side, uint32_t along,
-                                          uint32_t self)
-{
-    uint32_t border = terrimpi_mip_border_vertices(w->quads);
-    if (w->form != TERRIMP_FORM_FITTED || along == 0 || along == w->quads)
-        return (uint16_t)self;
-    along = along / 2u - 1u;
-    return (uint16_t)((w->quads + 1u) * (w->quads + 1u) + (uint32_t)side * border + along);
-}
-
 /* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
    towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
-   edge. */
+   edge. In fitted patterns coarse sides have vertices of their own between their ends. */
 static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
 {
-    uint32_t row = w->quads + 1u;
-    if (w->form == TERRIMP_FORM_STITCHED)
-        return (uint16_t)(j * row + i);
-    if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        i += i & 1u;
-    if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        i -= i & 1u;
-    if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        j += j & 1u;
-    if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        j -= j & 1u;
-    if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_Z0, i, j * row + i);
-    if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_Z1, i, j * row + i);
-    if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_X0, j, j * row + i);
-    if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_X1, j, j * row + i);
+    uint32_t row = w->quads + 1u, border = terrimpi_mip_border_vertices(w->quads);
+    uint32_t own = row * row; /* the first of the side's own vertices */
+    int side;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++, own += border) {
+        int along_x = side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1, last = side & 1;
+        uint32_t *along = along_x ? &i : &j;
+        if (w->form == TERRIMP_FORM_STITCHED || !terrimpi_mip_coarse(w, side) ||
+            (along_x ? j : i) != (last ? w->quads : 0u))
+            continue;
+        if (*along & 1u)
+            *along = last ? *along - 1u : *along + 1u;
+        if (w->form == TERRIMP_FORM_FITTED && *along != 0 && *along != w->quads)
+            return (uint16_t)(own + *along / 2u - 1u);
+    }
     return (uint16_t)(j * row + i);
 }
 
@@ -3684,6 +3667,13 @@ static terrimpi_mip_place terrimpi_mip_place_of(const terrimp_geomip *t, uint32_
     return p;
 }
 
+/* The parent of a node that is not the root. */
+static uint32_t terrimpi_mip_parent(const terrimp_geomip *t, uint32_t node)
+{
+    terrimpi_mip_place p = terrimpi_mip_place_of(t, node);
+    return terrimpi_mip_number(t, p.level + 1u, p.x / 2u, p.z / 2u);
+}
+
 /* Column and row of lattice position (i, j) of a level. */
 static uint32_t terrimpi_mip_col(const terrimp_geomip *t, uint32_t level, uint32_t i)
 {
@@ -3697,21 +3687,27 @@ static uint32_t terrimpi_mip_row(const terrimp_geomip *t, uint32_t level, uint32
     return j > (last >> level) ? last : j << level;
 }
 
+/* World x and z of lattice position (i, j) of a level. */
+static float terrimpi_mip_x(const terrimp_geomip *t, uint32_t level, uint32_t i)
+{
+    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_mip_col(t, level, i));
+}
+
+static float terrimpi_mip_z(const terrimp_geomip *t, uint32_t level, uint32_t j)
+{
+    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_mip_row(t, level, j));
+}
+
 static void terrimpi_mip_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
 {
     const terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, p.level, p.x, p.z)];
-    const terrimp_heightfield *f = &t->field;
-    uint32_t quads = t->chunk_quads;
-    box->min[0] = terrimpi_line(f->origin_x, f->spacing_x,
-                                terrimpi_mip_col(t, p.level, p.x * quads));
-    box->max[0] = terrimpi_line(f->origin_x, f->spacing_x,
-                                terrimpi_mip_col(t, p.level, (p.x + 1u) * quads));
+    uint32_t i = p.x * t->chunk_quads, j = p.z * t->chunk_quads;
+    box->min[0] = terrimpi_mip_x(t, p.level, i);
+    box->max[0] = terrimpi_mip_x(t, p.level, i + t->chunk_quads);
     box->min[1] = node->low;
     box->max[1] = node->high;
-    box->min[2] = terrimpi_line(f->origin_z, f->spacing_z,
-                                terrimpi_mip_row(t, p.level, p.z * quads));
-    box->max[2] = terrimpi_line(f->origin_z, f->spacing_z,
-                                terrimpi_mip_row(t, p.level, (p.z + 1u) * quads));
+    box->min[2] = terrimpi_mip_z(t, p.level, j);
+    box->max[2] = terrimpi_mip_z(t, p.level, j + t->chunk_quads);
 }
 
 /* The box within which a node's error holds: half a quad larger all round, for what finer
@@ -4131,20 +4127,16 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
 
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree)
 {
-    uint32_t level, x, z;
+    uint32_t i;
     if (!tree || !tree->nodes)
         return TERRIMP_E_NULL;
-    for (level = 1; level < tree->level_count; level++)
-        for (z = 0; z < tree->level_z[level - 1u]; z++)
-            for (x = 0; x < tree->level_x[level - 1u]; x++) {
-                const terrimp_geomip_node *child =
-                    &tree->nodes[terrimpi_mip_number(tree, level - 1u, x, z)];
-                terrimp_geomip_node *node =
-                    &tree->nodes[terrimpi_mip_number(tree, level, x / 2u, z / 2u)];
-                node->low = terrimpi_min(node->low, child->low);
-                node->high = terrimpi_max(node->high, child->high);
-                node->error = terrimpi_max(node->error, child->error);
-            }
+    for (i = 0; i + 1u < tree->node_count; i++) {
+        const terrimp_geomip_node *child = &tree->nodes[i];
+        terrimp_geomip_node *node = &tree->nodes[terrimpi_mip_parent(tree, i)];
+        node->low = terrimpi_min(node->low, child->low);
+        node->high = terrimpi_max(node->high, child->high);
+        node->error = terrimpi_max(node->error, child->error);
+    }
     return TERRIMP_OK;
 }
 
@@ -4188,25 +4180,6 @@ static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
 }
 
-static void terrimpi_mip_distances(const terrimp_geomip *t, int rule, float tolerance_px,
-                                   float morph_ratio, float pixel_factor, float *distances)
-{
-    uint32_t level, x, z;
-    for (level = 0; level < t->level_count; level++) {
-        for (x = t->level_first[level]; x < t->level_first[level + 1u]; x++)
-            distances[x] = terrimpi_mip_distance(t, level, x, rule, tolerance_px, pixel_factor);
-        if (level == 0)
-            continue;
-        for (z = 0; z < t->level_z[level - 1u]; z++)
-            for (x = 0; x < t->level_x[level - 1u]; x++) {
-                float least = distances[terrimpi_mip_number(t, level - 1u, x, z)];
-                float *d = &distances[terrimpi_mip_number(t, level, x / 2u, z / 2u)];
-                least = terrimpi_min(least * morph_ratio * morph_ratio, TERRIMPI_MIP_MOST);
-                *d = terrimpi_max(*d, least);
-            }
-    }
-}
-
 /* Checks the settings that selection and distances share. */
 static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
                                          float morph_ratio)
@@ -4226,6 +4199,7 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
                                                     float pixel_factor, float *distances)
 {
     terrimp_result result = terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio);
+    uint32_t level, node;
     if (result != TERRIMP_OK)
         return result;
     if (!distances)
@@ -4234,7 +4208,15 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
         return TERRIMP_E_NOT_FINITE;
     if (!(pixel_factor > 0.0f))
         return TERRIMP_E_RANGE;
-    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
+    for (level = 0; level < tree->level_count; level++)
+        for (node = tree->level_first[level]; node < tree->level_first[level + 1u]; node++)
+            distances[node] =
+                terrimpi_mip_distance(tree, level, node, rule, tolerance_px, pixel_factor);
+    for (node = 0; node + 1u < tree->node_count; node++) {
+        float least = distances[node] * morph_ratio * morph_ratio;
+        float *d = &distances[terrimpi_mip_parent(tree, node)];
+        *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
+    }
     return TERRIMP_OK;
 }
 
@@ -4390,6 +4372,35 @@ typedef struct terrimpi_mip_visit {
     int mask;
 } terrimpi_mip_visit;
 
+/* Enough for a walk that goes down one child and keeps the other three. */
+#define TERRIMPI_MIP_STACK (3u * TERRIMP_GEOMIP_LEVELS + 1u)
+
+/* Begins a walk at the root; returns the depth of the stack. */
+static uint32_t terrimpi_mip_push_root(const terrimp_geomip *t, terrimpi_mip_visit *stack, int mask)
+{
+    stack->place.level = t->level_count - 1u;
+    stack->place.x = stack->place.z = 0;
+    stack->mask = mask;
+    return 1;
+}
+
+/* Pushes the children of a node, `first` (bit 0: x, bit 1: z) last, so that it is visited first. */
+static uint32_t terrimpi_mip_push_children(const terrimp_geomip *t, terrimpi_mip_visit v,
+                                           uint32_t first, terrimpi_mip_visit *stack,
+                                           uint32_t depth)
+{
+    terrimpi_mip_place p = v.place;
+    uint32_t i;
+    v.place.level--;
+    for (i = 4u; i-- > 0;) {
+        v.place.x = p.x * 2u + ((first ^ i) & 1u);
+        v.place.z = p.z * 2u + ((first ^ i) >> 1);
+        if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
+            stack[depth++] = v;
+    }
+    return depth;
+}
+
 /* Marks the nodes whose own error asks for a split, and those that are close to it. Measures never
    grow towards the leaves, so what lies below an unsplit node asks for nothing. What is out of view
    asks for nothing either, unless nodes morph: then a border would jump when one of its nodes
@@ -4397,13 +4408,10 @@ typedef struct terrimpi_mip_visit {
 static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[3u * TERRIMP_GEOMIP_LEVELS + 1u];
-    uint32_t depth = 1, i;
+    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
     float stay = 1.0f + f->view->hysteresis;
     float worth = 1.0f / (f->view->morph_ratio * f->view->morph_ratio);
-    stack[0].place.level = t->level_count - 1u;
-    stack[0].place.x = stack[0].place.z = 0;
-    stack[0].mask = worth < 1.0f ? 0 : TERRIMP_PLANES_ALL;
+    uint32_t depth = terrimpi_mip_push_root(t, stack, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
     while (depth > 0) {
         terrimpi_mip_visit v = stack[--depth];
         terrimpi_mip_place p = v.place;
@@ -4415,15 +4423,8 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
         if (measure < worth)
             continue;
         terrimpi_mip_raise(f, p.level, node, measure);
-        if (measure < 1.0f || p.level == 1u)
-            continue;
-        v.place.level--;
-        for (i = 0; i < 4u; i++) {
-            v.place.x = p.x * 2u + (i & 1u);
-            v.place.z = p.z * 2u + (i >> 1);
-            if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
-                stack[depth++] = v;
-        }
+        if (measure >= 1.0f && p.level > 1u)
+            depth = terrimpi_mip_push_children(t, v, 0, stack, depth);
     }
 }
 
@@ -4440,10 +4441,7 @@ static void terrimpi_mip_balance(terrimpi_mip_frame *f)
     int side;
     for (level = 1; level + 1u < t->level_count; level++)
         for (node = f->first[level]; node != t->node_count; node = f->view->marks[node].next) {
-            terrimpi_mip_place p, beyond;
-            p.level = level;
-            p.x = (node - t->level_first[level]) % t->level_x[level];
-            p.z = (node - t->level_first[level]) / t->level_x[level];
+            terrimpi_mip_place p = terrimpi_mip_place_of(t, node), beyond;
             for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
                 if (terrimpi_mip_beyond(t, p, side, &beyond))
                     terrimpi_mip_raise(f, level + 1u,
@@ -4520,48 +4518,30 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
 static void terrimpi_mip_collect(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1, i;
+    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
+    uint32_t depth = terrimpi_mip_push_root(t, stack, TERRIMP_PLANES_ALL);
     f->view->draws_needed = f->view->triangle_count = 0;
-    stack[0].place.level = t->level_count - 1u;
-    stack[0].place.x = stack[0].place.z = 0;
-    stack[0].mask = TERRIMP_PLANES_ALL;
     while (depth > 0) {
-        terrimpi_mip_place p;
+        terrimpi_mip_visit v = stack[--depth];
+        terrimpi_mip_place p = v.place;
         terrimp_box box;
-        uint32_t node, closest = 0;
-        top = stack[--depth];
-        p = top.place;
-        node = terrimpi_mip_number(t, p.level, p.x, p.z);
-        if (top.mask) {
+        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z), closest = 0;
+        if (v.mask) {
             terrimpi_mip_box(t, p, &box);
-            top.mask = terrimp_frustum_test(&f->frustum, &box, top.mask);
-            if (top.mask == TERRIMP_PLANES_OUTSIDE)
+            v.mask = terrimp_frustum_test(&f->frustum, &box, v.mask);
+            if (v.mask == TERRIMP_PLANES_OUTSIDE)
                 continue;
         }
         if (p.level == 0 || terrimpi_mip_marked(f, node) < 1.0f) {
             terrimpi_mip_emit(f, p, node);
             continue;
         }
-        p.level--;
-        p.x *= 2u;
-        p.z *= 2u;
-        if (f->eye[0] >= terrimpi_line(t->field.origin_x, t->field.spacing_x,
-                                       terrimpi_mip_col(t, p.level, (p.x + 1u) * t->chunk_quads)))
+        p.level--; /* the eye against where the first child ends */
+        if (f->eye[0] >= terrimpi_mip_x(t, p.level, (2u * p.x + 1u) * t->chunk_quads))
             closest |= 1u;
-        if (f->eye[2] >= terrimpi_line(t->field.origin_z, t->field.spacing_z,
-                                       terrimpi_mip_row(t, p.level, (p.z + 1u) * t->chunk_quads)))
+        if (f->eye[2] >= terrimpi_mip_z(t, p.level, (2u * p.z + 1u) * t->chunk_quads))
             closest |= 2u;
-        for (i = 4u; i-- > 0;) { /* the last one pushed is the first one visited */
-            terrimpi_mip_place child = p;
-            child.x += (closest ^ i) & 1u;
-            child.z += (closest ^ i) >> 1;
-            if (child.x >= t->level_x[p.level] || child.z >= t->level_z[p.level])
-                continue;
-            stack[depth].place = child;
-            stack[depth].mask = top.mask;
-            depth++;
-        }
+        depth = terrimpi_mip_push_children(t, v, closest, stack, depth);
     }
 }
 
@@ -4578,8 +4558,8 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
-    terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
-                           v->distances);
+    terrimp_geomip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
+                             v->distances);
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
@@ -4752,43 +4732,30 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tr
     return TERRIMP_OK;
 }
 
-/* With fits every vertex moves to the parent's shape, without them only odd ones do. */
-static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t i, uint32_t j,
-                                 terrimp_geomip_weights *w)
+/* The weights of vertex k, of the grid or of a coarse border. With fits every vertex moves to the
+   parent's shape, without them only odd ones do. */
+static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
 {
-    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED, corner;
-    uint8_t on[TERRIMP_SIDE_COUNT];
-    int side;
+    uint32_t row = quads + 1u, i = k % row, j = k / row, from[TERRIMP_SIDE_COUNT], side;
+    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED;
+    int corner = (i == 0 || i == quads) && (j == 0 || j == quads);
     memset(w, 0, sizeof *w);
-    on[TERRIMP_SIDE_Z0] = j == 0;
-    on[TERRIMP_SIDE_Z1] = j == quads;
-    on[TERRIMP_SIDE_X0] = i == 0;
-    on[TERRIMP_SIDE_X1] = i == quads;
-    corner = (j == 0 || j == quads) && (i == 0 || i == quads);
-    w->self = odd != 0 || fitted;
-    w->beside[TERRIMP_SIDE_Z0] = j == 1u;
-    w->beside[TERRIMP_SIDE_Z1] = j == quads - 1u;
-    w->beside[TERRIMP_SIDE_X0] = i == 1u;
-    w->beside[TERRIMP_SIDE_X1] = i == quads - 1u;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        if (!on[side])
-            continue;
-        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
-        w->beside[side] = odd != 0;
-        w->self = 0;
-    }
-}
-
-/* The weights of vertex k, of the grid or of a coarse border. */
-static void terrimpi_mip_weights_of(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
-{
-    uint32_t grid = (quads + 1u) * (quads + 1u);
-    if (k < grid) {
-        terrimpi_mip_weights(quads, form, k % (quads + 1u), k / (quads + 1u), w);
+    if (k >= row * row) {
+        w->even[(k - row * row) / terrimpi_mip_border_vertices(quads)] = 1;
         return;
     }
-    memset(w, 0, sizeof *w);
-    w->even[(k - grid) / terrimpi_mip_border_vertices(quads)] = 1;
+    from[TERRIMP_SIDE_Z0] = j;
+    from[TERRIMP_SIDE_Z1] = quads - j;
+    from[TERRIMP_SIDE_X0] = i;
+    from[TERRIMP_SIDE_X1] = quads - i;
+    w->self = odd || fitted;
+    for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
+        w->beside[side] = from[side] == 1u || (from[side] == 0 && odd);
+        if (from[side] > 0)
+            continue;
+        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
+        w->self = 0;
+    }
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
@@ -4800,7 +4767,7 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int
     if (count == 0)
         return TERRIMP_E_RANGE;
     for (k = 0; k < count; k++)
-        terrimpi_mip_weights_of(chunk_quads, form, k, &weights[k]);
+        terrimpi_mip_weights(chunk_quads, form, k, &weights[k]);
     return TERRIMP_OK;
 }
 
@@ -4824,7 +4791,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
         const float *coarse = draw->side_coarse;
         terrimp_geomip_weights w;
         float factor, along_z, along_x;
-        terrimpi_mip_weights_of(chunk_quads, form, k, &w);
+        terrimpi_mip_weights(chunk_quads, form, k, &w);
         factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
                  terrimpi_mip_dot4(w.even, coarse);
         along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
