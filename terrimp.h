@@ -1969,6 +1969,13 @@ static float terrimpi_dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+static void terrimpi_sub(const float a[3], const float b[3], float out[3])
+{
+    out[0] = a[0] - b[0];
+    out[1] = a[1] - b[1];
+    out[2] = a[2] - b[2];
+}
+
 static void terrimpi_cross(const float a[3], const float b[3], float out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
@@ -3098,42 +3105,6 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     return TERRIMP_OK;
 }
 
-/* Column-major view matrix of an eye and its orthonormal axes. */
-static void terrimpi_view_matrix(const float eye[3], const float right[3], const float up[3],
-                                 const float forward[3], float m[16])
-{
-    int i;
-    for (i = 0; i < 3; i++) {
-        m[i * 4 + 0] = right[i];
-        m[i * 4 + 1] = up[i];
-        m[i * 4 + 2] = -forward[i];
-        m[i * 4 + 3] = 0.0f;
-    }
-    m[12] = -terrimpi_dot(right, eye);
-    m[13] = -terrimpi_dot(up, eye);
-    m[14] = terrimpi_dot(forward, eye);
-    m[15] = 1.0f;
-}
-
-/* Column-major perspective matrix of a frustum whose sides are tangents. */
-static void terrimpi_projection_matrix(float left, float right, float down, float up, float z_near,
-                                       float z_far, int depth_zero_to_one, float m[16])
-{
-    memset(m, 0, 16 * sizeof m[0]);
-    m[0] = 2.0f / (right - left);
-    m[5] = 2.0f / (up - down);
-    m[8] = (right + left) / (right - left);
-    m[9] = (up + down) / (up - down);
-    m[11] = -1.0f;
-    if (depth_zero_to_one) {
-        m[10] = -z_far / (z_far - z_near);
-        m[14] = -z_far * z_near / (z_far - z_near);
-    } else {
-        m[10] = -(z_far + z_near) / (z_far - z_near);
-        m[14] = -2.0f * z_far * z_near / (z_far - z_near);
-    }
-}
-
 /* Half the height and width of a resolved camera's screen at distance 1. */
 static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x, float *tan_y)
 {
@@ -3141,23 +3112,36 @@ static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x,
     *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
 }
 
+/* The frustum of a camera, as that of a capture. */
+static terrimp_result terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
+{
+    terrimp_camera c;
+    terrimp_result result = terrimp_camera_resolve(camera, &c);
+    if (result != TERRIMP_OK)
+        return result;
+    memcpy(out->eye, c.eye, sizeof c.eye);
+    memcpy(out->up, c.up, sizeof c.up);
+    memcpy(out->forward, c.forward, sizeof c.forward);
+    terrimpi_cross(c.forward, c.up, out->right);
+    out->z_near = c.z_near;
+    out->z_far = c.z_far;
+    terrimpi_camera_tangents(&c, &out->tan_right, &out->tan_up);
+    out->tan_left = -out->tan_right;
+    out->tan_down = -out->tan_up;
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16])
 {
-    terrimp_camera c;
+    terrimp_capture c;
     terrimp_result result;
-    float right[3], tan_x, tan_y;
     if (!view || !projection)
         return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
+    result = terrimpi_camera_capture(camera, &c);
     if (result != TERRIMP_OK)
         return result;
-    terrimpi_cross(c.forward, c.up, right);
-    terrimpi_view_matrix(c.eye, right, c.up, c.forward, view);
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
-    terrimpi_projection_matrix(-tan_x, tan_x, -tan_y, tan_y, c.z_near, c.z_far,
-                               c.depth_zero_to_one, projection);
-    return TERRIMP_OK;
+    return terrimp_capture_matrices(&c, camera->depth_zero_to_one, view, projection);
 }
 
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
@@ -3178,28 +3162,24 @@ TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *cam
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum)
 {
-    terrimp_camera c;
+    terrimp_capture c;
     terrimp_result result;
-    float right[3], tan_x, tan_y;
     int i;
     if (!frustum)
         return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
+    result = terrimpi_camera_capture(camera, &c);
     if (result != TERRIMP_OK)
         return result;
-    terrimpi_cross(c.forward, c.up, right);
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
+    memset(frustum, 0, sizeof *frustum);
     for (i = 0; i < 3; i++) {
         frustum->eye[i] = c.eye[i];
-        frustum->plane[0][i] = right[i] + c.forward[i] * tan_x;
-        frustum->plane[1][i] = c.forward[i] * tan_x - right[i];
-        frustum->plane[2][i] = c.up[i] + c.forward[i] * tan_y;
-        frustum->plane[3][i] = c.forward[i] * tan_y - c.up[i];
+        frustum->plane[0][i] = c.right[i] - c.forward[i] * c.tan_left;
+        frustum->plane[1][i] = c.forward[i] * c.tan_right - c.right[i];
+        frustum->plane[2][i] = c.up[i] - c.forward[i] * c.tan_down;
+        frustum->plane[3][i] = c.forward[i] * c.tan_up - c.up[i];
         frustum->plane[4][i] = c.forward[i];
         frustum->plane[5][i] = -c.forward[i];
     }
-    for (i = 0; i < 4; i++)
-        frustum->plane[i][3] = 0.0f;
     frustum->plane[4][3] = -c.z_near;
     frustum->plane[5][3] = c.z_far;
     return TERRIMP_OK;
@@ -3267,13 +3247,47 @@ static terrimp_result terrimpi_check_box(const terrimp_box *box)
     return TERRIMP_OK;
 }
 
+/* Fits the sides and clip distances of a capture to points, with a hair's breadth more, so that
+   rounding leaves none outside and a flat box has a volume. Returns 0 when the cosine between
+   forward and the way to one of them is not above `least`. */
+static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t count, float least)
+{
+    float slope = 1.0f; /* of the steepest ray: its length over its depth */
+    uint32_t i;
+    c->z_near = c->tan_left = c->tan_down = TERRIMPI_FLOAT_MAX;
+    c->z_far = c->tan_right = c->tan_up = -TERRIMPI_FLOAT_MAX;
+    for (i = 0; i < count; i++) {
+        float p[3], length, z, x, y;
+        terrimpi_sub(xyz + 3u * i, c->eye, p);
+        z = terrimpi_dot(c->forward, p);
+        length = terrimpi_length(p);
+        if (!(z > least * length))
+            return 0;
+        slope = terrimpi_max(slope, length / z);
+        x = terrimpi_dot(c->right, p) / z;
+        y = terrimpi_dot(c->up, p) / z;
+        c->z_near = terrimpi_min(c->z_near, z);
+        c->z_far = terrimpi_max(c->z_far, z);
+        c->tan_left = terrimpi_min(c->tan_left, x);
+        c->tan_right = terrimpi_max(c->tan_right, x);
+        c->tan_down = terrimpi_min(c->tan_down, y);
+        c->tan_up = terrimpi_max(c->tan_up, y);
+    }
+    c->z_near *= 1.0f - 1e-6f * slope;
+    c->z_far *= 1.0f + 1e-6f * slope;
+    terrimpi_widen(&c->tan_left, &c->tan_right, slope);
+    terrimpi_widen(&c->tan_down, &c->tan_up, slope);
+    return 1;
+}
+
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
+    static const float origin[3] = {0.0f, 0.0f, 0.0f};
     terrimp_capture c;
     terrimp_result result;
-    float slope = 1.0f; /* of the steepest ray to a corner: its length over its depth */
+    float corners[8][3];
     int i;
     if (!box || !eye || !capture)
         return TERRIMP_E_NULL;
@@ -3292,31 +3306,11 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
         return TERRIMP_E_INSIDE;
     memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
     terrimpi_basis(c.forward, c.up, c.right);
-    c.z_near = c.z_far = 0.0f;
-    c.tan_left = c.tan_right = c.tan_down = c.tan_up = 0.0f;
-    for (i = 0; i < 8; i++) {
-        float p[3], length, z, x, y;
-        terrimpi_box_corner(box, i, eye, p);
-        z = terrimpi_dot(c.forward, p);
-        length = terrimpi_length(p);
-        /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-        if (!(z > 0.001f * length))
-            return TERRIMP_E_BEHIND;
-        slope = terrimpi_max(slope, length / z);
-        x = terrimpi_dot(c.right, p) / z;
-        y = terrimpi_dot(c.up, p) / z;
-        c.z_near = i ? terrimpi_min(c.z_near, z) : z;
-        c.z_far = i ? terrimpi_max(c.z_far, z) : z;
-        c.tan_left = i ? terrimpi_min(c.tan_left, x) : x;
-        c.tan_right = i ? terrimpi_max(c.tan_right, x) : x;
-        c.tan_down = i ? terrimpi_min(c.tan_down, y) : y;
-        c.tan_up = i ? terrimpi_max(c.tan_up, y) : y;
-    }
-    /* A hair's breadth, so that rounding leaves no corner outside and a flat box has a volume. */
-    c.z_near *= 1.0f - 1e-6f * slope;
-    c.z_far *= 1.0f + 1e-6f * slope;
-    terrimpi_widen(&c.tan_left, &c.tan_right, slope);
-    terrimpi_widen(&c.tan_down, &c.tan_up, slope);
+    for (i = 0; i < 8; i++)
+        terrimpi_box_corner(box, i, origin, corners[i]);
+    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
+    if (!terrimpi_fit_sides(&c, corners[0], 8, 0.001f))
+        return TERRIMP_E_BEHIND;
     *capture = c;
     return TERRIMP_OK;
 }
@@ -3324,35 +3318,17 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count)
 {
-    float low[2], high[2], slope = 1.0f; /* tangents; a ray's length over its depth */
-    uint32_t i, k;
+    terrimp_capture c;
     if (!capture || !xyz)
         return TERRIMP_E_NULL;
     if (count == 0)
         return TERRIMP_E_RANGE;
-    low[0] = low[1] = TERRIMPI_FLOAT_MAX;
-    high[0] = high[1] = -TERRIMPI_FLOAT_MAX;
-    for (i = 0; i < count; i++, xyz += 3) {
-        float p[3], depth, tangent[2];
-        for (k = 0; k < 3u; k++)
-            p[k] = xyz[k] - capture->eye[k];
-        depth = terrimpi_dot(p, capture->forward);
-        if (!(depth > 0.0f))
-            return TERRIMP_E_BEHIND;
-        tangent[0] = terrimpi_dot(p, capture->right) / depth;
-        tangent[1] = terrimpi_dot(p, capture->up) / depth;
-        slope = terrimpi_max(slope, terrimpi_length(p) / depth);
-        for (k = 0; k < 2u; k++) {
-            low[k] = terrimpi_min(low[k], tangent[k]);
-            high[k] = terrimpi_max(high[k], tangent[k]);
-        }
-    }
-    for (k = 0; k < 2u; k++)
-        terrimpi_widen(&low[k], &high[k], slope);
-    capture->tan_left = low[0];
-    capture->tan_right = high[0];
-    capture->tan_down = low[1];
-    capture->tan_up = high[1];
+    c = *capture;
+    if (!terrimpi_fit_sides(&c, xyz, count, 0.0f))
+        return TERRIMP_E_BEHIND;
+    c.z_near = capture->z_near;
+    c.z_far = capture->z_far;
+    *capture = c;
     return TERRIMP_OK;
 }
 
@@ -3360,12 +3336,32 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16])
 {
-    if (!capture || !view || !projection)
+    const terrimp_capture *c = capture;
+    float width, height, depth;
+    int i;
+    if (!c || !view || !projection)
         return TERRIMP_E_NULL;
-    terrimpi_view_matrix(capture->eye, capture->right, capture->up, capture->forward, view);
-    terrimpi_projection_matrix(capture->tan_left, capture->tan_right, capture->tan_down,
-                               capture->tan_up, capture->z_near, capture->z_far,
-                               depth_zero_to_one, projection);
+    for (i = 0; i < 3; i++) {
+        view[i * 4 + 0] = c->right[i];
+        view[i * 4 + 1] = c->up[i];
+        view[i * 4 + 2] = -c->forward[i];
+        view[i * 4 + 3] = 0.0f;
+    }
+    view[12] = -terrimpi_dot(c->right, c->eye);
+    view[13] = -terrimpi_dot(c->up, c->eye);
+    view[14] = terrimpi_dot(c->forward, c->eye);
+    view[15] = 1.0f;
+    width = c->tan_right - c->tan_left;
+    height = c->tan_up - c->tan_down;
+    depth = c->z_far - c->z_near;
+    memset(projection, 0, 16 * sizeof *projection);
+    projection[0] = 2.0f / width;
+    projection[5] = 2.0f / height;
+    projection[8] = (c->tan_right + c->tan_left) / width;
+    projection[9] = (c->tan_up + c->tan_down) / height;
+    projection[10] = -(depth_zero_to_one ? c->z_far : c->z_far + c->z_near) / depth;
+    projection[11] = -1.0f;
+    projection[14] = (depth_zero_to_one ? -c->z_far : -2.0f * c->z_far) * c->z_near / depth;
     return TERRIMP_OK;
 }
 
@@ -6850,16 +6846,25 @@ TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], c
     return TERRIMP_OK;
 }
 
+static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float captured_eye[3],
+                                          const float eye[3], const float *out)
+{
+    if (!box || !captured_eye || !eye || !out)
+        return TERRIMP_E_NULL;
+    return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
+                   terrimpi_finite3(captured_eye) && terrimpi_finite3(eye)
+               ? TERRIMP_OK
+               : TERRIMP_E_NOT_FINITE;
+}
+
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
                                               const float eye[3], float *angle_rad)
 {
     float worst = 0.0f; /* grows with the angle: its sine up to 60 degrees, then 2 - its cosine */
+    terrimp_result result = terrimpi_check_eyes(box, captured_eye, eye, angle_rad);
     int i;
-    if (!box || !captured_eye || !eye || !angle_rad)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-        !terrimpi_finite3(captured_eye) || !terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
+    if (result != TERRIMP_OK)
+        return result;
     for (i = 0; i < 8; i++) {
         float a[3], b[3], across[3], cosine;
         terrimpi_box_corner(box, i, captured_eye, a);
@@ -6915,17 +6920,14 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
                                                   float pixel_factor, float *error_px)
 {
     float move[3], move_length, distance, sine;
-    int i;
-    if (!box || !captured_eye || !eye || !error_px)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-        !terrimpi_finite3(captured_eye) || !terrimpi_finite3(eye) || !terrimpi_finite(error) ||
-        !terrimpi_finite(pixel_factor))
+    terrimp_result result = terrimpi_check_eyes(box, captured_eye, eye, error_px);
+    if (result != TERRIMP_OK)
+        return result;
+    if (!terrimpi_finite(error) || !terrimpi_finite(pixel_factor))
         return TERRIMP_E_NOT_FINITE;
     if (error < 0.0f || !(pixel_factor > 0.0f))
         return TERRIMP_E_RANGE;
-    for (i = 0; i < 3; i++)
-        move[i] = eye[i] - captured_eye[i];
+    terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
     *error_px = 0.0f;
     if (!(move_length > 0.0f) || !(error > 0.0f))
@@ -6985,17 +6987,14 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
     return TERRIMP_OK;
 }
 
-/* Where the way from the eye to a point, both relative to the eye, passes through a triangle: the
-   fraction of the way, or 1 when it does not. */
+/* Where the way `to` from the origin passes through a triangle: the fraction of the way, or 1 when
+   it does not. */
 static float terrimpi_hidden_at(const float to[3], const float a[3], const float b[3],
                                 const float c[3])
 {
     float ab[3], ac[3], p[3], q[3], det, u, v, t;
-    int i;
-    for (i = 0; i < 3; i++) {
-        ab[i] = b[i] - a[i];
-        ac[i] = c[i] - a[i];
-    }
+    terrimpi_sub(b, a, ab);
+    terrimpi_sub(c, a, ac);
     terrimpi_cross(to, ac, p);
     det = terrimpi_dot(ab, p);
     if (!(terrimpi_abs(det) > 0.0f))
@@ -7003,7 +7002,7 @@ static float terrimpi_hidden_at(const float to[3], const float a[3], const float
     u = -terrimpi_dot(a, p) / det;
     if (!(u >= 0.0f && u <= 1.0f))
         return 1.0f;
-    terrimpi_cross(a, ab, q); /* of the eye minus a, and ab, with the sign turned */
+    terrimpi_cross(a, ab, q); /* of the origin minus a, and ab, with the sign turned */
     v = -terrimpi_dot(to, q) / det;
     if (!(v >= 0.0f && u + v <= 1.0f))
         return 1.0f;
@@ -7016,18 +7015,25 @@ static float terrimpi_first_hit(const float eye[3], const float *xyz, uint32_t v
                                 const uint16_t *indices, uint32_t index_count)
 {
     float first = 1.0f, to[3], corner[3][3];
-    uint32_t i, k, axis;
-    for (axis = 0; axis < 3u; axis++)
-        to[axis] = xyz[vertex * 3u + axis] - eye[axis];
-    for (i = 0; i < index_count; i += 3u) {
-        if (indices[i] == vertex || indices[i + 1u] == vertex || indices[i + 2u] == vertex)
+    const uint16_t *t;
+    int k;
+    terrimpi_sub(xyz + vertex * 3u, eye, to);
+    for (t = indices; t < indices + index_count; t += 3) {
+        if (t[0] == vertex || t[1] == vertex || t[2] == vertex)
             continue;
-        for (k = 0; k < 3u; k++)
-            for (axis = 0; axis < 3u; axis++)
-                corner[k][axis] = xyz[indices[i + k] * 3u + axis] - eye[axis];
+        for (k = 0; k < 3; k++)
+            terrimpi_sub(xyz + t[k] * 3u, eye, corner[k]);
         first = terrimpi_min(first, terrimpi_hidden_at(to, corner[0], corner[1], corner[2]));
     }
     return first;
+}
+
+/* How far a vertex lies in front of the eye of a capture. */
+static float terrimpi_depth(const terrimp_capture *capture, const float xyz[3])
+{
+    float to[3];
+    terrimpi_sub(xyz, capture->eye, to);
+    return terrimpi_dot(to, capture->forward);
 }
 
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
@@ -7046,22 +7052,17 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
     first = TERRIMPI_FLOAT_MAX;
     last = 0.0f;
     for (i = 0; i < vertex_count; i++) {
-        float to[3], depth;
-        for (k = 0; k < 3u; k++)
-            to[k] = xyz[i * 3u + k] - capture->eye[k];
-        depth = terrimpi_dot(to, capture->forward);
+        float depth = terrimpi_depth(capture, xyz + i * 3u);
         first = terrimpi_min(first, depth);
         last = terrimpi_max(last, depth);
     }
     step = (last - first) / (float)(TERRIMPI_SPLITS + 1u);
     memset(saved, 0, sizeof saved);
     for (i = 0; i < vertex_count; i++) {
-        float hit = terrimpi_first_hit(capture->eye, xyz, i, indices, index_count), to[3], depth;
+        float hit = terrimpi_first_hit(capture->eye, xyz, i, indices, index_count);
+        float depth = terrimpi_depth(capture, xyz + i * 3u);
         if (hit > 0.98f) /* a neighbour that leans over it */
             continue;
-        for (k = 0; k < 3u; k++)
-            to[k] = xyz[i * 3u + k] - capture->eye[k];
-        depth = terrimpi_dot(to, capture->forward);
         all += (1.0f - hit) * (1.0f - hit);
         for (k = 0; k < TERRIMPI_SPLITS; k++) {
             float at = first + (float)(k + 1u) * step;
