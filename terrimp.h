@@ -1440,19 +1440,16 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity);
 
-/* Fills what the ground vertices of a node move by when they morph, and the weights of the grid
-   that say with which factor each moves, the same for every node: see terrimp_geomip_vertex and
-   terrimp_geomip_weights.
+/* Fills what the ground vertices of a node move by when they morph. With which factor each moves
+   say the weights that terrimp_geomip_fill_weights gives for chunk_quads and TERRIMP_FORM_LIST.
 
-   vertices, weights   [ground_vertex_count] out
-   Errors              E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   vertices   [ground_vertex_count] out
+   capacity   of vertices
+   Errors     E_NULL; E_RANGE; E_CAPACITY; E_STATE */
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
                                                       uint32_t node,
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity);
-TERRIMP_API terrimp_result terrimp_terrain_fill_weights(const terrimp_terrain *terrain,
-                                                        terrimp_geomip_weights *weights,
-                                                        size_t capacity);
 
 /* Fills the vertices and indices of one node's coarse mesh with its skirts, to stand at node *
    stride in the host's buffers. Indices count from its base vertex; what is over is 0.
@@ -3379,6 +3376,10 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
+/* Whether a side of a node, or a border of a tile, runs along x: Z0 and Z1 do. Of either pair the
+   odd one is the last row or column. */
+static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
+
 /* ---- patterns ---- */
 
 static int terrimpi_mip_quads_fit(uint32_t quads)
@@ -3486,7 +3487,7 @@ static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uin
     uint32_t own = row * row; /* the first of the side's own vertices */
     int side;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++, own += border) {
-        int along_x = side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1, last = side & 1;
+        int along_x = terrimpi_along_x(side), last = side & 1;
         uint32_t *along = along_x ? &i : &j;
         if (w->form == TERRIMP_FORM_STITCHED || !terrimpi_mip_coarse(w, side) ||
             (along_x ? j : i) != (last ? w->quads : 0u))
@@ -3733,10 +3734,8 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32
 static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, int side,
                                terrimpi_mip_place *beyond)
 {
-    if (side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1)
-        p.z += side == TERRIMP_SIDE_Z1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
-    else
-        p.x += side == TERRIMP_SIDE_X1 ? 1u : (uint32_t)-1;
+    uint32_t *across = terrimpi_along_x(side) ? &p.z : &p.x;
+    *across += side & 1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
     *beyond = p;
     return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
 }
@@ -4663,9 +4662,9 @@ static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_
 /* Place on the grid of the k-th vertex of a coarse border. */
 static void terrimpi_mip_border_vertex(uint32_t quads, int side, uint32_t k, uint32_t at[2])
 {
-    int along_z = side == TERRIMP_SIDE_X0 || side == TERRIMP_SIDE_X1;
-    at[along_z] = 2u * (k + 1u);
-    at[!along_z] = side == TERRIMP_SIDE_Z1 || side == TERRIMP_SIDE_X1 ? quads : 0;
+    int along_x = terrimpi_along_x(side);
+    at[!along_x] = 2u * (k + 1u);
+    at[along_x] = side & 1 ? quads : 0;
 }
 
 /* Writes one position, and moves on to the next. */
@@ -6363,8 +6362,8 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
         desc->triangle_budget > TERRIMP_MAX_TRIANGLES)
         return TERRIMP_E_RANGE;
     for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
-        int along_x = i == TERRIMP_BORDER_Z0 || i == TERRIMP_BORDER_Z1;
-        terrimp_result r = terrimpi_check_border(b + i, along_x ? desc->cols : desc->rows);
+        terrimp_result r = terrimpi_check_border(
+            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
         if (r != TERRIMP_OK)
             return r;
     }
@@ -8200,18 +8199,26 @@ static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x
         row[first + i] -= start + (float)i * slope;
 }
 
-/* Takes the surface away from the samples of a node's last row, of which the loop has the line. */
-static void terrimpi_take_last_row(const terrimpi_patch *p, const terrimp_mesh *mesh, float *row)
+/* Takes the surface away from the samples of one border, whose line the loop has. */
+static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
+                                 float *line)
 {
-    uint32_t i, n = mesh->border_vertex_count;
-    for (i = 0; i + 1u < n; i++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = a + 1;
-        uint32_t from, to;
-        if (a->z != p->rows - 1u || b->z != p->rows - 1u)
+    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
+    uint32_t i, n = mesh->border_vertex_count, span = along_x ? p->span_x : p->span_z;
+    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
+    for (i = 0; i < n; i++) {
+        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = mesh->vertices + (i + 1u) % n;
+        uint32_t a_at = along_x ? a->x : a->z, b_at = along_x ? b->x : b->z, from, to;
+        if ((along_x ? a->z : a->x) != at || (along_x ? b->z : b->x) != at)
             continue;
-        from = terrimpi_tile_place(a->x, p->level, p->span_x);
-        to = terrimpi_tile_place(b->x, p->level, p->span_x);
-        terrimpi_take_away(row, from, to + (to == p->span_x), (float)from, a->height,
+        if (a_at > b_at) { /* the loop runs the other way on the far two sides */
+            const terrimp_mesh_vertex *swap = a;
+            a = b;
+            b = swap;
+        }
+        from = terrimpi_tile_place(terrimpi_min_u32(a_at, b_at), p->level, span);
+        to = terrimpi_tile_place(terrimpi_max_u32(a_at, b_at), p->level, span);
+        terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
                            (b->height - a->height) / (float)(to - from));
     }
 }
@@ -8226,7 +8233,7 @@ static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *
     float *row = build->row, last = (float)p->span_x;
     terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
-        terrimpi_take_last_row(p, mesh, row);
+        terrimpi_take_border(p, mesh, TERRIMP_BORDER_Z1, row);
         return;
     }
     for (; facet < end; facet++) {
@@ -8276,7 +8283,7 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
     const terrimp_heightfield *f = &t->desc.field;
     uint32_t i, x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
     uint32_t z = side == TERRIMP_BORDER_Z1 ? p->z + p->span_z : p->z;
-    if (side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1) {
+    if (terrimpi_along_x(side)) {
         terrimpi_heightfield_tile(f, x, z, p->span_x + 1u, 1, 1, line);
         return p->span_x;
     }
@@ -8289,12 +8296,11 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
 static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t *first,
                                      uint32_t *step)
 {
-    int along_x = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1;
     *first = side == TERRIMP_BORDER_Z1   ? (p->rows - 1u) * p->cols
              : side == TERRIMP_BORDER_X1 ? p->cols - 1u
                                          : 0u;
-    *step = along_x ? 1u : p->cols;
-    return along_x ? p->cols : p->rows;
+    *step = terrimpi_along_x(side) ? 1u : p->cols;
+    return terrimpi_along_x(side) ? p->cols : p->rows;
 }
 
 /* Fills the tile that the simplifier works on: at level 0 the samples, above that the mean of those
@@ -8329,25 +8335,9 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
     }
 }
 
-/* The loop's vertex that is point k of a border, when the borders have so many points. */
-static uint32_t terrimpi_loop_vertex(const uint32_t counts[TERRIMP_BORDER_COUNT], int side,
-                                     uint32_t k)
-{
-    uint32_t x0 = counts[TERRIMP_BORDER_X0] - 1u, z1 = counts[TERRIMP_BORDER_Z1] - 1u;
-    uint32_t x1 = counts[TERRIMP_BORDER_X1] - 1u, z0 = counts[TERRIMP_BORDER_Z0] - 1u;
-    switch (side) {
-    case TERRIMP_BORDER_X0: return k;
-    case TERRIMP_BORDER_Z1: return x0 + k;
-    case TERRIMP_BORDER_X1: return x0 + z1 + x1 - k;
-    default: return k == 0 ? 0 : x0 + z1 + x1 + z0 - k;
-    }
-}
-
 /* Simplifies the tile between its four borders. */
 static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                                             const terrimpi_build *build,
-                                             uint32_t counts[TERRIMP_BORDER_COUNT],
-                                             terrimp_mesh *mesh)
+                                             const terrimpi_build *build, terrimp_mesh *mesh)
 {
     terrimp_border_point points[TERRIMP_BORDER_COUNT][16];
     float line[129];
@@ -8365,11 +8355,10 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
             line[k] = build->tile[first + k * step];
         result = terrimp_border_simplify(line, count,
                                          terrimpi_border_points(t->desc.triangle_budget),
-                                         points[side], 16, &counts[side]);
+                                         points[side], 16, &desc.borders[side].point_count);
         if (result != TERRIMP_OK)
             return result;
         desc.borders[side].points = points[side];
-        desc.borders[side].point_count = counts[side];
     }
     squeeze.step = 1 << p->level;
     squeeze.last_x = (int32_t)p->span_x;
@@ -8387,20 +8376,11 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
    a sample round it over the polyline. From the border's own samples alone. */
 static void terrimpi_miss_border(const terrimp_terrain *t, const terrimpi_patch *p, int side,
-                                 const uint32_t counts[TERRIMP_BORDER_COUNT],
                                  const terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    int along_x = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1;
     uint32_t span = terrimpi_read_border(t, p, side, build->row), first, step, i, k;
     uint32_t count = terrimpi_tile_border(p, side, &first, &step);
-    for (k = 0; k + 1u < counts[side]; k++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + terrimpi_loop_vertex(counts, side, k);
-        const terrimp_mesh_vertex *b = mesh->vertices + terrimpi_loop_vertex(counts, side, k + 1u);
-        uint32_t from = terrimpi_tile_place(along_x ? a->x : a->z, p->level, span);
-        uint32_t to = terrimpi_tile_place(along_x ? b->x : b->z, p->level, span);
-        terrimpi_take_away(build->row, from, to + (to == span), (float)from, a->height,
-                           (b->height - a->height) / (float)(to - from));
-    }
+    terrimpi_take_border(p, mesh, side, build->row);
     build->tile[first] = build->tile[first + (count - 1u) * step] = 0.0f;
     for (k = 1; k + 1u < count; k++) {
         uint32_t from, end;
@@ -8416,7 +8396,6 @@ static void terrimpi_miss_border(const terrimp_terrain *t, const terrimpi_patch 
 /* Fills the tile with what the mesh misses: for each place the largest height of a sample round it
    over the surface. */
 static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch *p,
-                                 const uint32_t counts[TERRIMP_BORDER_COUNT],
                                  const terrimp_mesh *mesh, const terrimpi_build *build)
 {
     uint32_t i, k, x, z;
@@ -8440,7 +8419,7 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
         }
     }
     for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++)
-        terrimpi_miss_border(t, p, side, counts, mesh, build);
+        terrimpi_miss_border(t, p, side, mesh, build);
 }
 
 /* Raises the mesh so that it stands proud of all samples. Since a raise is a piecewise linear
@@ -8449,13 +8428,12 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
    To do so twice halves the samples that still stand out, from 0.3 to 0.15 %, and makes the error
    larger by a tenth to a fifth: not worth it. */
 static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                                          const uint32_t counts[TERRIMP_BORDER_COUNT],
                                           terrimp_mesh *mesh, const terrimpi_build *build)
 {
     terrimp_raise_desc raise;
     terrimp_result result;
     uint32_t i;
-    terrimpi_fill_misses(t, p, counts, mesh, build);
+    terrimpi_fill_misses(t, p, mesh, build);
     raise.heights = build->tile;
     raise.cols = p->cols;
     raise.rows = p->rows;
@@ -8552,15 +8530,14 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
                                           const terrimpi_build *build)
 {
     terrimpi_patch p = terrimpi_patch_of(t, node);
-    uint32_t counts[TERRIMP_BORDER_COUNT];
     terrimp_mesh mesh;
     terrimpi_error error;
     terrimp_result result;
     float rms;
     terrimpi_fill_tile(t, &p, build);
-    result = terrimpi_simplify_tile(t, &p, build, counts, &mesh);
+    result = terrimpi_simplify_tile(t, &p, build, &mesh);
     if (result == TERRIMP_OK && t->desc.proud > 0.0f)
-        result = terrimpi_raise_tile(t, &p, counts, &mesh, build);
+        result = terrimpi_raise_tile(t, &p, &mesh, build);
     if (result != TERRIMP_OK)
         return result;
     terrimpi_store_surface(t, node, &mesh);
@@ -8688,7 +8665,7 @@ static void terrimpi_hold(terrimpi_mesh *mesh, float low, float high)
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain)
 {
     const terrimp_geomip *tree;
-    uint32_t node, level, x, z;
+    uint32_t node;
     if (!terrain)
         return TERRIMP_E_NULL;
     tree = &terrain->tree;
@@ -8701,14 +8678,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
         terrimpi_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
         terrain->mesh_triangle_count += terrain->meshes[node].triangle_count;
     }
-    for (level = 1; level < tree->level_count; level++)
-        for (z = 0; z < tree->level_z[level - 1u]; z++)
-            for (x = 0; x < tree->level_x[level - 1u]; x++) {
-                const terrimpi_mesh *child =
-                    &terrain->meshes[terrimpi_mip_number(tree, level - 1u, x, z)];
-                terrimpi_hold(&terrain->meshes[terrimpi_mip_number(tree, level, x / 2u, z / 2u)],
-                              child->low, child->high);
-            }
+    for (node = 0; node + 1u < tree->node_count; node++)
+        terrimpi_hold(&terrain->meshes[terrimpi_mip_parent(tree, node)],
+                      terrain->meshes[node].low, terrain->meshes[node].high);
     terrain->built = 1;
     return TERRIMP_OK;
 }
@@ -8734,30 +8706,38 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
 
 /* ---- what has been built ---- */
 
+/* What all that give something of a node have to check. */
+static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32_t node,
+                                          const void *out)
+{
+    if (!terrain || !out)
+        return TERRIMP_E_NULL;
+    if (!terrain->built)
+        return TERRIMP_E_STATE;
+    return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
+}
+
 /* The box of node (x, z) of a level: of everything drawn of it and of those below it. */
 static void terrimpi_node_box(const terrimp_terrain *t, uint32_t level, uint32_t x, uint32_t z,
                               terrimp_box *box)
 {
     const terrimpi_mesh *mesh = &t->meshes[terrimpi_mip_number(&t->tree, level, x, z)];
-    uint32_t quads = t->desc.chunk_quads << level;
-    box->min[0] = terrimpi_world_x(t, x * quads);
+    terrimpi_mip_place p;
+    p.level = level;
+    p.x = x;
+    p.z = z;
+    terrimpi_mip_box(&t->tree, p, box);
     box->min[1] = mesh->low;
-    box->min[2] = terrimpi_world_z(t, z * quads);
-    box->max[0] = terrimpi_world_x(t, (x + 1u) * quads);
     box->max[1] = mesh->high;
-    box->max[2] = terrimpi_world_z(t, (z + 1u) * quads);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box)
 {
+    terrimp_result result = terrimpi_check_node(terrain, node, box);
     terrimpi_mip_place place;
-    if (!terrain || !box)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
+    if (result != TERRIMP_OK)
+        return result;
     place = terrimpi_mip_place_of(&terrain->tree, node);
     terrimpi_node_box(terrain, place.level, place.x, place.z, box);
     return TERRIMP_OK;
@@ -8780,14 +8760,10 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                     terrimp_mesh_info *mesh)
 {
-    if (!terrain || !mesh)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
-    terrimpi_mesh_place(terrain, node, mesh);
-    return TERRIMP_OK;
+    terrimp_result result = terrimpi_check_node(terrain, node, mesh);
+    if (result == TERRIMP_OK)
+        terrimpi_mesh_place(terrain, node, mesh);
+    return result;
 }
 
 /* ---- edits ---- */
@@ -8951,7 +8927,8 @@ static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t 
 static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
-    uint32_t width, direction, number = 1, strips = terrimpi_strip_count(quads);
+    uint32_t width, strip = 0, direction = (wanted - 1u) % TERRIMPI_DIRECTIONS, k;
+    int dx, dz;
     p.x0 = p.z0 = p.first_index = 0;
     p.x1 = p.z1 = quads;
     p.index_count = terrimpi_mip_indices(quads, TERRIMP_FORM_LIST, 0);
@@ -8960,26 +8937,21 @@ static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
         return p;
     /* each of the 16 patterns as pattern 0, but half of the 64 sides coarse */
     p.first_index = 16u * p.index_count - 32u * 3u * (quads / 2u);
-    for (width = 0; width < strips; width++) {
-        uint32_t strip = terrimpi_strip_quads(quads, width);
-        if (wanted - number >= TERRIMPI_DIRECTIONS) { /* corners, and whole sides */
-            p.first_index += 24u * strip * (strip + quads);
-            number += TERRIMPI_DIRECTIONS;
-            continue;
-        }
-        for (direction = 0;; direction++) {
-            int dx, dz;
-            terrimpi_direction(direction, &dx, &dz);
-            terrimpi_strip_span(dx, quads, strip, &p.x0, &p.x1);
-            terrimpi_strip_span(dz, quads, strip, &p.z0, &p.z1);
-            p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
-            p.index_count = 3u * p.triangle_count;
-            if (number++ == wanted)
-                return p;
-            p.first_index += p.index_count;
-        }
-    }
     p.index_count = p.triangle_count = 0;
+    for (width = 0; width <= (wanted - 1u) / TERRIMPI_DIRECTIONS; width++) {
+        p.first_index += 24u * strip * (strip + quads); /* corners, and whole sides */
+        strip = terrimpi_strip_quads(quads, width);
+        if (strip == quads)
+            return p;
+    }
+    for (k = 0; k <= direction; k++) {
+        p.first_index += p.index_count;
+        terrimpi_direction(k, &dx, &dz);
+        terrimpi_strip_span(dx, quads, strip, &p.x0, &p.x1);
+        terrimpi_strip_span(dz, quads, strip, &p.z0, &p.z1);
+        p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
+        p.index_count = 3u * p.triangle_count;
+    }
     return p;
 }
 
@@ -9058,27 +9030,19 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     return TERRIMP_OK;
 }
 
-/* What the three functions below have to check: `count` items are wanted for each vertex. */
-static terrimp_result terrimpi_check_fill(const terrimp_terrain *terrain, uint32_t node,
-                                          const void *out, size_t capacity, size_t count)
+static size_t terrimpi_ground_vertices(const terrimp_terrain *t)
 {
-    size_t side;
-    if (!terrain || !out)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
-    side = terrain->desc.chunk_quads + 1u;
-    return capacity < side * side * count ? TERRIMP_E_CAPACITY : TERRIMP_OK;
+    return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
-    terrimp_result result = terrimpi_check_fill(terrain, node, xyz, capacity, 3);
+    terrimp_result result = terrimpi_check_node(terrain, node, xyz);
     if (result != TERRIMP_OK)
         return result;
+    if (capacity < 3u * terrimpi_ground_vertices(terrain))
+        return TERRIMP_E_CAPACITY;
     return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
 }
 
@@ -9087,55 +9051,12 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity)
 {
-    terrimp_result result = terrimpi_check_fill(terrain, node, vertices, capacity, 1);
+    terrimp_result result = terrimpi_check_node(terrain, node, vertices);
     if (result != TERRIMP_OK)
         return result;
+    if (capacity < terrimpi_ground_vertices(terrain))
+        return TERRIMP_E_CAPACITY;
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
-}
-
-TERRIMP_API terrimp_result terrimp_terrain_fill_weights(const terrimp_terrain *terrain,
-                                                        terrimp_geomip_weights *weights,
-                                                        size_t capacity)
-{
-    terrimp_result result = terrimpi_check_fill(terrain, 0, weights, capacity, 1);
-    if (result != TERRIMP_OK)
-        return result;
-    return terrimp_geomip_fill_weights(terrain->desc.chunk_quads, TERRIMP_FORM_LIST, weights);
-}
-
-/* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
-static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
-                               uint16_t *indices)
-{
-    const terrimpi_mesh *mesh = &t->meshes[node];
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    terrimpi_patch p = terrimpi_patch_of(t, node);
-    uint32_t i, vertices = mesh->vertex_count, index_count = 3u * mesh->triangle_count;
-    int upper;
-    memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
-    memset(indices, 0, t->index_stride * sizeof *indices);
-    for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
-        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
-        xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
-        xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
-        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
-    }
-    for (i = 0; i < index_count; i++)
-        indices[i] = corners[i];
-    for (upper = 0; upper < 2; upper++) {
-        float *rim = xyz + (size_t)vertices * 3u;
-        if (upper ? !(mesh->upper_skirt > 0.0f) : t->desc.no_lower_skirts)
-            continue;
-        memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
-        for (i = 0; i < mesh->border_count; i++)
-            rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
-                                     : terrimpi_min(rim[i * 3u + 1u], t->tree.nodes[node].low);
-        terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
-        vertices += mesh->border_count;
-        index_count += 6u * mesh->border_count;
-    }
 }
 
 /* Writes the floor: a quad for each node of its level. A corner has the height of the lowest point
@@ -9163,6 +9084,49 @@ static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *
     terrimpi_emit_quads(indices, &all, wide + 1u);
 }
 
+/* Writes one node's vertices and indices with skirts, its whole share of the buffers; the floor's
+   when the node is node_count. */
+static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
+                               uint16_t *indices)
+{
+    const terrimpi_mesh *mesh = t->meshes + node;
+    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
+    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
+    terrimpi_patch p;
+    uint32_t i, vertices, index_count;
+    int upper;
+    if (node == t->tree.node_count) {
+        terrimpi_fill_floor(t, xyz, indices);
+        return;
+    }
+    p = terrimpi_patch_of(t, node);
+    vertices = mesh->vertex_count;
+    index_count = 3u * mesh->triangle_count;
+    memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
+    memset(indices, 0, t->index_stride * sizeof *indices);
+    for (i = 0; i < vertices; i++) {
+        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
+        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
+        xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
+        xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
+        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
+    }
+    for (i = 0; i < index_count; i++)
+        indices[i] = corners[i];
+    for (upper = 0; upper < 2; upper++) {
+        float *rim = xyz + (size_t)vertices * 3u;
+        if (upper ? !(mesh->upper_skirt > 0.0f) : t->desc.no_lower_skirts)
+            continue;
+        memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
+        for (i = 0; i < mesh->border_count; i++)
+            rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
+                                     : terrimpi_min(rim[i * 3u + 1u], t->tree.nodes[node].low);
+        terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
+        vertices += mesh->border_count;
+        index_count += 6u * mesh->border_count;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                      float *xyz, size_t xyz_capacity,
                                                      uint16_t *indices, size_t index_capacity)
@@ -9180,10 +9144,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
     if (xyz_capacity / 3u < vertices || index_capacity < index_count)
         return TERRIMP_E_CAPACITY;
-    if (is_floor)
-        terrimpi_fill_floor(terrain, xyz, indices);
-    else
-        terrimpi_fill_mesh(terrain, node, xyz, indices);
+    terrimpi_fill_mesh(terrain, node, xyz, indices);
     return TERRIMP_OK;
 }
 
@@ -9191,20 +9152,17 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity)
 {
-    uint32_t node, nodes;
-    if (!terrain || !xyz || !indices)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    terrimp_result result = terrimpi_check_node(terrain, 0, xyz);
+    size_t node, nodes;
+    if (result != TERRIMP_OK || !indices)
+        return result != TERRIMP_OK ? result : TERRIMP_E_NULL;
     nodes = terrain->tree.node_count;
     if (xyz_capacity / 3u < nodes * terrain->vertex_stride + terrimpi_floor_vertices(terrain) ||
         index_capacity < nodes * terrain->index_stride + terrimpi_floor_indices(terrain))
         return TERRIMP_E_CAPACITY;
-    for (node = 0; node < nodes; node++)
-        terrimpi_fill_mesh(terrain, node, xyz + (size_t)node * terrain->vertex_stride * 3u,
-                           indices + (size_t)node * terrain->index_stride);
-    terrimpi_fill_floor(terrain, xyz + (size_t)nodes * terrain->vertex_stride * 3u,
-                        indices + (size_t)nodes * terrain->index_stride);
+    for (node = 0; node <= nodes; node++)
+        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + node * terrain->vertex_stride * 3u,
+                           indices + node * terrain->index_stride);
     return TERRIMP_OK;
 }
 
