@@ -1855,6 +1855,14 @@ extern "C" {
 
 /* ==== Basics ============================================================= >>impl-basics */
 
+/* What most functions begin with: an error is returned when a condition holds; or is passed on. */
+#define TERRIMPI_REFUSE(condition, error) \
+    do { if (condition) return (error); } while (0)
+#define TERRIMPI_TRY(call)                                                      \
+    do {                                                                        \
+        terrimp_result tried = (call); if (tried != TERRIMP_OK) return tried; \
+    } while (0)
+
 TERRIMP_API const char *terrimp_result_text(int result)
 {
     switch (result) {
@@ -2077,11 +2085,9 @@ static terrimp_result terrimpi_axis_check(float origin, float spacing, uint32_t 
     float extent = (float)(count - 1u) * spacing;
     float last = terrimpi_line(origin, spacing, count - 1u);
     float reach = terrimpi_max(extent, terrimpi_max(-origin, terrimpi_max(origin, last)));
-
-    if (!terrimpi_finite(origin) || !terrimpi_finite(spacing))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(spacing > 0.0f) || !terrimpi_finite(reach) || spacing < reach * (1.0f / 8388608.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite(origin) || !terrimpi_finite(spacing), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(spacing > 0.0f) || !terrimpi_finite(reach) ||
+                    spacing < reach * (1.0f / 8388608.0f), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -2089,12 +2095,11 @@ static terrimp_result terrimpi_heights_check(const terrimp_heightfield *field)
 {
     float steps = field->format == TERRIMP_FORMAT_F32 ? 0.0f : 65535.0f;
     float height = field->height_scale * steps;
-
-    if (!terrimpi_finite(field->height_scale) || !terrimpi_finite(field->height_offset))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(field->height_scale > 0.0f) || !terrimpi_finite(field->height_offset + height) ||
-        !terrimpi_finite(field->height_offset - height))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite(field->height_scale) ||
+                    !terrimpi_finite(field->height_offset), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(field->height_scale > 0.0f) ||
+                    !terrimpi_finite(field->height_offset + height) ||
+                    !terrimpi_finite(field->height_offset - height), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -2103,12 +2108,9 @@ static terrimp_result terrimpi_memory_check(const terrimp_heightfield *field)
     size_t size = terrimpi_sample_bytes(field->format);
     size_t row = (size_t)field->width * size;
     int ok = 1;
-
-    if (field->row_bytes < row || field->row_bytes % size != 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(field->row_bytes < row || field->row_bytes % size != 0, TERRIMP_E_RANGE);
     (void)terrimpi_add(terrimpi_mul(field->row_bytes, field->depth - 1u, &ok), row, &ok);
-    if (!ok)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(!ok, TERRIMP_E_OVERFLOW);
     return (uintptr_t)field->samples % size != 0 ? TERRIMP_E_ALIGN : TERRIMP_OK;
 }
 
@@ -2117,13 +2119,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
 {
     terrimp_heightfield field;
     terrimp_result result;
-
-    if (in == NULL || out == NULL || in->samples == NULL)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(in == NULL || out == NULL || in->samples == NULL, TERRIMP_E_NULL);
     field = *in;
-    if (field.width < 2u || field.width > TERRIMP_MAX_DIM || field.depth < 2u ||
-        field.depth > TERRIMP_MAX_DIM || field.format < 0 || field.format >= TERRIMP_FORMAT_COUNT)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(field.width < 2u || field.width > TERRIMP_MAX_DIM || field.depth < 2u ||
+                    field.depth > TERRIMP_MAX_DIM || field.format < 0 ||
+                    field.format >= TERRIMP_FORMAT_COUNT, TERRIMP_E_RANGE);
     if (field.format == TERRIMP_FORMAT_DEFAULT)
         field.format = TERRIMP_FORMAT_F32;
     if (field.row_bytes == 0)
@@ -2157,7 +2157,6 @@ static const void *terrimpi_row(const terrimp_heightfield *field, uint32_t z)
 static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t z)
 {
     const void *row = terrimpi_row(field, z);
-
     switch (field->format) {
     case TERRIMP_FORMAT_U8: return (float)((const uint8_t *)row)[x];
     case TERRIMP_FORMAT_U16: return (float)((const uint16_t *)row)[x];
@@ -2193,7 +2192,6 @@ static void terrimpi_raw_row(const terrimp_heightfield *field, uint32_t x, uint3
     const void *row = terrimpi_row(field, z);
     float edge;
     uint32_t c;
-
     /* Two loops, for the one of stride 1 turns into vector instructions. */
 #define TERRIMPI_COPY(type)                                \
     if (stride == 1u)                                      \
@@ -2232,7 +2230,6 @@ static void terrimpi_heightfield_tile(const terrimp_heightfield *field, uint32_t
     const float scale = field->height_scale, offset = field->height_offset;
     const uint32_t last = field->depth - 1u;
     uint32_t r, c;
-
     z = z < last ? z : last;
     for (r = 0; r < rows; ++r) {
         terrimpi_raw_row(field, x, terrimpi_step(z, last, r, stride), cols, stride, out);
@@ -2254,7 +2251,6 @@ static terrimp_result terrimpi_scan_values(const terrimp_heightfield *field, con
                                            uint32_t count, uint32_t *bad, terrimpi_scan *scan)
 {
     uint32_t i;
-
     for (i = 0; i < count; ++i) {
         if (terrimpi_is_void(field, raw[i])) {
             if (scan->skip_voids)
@@ -2282,7 +2278,6 @@ static terrimp_result terrimpi_scan_tile(const terrimp_heightfield *field, uint3
     const uint32_t most = (last_x - x) / stride + 2u; /* the last of these is the last column */
     uint32_t r, c, at, row, count, bad = 0;
     terrimp_result result;
-
     scan->low = TERRIMPI_FLOAT_MAX;
     scan->high = -TERRIMPI_FLOAT_MAX;
     cols = cols < most ? cols : most;
@@ -2310,10 +2305,8 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
 {
     terrimp_heightfield f;
     terrimpi_scan scan;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
+    terrimp_result result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     scan.skip_voids = 0;
     result = terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan);
     if (result != TERRIMP_OK) {
@@ -2338,17 +2331,13 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
     terrimp_heightfield f;
     terrimpi_scan scan;
     int ok = 1;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (out == NULL)
-        return TERRIMP_E_NULL;
-    if (x >= f.width || z >= f.depth || cols == 0 || rows == 0 || stride == 0)
-        return TERRIMP_E_RANGE;
+    terrimp_result result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(out == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0 ||
+                    stride == 0, TERRIMP_E_RANGE);
     (void)terrimpi_mul(terrimpi_mul(cols, rows, &ok), sizeof(float), &ok);
-    if (!ok)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(!ok, TERRIMP_E_OVERFLOW);
     scan.skip_voids = 0;
     result = terrimpi_scan_tile(&f, x, z, cols, rows, stride, &scan);
     if (result == TERRIMP_OK)
@@ -2362,15 +2351,10 @@ static terrimp_result terrimpi_height_range(const terrimp_heightfield *field, te
                                             int skip_voids, float *low, float *high)
 {
     terrimpi_scan scan;
-    terrimp_result result;
-
     scan.skip_voids = skip_voids;
-    result = terrimpi_scan_tile(field, samples.x, samples.y, samples.width, samples.height, 1,
-                                &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (scan.low > scan.high)
-        return TERRIMP_E_VOID;
+    TERRIMPI_TRY(terrimpi_scan_tile(field, samples.x, samples.y, samples.width, samples.height, 1,
+                                    &scan));
+    TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
     *low = terrimpi_world_height(field, scan.low);
     *high = terrimpi_world_height(field, scan.high);
     return TERRIMP_OK;
@@ -2381,14 +2365,9 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
                                                       float *low, float *high)
 {
     terrimp_heightfield f;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (low == NULL || high == NULL)
-        return TERRIMP_E_NULL;
-    if (x >= f.width || z >= f.depth || cols == 0 || rows == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(low == NULL || high == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0, TERRIMP_E_RANGE);
     return terrimpi_height_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
 }
 
@@ -2428,7 +2407,6 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
     size_t first[TERRIMPI_FILL_LEVELS], cells = 0;
     uint32_t count = 0, rows = TERRIMPI_FILL_RING, w = width, d = depth, i;
     int ok = 1;
-
     for (;;) {
         first[count] = cells;
         cells = terrimpi_add(cells, terrimpi_mul(w, rows, &ok), &ok);
@@ -2453,7 +2431,6 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
 TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, uint32_t depth)
 {
     terrimpi_fill fill;
-
     if (width < 2u || width > TERRIMP_MAX_DIM || depth < 2u || depth > TERRIMP_MAX_DIM)
         return 0;
     return terrimpi_fill_layout(width, depth, NULL, &fill);
@@ -2467,7 +2444,6 @@ static void terrimpi_fill_load(const terrimp_heightfield *field, const terrimpi_
     float *value = fill->level[0].value + first;
     uint8_t *known = fill->level[0].known + first;
     uint32_t x;
-
     terrimpi_raw_row(field, 0, z, field->width, 1, value);
     for (x = 0; x < field->width; ++x)
         known[x] = (uint8_t)(value[x] != field->no_data && value[x] == value[x]);
@@ -2492,7 +2468,6 @@ static void terrimpi_fill_pull(const terrimpi_fill *fill, uint32_t level, uint32
     float *value = up->value + (size_t)z * up->width;
     uint8_t *known = up->known + (size_t)z * up->width;
     uint32_t x, k;
-
     for (x = 0; x < up->width; ++x) {
         size_t x0 = 2u * x, x1 = x0 + 1u < from->width ? x0 + 1u : x0, cell[4];
         float sum = 0.0f;
@@ -2520,7 +2495,6 @@ static void terrimpi_fill_push(const terrimpi_fill *fill, uint32_t level, uint32
     const float *own = up->value + terrimpi_fill_row(fill, level + 1u, z / 2u);
     const float *other = up->value + terrimpi_fill_row(fill, level + 1u, side);
     uint32_t x;
-
     for (x = 0; x < to->width; ++x) {
         uint32_t a = x / 2u, b = (x & 1u) ? (a + 1u < up->width ? a + 1u : a) : a - (a > 0);
         if (!to->known[row + x])
@@ -2542,7 +2516,6 @@ static void terrimpi_fill_relax(const terrimpi_fill *fill, uint32_t level, uint3
     const uint8_t *known = on->known + first;
     float *row = on->value + first, left, own;
     uint32_t x = 0, last = on->width - 1u;
-
     while (x <= last) {
         const void *next = memchr(known + x, 0, last - x + 1u);
         if (next == NULL)
@@ -2561,7 +2534,6 @@ static void terrimpi_fill_relax(const terrimpi_fill *fill, uint32_t level, uint3
 static void terrimpi_fill_coarse(const terrimpi_fill *fill)
 {
     uint32_t level, z, sweep, sweeps;
-
     for (level = 2; level < fill->level_count; ++level)
         for (z = 0; z < fill->level[level].depth; ++z)
             terrimpi_fill_pull(fill, level, z);
@@ -2584,7 +2556,6 @@ static float terrimpi_fill_not_void(const terrimp_heightfield *field, const terr
                                     float value)
 {
     float moved;
-
     if (value != field->no_data)
         return value;
     if (field->format != TERRIMP_FORMAT_F32)
@@ -2602,7 +2573,6 @@ static void terrimpi_fill_store(const terrimp_heightfield *field, const terrimpi
     const uint8_t *known = fill->level[0].known + first;
     void *row = samples + (size_t)z * field->row_bytes;
     uint32_t x;
-
     for (x = 0; x < field->width; ++x) {
         float v;
         if (known[x])
@@ -2626,7 +2596,6 @@ static void terrimpi_fill_fine(const terrimp_heightfield *field, const terrimpi_
                                char *samples)
 {
     uint32_t r, s;
-
     for (r = 0; r < field->depth + TERRIMPI_FILL_SWEEPS; ++r) {
         if (r < field->depth) {
             terrimpi_fill_load(field, fill, r);
@@ -2645,7 +2614,6 @@ static size_t terrimpi_fill_read(const terrimp_heightfield *field, const terrimp
 {
     size_t voids = 0;
     uint32_t x, z;
-
     for (z = 0; z < field->depth; ++z) {
         const uint8_t *known = fill->level[0].known + terrimpi_fill_row(fill, 0, z);
         terrimpi_fill_load(field, fill, z);
@@ -2666,28 +2634,17 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     terrimpi_fill fill;
     terrimpi_scan scan;
     size_t needed, voids = 0;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (samples == NULL || scratch == NULL)
-        return TERRIMP_E_NULL;
-    if (samples != f.samples)
-        return TERRIMP_E_RANGE;
-    if ((uintptr_t)scratch % sizeof(float) != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(samples == NULL || scratch == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(samples != f.samples, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE((uintptr_t)scratch % sizeof(float) != 0, TERRIMP_E_ALIGN);
     needed = terrimpi_fill_layout(f.width, f.depth, scratch, &fill);
-    if (needed == 0)
-        return TERRIMP_E_OVERFLOW;
-    if (scratch_bytes < needed)
-        return TERRIMP_E_MEMORY;
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_REFUSE(scratch_bytes < needed, TERRIMP_E_MEMORY);
 
     scan.skip_voids = 1;
-    result = terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (scan.low > scan.high)
-        return TERRIMP_E_VOID;
+    TERRIMPI_TRY(terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
+    TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
     fill.low = scan.low;
     fill.high = scan.high;
     if (f.has_no_data)
@@ -2715,7 +2672,6 @@ static int terrimpi_locate(float origin, float spacing, uint32_t count, float at
 {
     float guess = (at - origin) / spacing;
     uint32_t i;
-
     if (!(at >= origin && at <= terrimpi_line(origin, spacing, count - 1u)))
         return 0;
     i = (uint32_t)terrimpi_clamp(guess, 0.0f, (float)(count - 2u));
@@ -2733,7 +2689,6 @@ static terrimp_result terrimpi_quad_load(const terrimp_heightfield *field, uint3
 {
     float none = 0.0f;
     uint32_t i;
-
     quad->x0 = terrimpi_line(field->origin_x, field->spacing_x, x);
     quad->x1 = terrimpi_line(field->origin_x, field->spacing_x, x + 1u);
     quad->z0 = terrimpi_line(field->origin_z, field->spacing_z, z);
@@ -2782,7 +2737,6 @@ static void terrimpi_quad_slope(const terrimpi_quad *quad, int side, float slope
 static int terrimpi_slope_normal(const float slope[2], float normal[3])
 {
     float n[3];
-
     n[0] = -slope[0];
     n[1] = 1.0f;
     n[2] = -slope[1];
@@ -2798,18 +2752,11 @@ static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x
 {
     terrimp_heightfield f;
     uint32_t i, j;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite(x) || !terrimpi_finite(z))
-        return TERRIMP_E_NOT_FINITE;
-    if (!terrimpi_locate(f.origin_x, f.spacing_x, f.width, x, &i) ||
-        !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, z, &j))
-        return TERRIMP_E_MISS;
-    result = terrimpi_quad_load(&f, i, j, quad);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(!terrimpi_finite(x) || !terrimpi_finite(z), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_locate(f.origin_x, f.spacing_x, f.width, x, &i) ||
+                    !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, z, &j), TERRIMP_E_MISS);
+    TERRIMPI_TRY(terrimpi_quad_load(&f, i, j, quad));
     *u = terrimpi_fraction(x, quad->x0, quad->x1);
     *v = terrimpi_fraction(z, quad->z0, quad->z1);
     return TERRIMP_OK;
@@ -2821,9 +2768,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield 
     terrimpi_quad quad;
     float u, v;
     terrimp_result result;
-
-    if (height == NULL)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(height == NULL, TERRIMP_E_NULL);
     result = terrimpi_surface(field, x, z, &quad, &u, &v);
     if (result == TERRIMP_OK)
         *height = terrimpi_quad_height(&quad, terrimpi_quad_side(u, v), u, v);
@@ -2835,13 +2780,8 @@ TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield 
 {
     terrimpi_quad quad;
     float u, v, slope[2];
-    terrimp_result result;
-
-    if (normal == NULL)
-        return TERRIMP_E_NULL;
-    result = terrimpi_surface(field, x, z, &quad, &u, &v);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(normal == NULL, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
     terrimpi_quad_slope(&quad, terrimpi_quad_side(u, v), slope);
     return terrimpi_slope_normal(slope, normal) ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
@@ -2872,7 +2812,6 @@ typedef struct terrimpi_ray {
 static int terrimpi_ray_clip(float origin, float way, float low, float high, float *t0, float *t1)
 {
     float a, b;
-
     if (way == 0.0f)
         return origin >= low && origin <= high;
     a = ((way > 0.0f ? low : high) - origin) / way;
@@ -2889,7 +2828,6 @@ static int terrimpi_ray_aim(const float direction[3], float way[3])
     float largest = terrimpi_max(terrimpi_abs(direction[0]),
                                  terrimpi_max(terrimpi_abs(direction[1]),
                                               terrimpi_abs(direction[2])));
-
     if (!(largest > 0.0f))
         return 0;
     way[0] = direction[0] / largest;
@@ -2905,7 +2843,6 @@ static int terrimpi_ray_enter(const terrimp_heightfield *field, const float orig
     float last_x = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
     float last_z = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
     float t0 = 0.0f, t1 = max_distance;
-
     if (!terrimpi_ray_clip(origin[0], ray->way[0], field->origin_x, last_x, &t0, &t1) ||
         !terrimpi_ray_clip(origin[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
         return 0;
@@ -2942,7 +2879,6 @@ static int terrimpi_ray_meets(const terrimpi_ray *ray, const terrimpi_quad *quad
     float gap_a = a->y - terrimpi_quad_height(quad, side, a->u, a->v);
     float gap_b = b->y - terrimpi_quad_height(quad, side, b->u, b->v);
     float slope[2], closing;
-
     if ((gap_a > 0.0f && gap_b > 0.0f) || (gap_a < 0.0f && gap_b < 0.0f))
         return 0;
     terrimpi_quad_slope(quad, side, slope);
@@ -2961,7 +2897,6 @@ static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
     float low = terrimpi_min(terrimpi_min(h[0], h[1]), terrimpi_min(h[2], h[3]));
     float high = terrimpi_max(terrimpi_max(h[0], h[1]), terrimpi_max(h[2], h[3]));
     terrimpi_ray_point cut;
-
     if (terrimpi_min(a->y, b->y) > high || terrimpi_max(a->y, b->y) < low)
         return 0;
     *side = terrimpi_quad_side(0.0f, off_a + off_b);
@@ -3000,7 +2935,6 @@ static void terrimpi_ray_report(const terrimpi_ray *ray, const terrimpi_quad *qu
 {
     terrimpi_ray_point point = terrimpi_ray_at(ray, quad, t);
     float slope[2];
-
     hit->distance = ray->before + t;
     hit->position[0] = terrimpi_clamp(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
     hit->position[1] = terrimpi_quad_height(quad, side, point.u, point.v);
@@ -3020,7 +2954,6 @@ static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const 
     terrimpi_quad quad;
     terrimp_result loaded = terrimpi_quad_load(field, x, z, &quad);
     terrimpi_ray_point enter = terrimpi_ray_at(ray, &quad, 0.0f);
-
     for (;;) {
         float leave_x = terrimpi_ray_leave(ray->start[0], ray->way[0], quad.x0, quad.x1);
         float leave_z = terrimpi_ray_leave(ray->start[2], ray->way[2], quad.z0, quad.z1);
@@ -3058,17 +2991,12 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
     terrimp_heightfield f;
     terrimpi_ray ray;
     uint32_t x, z;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (origin == NULL || direction == NULL)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
-        !terrimpi_finite(max_distance))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(max_distance > 0.0f) || !terrimpi_ray_aim(direction, ray.way))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(origin == NULL || direction == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
+                    !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) ||
+                    !terrimpi_ray_aim(direction, ray.way), TERRIMP_E_RANGE);
     if (!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
         !terrimpi_locate(f.origin_x, f.spacing_x, f.width, ray.start[0], &x) ||
         !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, ray.start[2], &z))
@@ -3083,20 +3011,19 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
 {
     terrimp_camera c;
     float right[3];
-    if (!camera || !out)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!camera || !out, TERRIMP_E_NULL);
     c = *camera;
-    if (!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) || !terrimpi_finite3(c.up) ||
-        !terrimpi_finite(c.fov_y_rad) || !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_REFUSE(!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) ||
+                    !terrimpi_finite3(c.up) || !terrimpi_finite(c.fov_y_rad) ||
+                    !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far), TERRIMP_E_NOT_FINITE);
     if (c.fov_y_rad == 0.0f)
         c.fov_y_rad = 1.0471976f;
     if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
         c.up[1] = 1.0f;
-    if (c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u || c.width_px > 65536u ||
-        c.height_px < 1u || c.height_px > 65536u || c.z_near <= 0.0f || c.z_far <= c.z_near ||
-        !terrimpi_normalize(c.forward))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u ||
+                    c.width_px > 65536u || c.height_px < 1u || c.height_px > 65536u ||
+                    c.z_near <= 0.0f || c.z_far <= c.z_near ||
+                    !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
     terrimpi_basis(c.forward, c.up, right);
     *out = c;
     return TERRIMP_OK;
@@ -3113,9 +3040,7 @@ static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x,
 static terrimp_result terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
 {
     terrimp_camera c;
-    terrimp_result result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     memcpy(out->eye, c.eye, sizeof c.eye);
     memcpy(out->up, c.up, sizeof c.up);
     memcpy(out->forward, c.forward, sizeof c.forward);
@@ -3132,25 +3057,17 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
                                                    float projection[16])
 {
     terrimp_capture c;
-    terrimp_result result;
-    if (!view || !projection)
-        return TERRIMP_E_NULL;
-    result = terrimpi_camera_capture(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!view || !projection, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_camera_capture(camera, &c));
     return terrimp_capture_matrices(&c, camera->depth_zero_to_one, view, projection);
 }
 
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
 {
     terrimp_camera c;
-    terrimp_result result;
     float tan_x, tan_y;
-    if (!factor)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!factor, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     terrimpi_camera_tangents(&c, &tan_x, &tan_y);
     *factor = (float)c.height_px / (2.0f * tan_y);
     return TERRIMP_OK;
@@ -3160,13 +3077,9 @@ TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum)
 {
     terrimp_capture c;
-    terrimp_result result;
     int i;
-    if (!frustum)
-        return TERRIMP_E_NULL;
-    result = terrimpi_camera_capture(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!frustum, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_camera_capture(camera, &c));
     memset(frustum, 0, sizeof *frustum);
     for (i = 0; i < 3; i++) {
         frustum->eye[i] = c.eye[i];
@@ -3236,8 +3149,8 @@ static void terrimpi_box_corner(const terrimp_box *box, int i, const float point
 static terrimp_result terrimpi_check_box(const terrimp_box *box)
 {
     int i;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) ||
+                    !terrimpi_finite3(box->max), TERRIMP_E_NOT_FINITE);
     for (i = 0; i < 3; i++)
         if (box->min[i] > box->max[i])
             return TERRIMP_E_RANGE;
@@ -3283,31 +3196,23 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
     static const float origin[3] = {0.0f, 0.0f, 0.0f};
     terrimp_capture c;
-    terrimp_result result;
     float corners[8][3];
     int i;
-    if (!box || !eye || !capture)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_box(box);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
-    if (terrimp_box_distance(box, eye) <= 0.0f)
-        return TERRIMP_E_INSIDE;
+    TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_box(box));
+    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
     for (i = 0; i < 3; i++) {
         c.eye[i] = eye[i];
         c.forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
     }
-    if (!terrimpi_normalize(c.forward))
-        return TERRIMP_E_INSIDE;
+    TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_INSIDE);
     memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
     terrimpi_basis(c.forward, c.up, c.right);
     for (i = 0; i < 8; i++)
         terrimpi_box_corner(box, i, origin, corners[i]);
     /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-    if (!terrimpi_fit_sides(&c, corners[0], 8, 0.001f))
-        return TERRIMP_E_BEHIND;
+    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, corners[0], 8, 0.001f), TERRIMP_E_BEHIND);
     *capture = c;
     return TERRIMP_OK;
 }
@@ -3316,13 +3221,10 @@ TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, con
                                                    uint32_t count)
 {
     terrimp_capture c;
-    if (!capture || !xyz)
-        return TERRIMP_E_NULL;
-    if (count == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
     c = *capture;
-    if (!terrimpi_fit_sides(&c, xyz, count, 0.0f))
-        return TERRIMP_E_BEHIND;
+    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, xyz, count, 0.0f), TERRIMP_E_BEHIND);
     c.z_near = capture->z_near;
     c.z_far = capture->z_far;
     *capture = c;
@@ -3336,8 +3238,7 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     const terrimp_capture *c = capture;
     float width, height, depth;
     int i;
-    if (!c || !view || !projection)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!c || !view || !projection, TERRIMP_E_NULL);
     for (i = 0; i < 3; i++) {
         view[i * 4 + 0] = c->right[i];
         view[i * 4 + 1] = c->up[i];
@@ -3444,11 +3345,9 @@ TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, 
                                                 terrimp_pattern *found)
 {
     uint32_t i, first = 0;
-    if (!found)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_mip_quads_fit(chunk_quads) || pattern >= TERRIMP_PATTERN_COUNT || form < 0 ||
-        form >= (int)TERRIMP_FORM_COUNT)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!found, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(chunk_quads) || pattern >= TERRIMP_PATTERN_COUNT ||
+                    form < 0 || form >= (int)TERRIMP_FORM_COUNT, TERRIMP_E_RANGE);
     for (i = 0; i < pattern; i++)
         first += terrimpi_mip_indices(chunk_quads, form, i);
     found->first_index = first;
@@ -3587,12 +3486,9 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 {
     terrimpi_mip_writer w;
     uint32_t count = terrimp_pattern_index_count(chunk_quads, form);
-    if (!indices)
-        return TERRIMP_E_NULL;
-    if (count == 0)
-        return TERRIMP_E_RANGE;
-    if (capacity < count)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(capacity < count, TERRIMP_E_CAPACITY);
     w.quads = chunk_quads;
     w.form = form;
     w.out = indices;
@@ -3607,17 +3503,12 @@ TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
                                                uint32_t chunk_quads, terrimp_geomip *tree)
 {
     terrimp_geomip t;
-    terrimp_result result;
     uint32_t x, z, level;
-    if (!field || !tree)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!field || !tree, TERRIMP_E_NULL);
     memset(&t, 0, sizeof t);
-    result = terrimp_heightfield_resolve(field, &t.field);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &t.field));
     t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
-    if (!terrimpi_mip_quads_fit(t.chunk_quads))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(t.chunk_quads), TERRIMP_E_RANGE);
     x = (t.field.width - 2u) / t.chunk_quads + 1u;
     z = (t.field.depth - 2u) / t.chunk_quads + 1u;
     for (level = 0;; level++) {
@@ -3722,10 +3613,8 @@ static void terrimpi_mip_error_box(const terrimp_geomip *t, terrimpi_mip_place p
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
                                               terrimp_box *box)
 {
-    if (!tree || !box || !tree->nodes)
-        return TERRIMP_E_NULL;
-    if (node >= tree->node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!tree || !box || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     terrimpi_mip_box(tree, terrimpi_mip_place_of(tree, node), box);
     return TERRIMP_OK;
 }
@@ -3879,8 +3768,7 @@ static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *s
 TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch)
 {
     uint32_t level, j;
-    if (!tree || !scratch)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!tree || !scratch, TERRIMP_E_NULL);
     for (level = 1; tree->fits && level < tree->level_count; level++) {
         uint32_t cols = terrimpi_mip_cols(tree, level), width = terrimpi_mip_cols(tree, level - 1u);
         float *loads = tree->fits + tree->fit_first[level];
@@ -4080,10 +3968,7 @@ static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_
     terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, 0, p.x, p.z)];
     uint32_t quads = t->chunk_quads;
     terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
-    terrimp_result result =
-        terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high));
     node->error = node->rms = 0.0f;
     if (t->fits)
         terrimpi_mip_drawn_range(t, p, node);
@@ -4096,10 +3981,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
     terrimpi_mip_place p, beyond;
     terrimpi_mip_misses misses;
     int side;
-    if (!tree || !scratch || !tree->nodes)
-        return TERRIMP_E_NULL;
-    if (node >= tree->node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     p = terrimpi_mip_place_of(tree, node);
     if (p.level == 0)
         return terrimpi_mip_build_leaf(tree, p);
@@ -4123,8 +4006,7 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree)
 {
     uint32_t i;
-    if (!tree || !tree->nodes)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!tree || !tree->nodes, TERRIMP_E_NULL);
     for (i = 0; i + 1u < tree->node_count; i++) {
         const terrimp_geomip_node *child = &tree->nodes[i];
         terrimp_geomip_node *node = &tree->nodes[terrimpi_mip_parent(tree, i)];
@@ -4179,10 +4061,9 @@ static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint
 static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
-    if (!t || !t->nodes)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(tolerance_px) || !terrimpi_finite(morph_ratio))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(tolerance_px) ||
+                    !terrimpi_finite(morph_ratio), TERRIMP_E_NOT_FINITE);
     return rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || tolerance_px < 0.01f ||
                    tolerance_px > 1000.0f || morph_ratio < 1.0f || morph_ratio > 4.0f
                ? TERRIMP_E_RANGE
@@ -4193,16 +4074,11 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
                                                     float tolerance_px, float morph_ratio,
                                                     float pixel_factor, float *distances)
 {
-    terrimp_result result = terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio);
     uint32_t level, node;
-    if (result != TERRIMP_OK)
-        return result;
-    if (!distances)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(pixel_factor))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(pixel_factor > 0.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
+    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++)
         for (node = tree->level_first[level]; node < tree->level_first[level + 1u]; node++)
             distances[node] =
@@ -4567,12 +4443,9 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
         view->tolerance_px = 1.0f;
     if (view->morph_ratio == 0.0f)
         view->morph_ratio = 1.0f;
-    if (!view->distances || !view->marks || !view->draws)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(view->hysteresis))
-        return TERRIMP_E_NOT_FINITE;
-    if (view->hysteresis < 0.0f || view->hysteresis > 1.0f)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!view->distances || !view->marks || !view->draws, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(view->hysteresis < 0.0f || view->hysteresis > 1.0f, TERRIMP_E_RANGE);
     return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
 }
 
@@ -4586,15 +4459,10 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
     terrimp_result result;
     float pixel_factor;
     uint32_t level;
-    if (!tree || !view)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
-    result = terrimpi_mip_view_resolve(tree, &v);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
     terrimp_camera_frustum(&c, &f.frustum);
     terrimp_camera_pixel_factor(&c, &pixel_factor);
     f.tree = tree;
@@ -4708,10 +4576,8 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tr
 {
     terrimpi_mip_place p;
     uint32_t i, j, i0, j0;
-    if (!tree || (!xyz && !vertices))
-        return TERRIMP_E_NULL;
-    if (node >= tree->node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     p = terrimpi_mip_place_of(tree, node);
     i0 = p.x * tree->chunk_quads;
     j0 = p.z * tree->chunk_quads;
@@ -4757,10 +4623,8 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int
                                                        terrimp_geomip_weights *weights)
 {
     uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
-    if (!weights)
-        return TERRIMP_E_NULL;
-    if (count == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!weights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
     for (k = 0; k < count; k++)
         terrimpi_mip_weights(chunk_quads, form, k, &weights[k]);
     return TERRIMP_OK;
@@ -4778,10 +4642,8 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
                                                 float *heights, size_t stride)
 {
     uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
-    if (!draw || !vertices || !heights)
-        return TERRIMP_E_NULL;
-    if (count == 0 || stride == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!draw || !vertices || !heights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0 || stride == 0, TERRIMP_E_RANGE);
     for (k = 0; k < count; k++, vertices++, heights += stride) {
         const float *coarse = draw->side_coarse;
         terrimp_geomip_weights w;
@@ -6218,10 +6080,9 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
     terrimp_border_point kept[TERRIMP_MAX_TILE_DIM];
     uint32_t i, wanted;
     int round;
-    if (!heights || !points || !point_count)
-        return TERRIMP_E_NULL;
-    if (count < 2 || count > TERRIMP_MAX_TILE_DIM || inner_limit > TERRIMP_MAX_TILE_DIM)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!heights || !points || !point_count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count < 2 || count > TERRIMP_MAX_TILE_DIM ||
+                    inner_limit > TERRIMP_MAX_TILE_DIM, TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
         if (!terrimpi_finite(heights[i]))
             return TERRIMP_E_NOT_FINITE;
@@ -6230,8 +6091,7 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
     }
     wanted = (inner_limit ? inner_limit : TERRIMP_BORDER_POINTS) + 2;
     wanted = wanted < count ? wanted : count;
-    if (capacity < wanted)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(capacity < wanted, TERRIMP_E_CAPACITY);
     if (wanted < count) {
         terrimpi_thin_border(heights, kept, count, wanted);
         for (round = 0; round < 8 && terrimpi_improve_border(heights, kept, wanted); round++) {
@@ -6324,10 +6184,8 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                                                  uint32_t *index_capacity)
 {
     uint32_t budget = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    if (!vertex_capacity || !index_capacity)
-        return TERRIMP_E_NULL;
-    if (budget < 2 || budget > TERRIMP_MAX_TRIANGLES)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!vertex_capacity || !index_capacity, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(budget < 2 || budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
     /* budget + 2 vertices when all of them are on the border, and each skirt as many again */
     *vertex_capacity = 3 * (budget + 2);
     *index_capacity = 3 * budget + 2 * 6 * (budget + 2);
@@ -6338,11 +6196,10 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
 static terrimp_result terrimpi_check_border(const terrimp_border *border, uint32_t samples)
 {
     uint32_t i;
-    if (!border->points)
-        return TERRIMP_E_NULL;
-    if (border->point_count < 2 || border->point_count > samples || border->points[0].at != 0 ||
-        border->points[border->point_count - 1].at != samples - 1)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!border->points, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(border->point_count < 2 || border->point_count > samples ||
+                    border->points[0].at != 0 ||
+                    border->points[border->point_count - 1].at != samples - 1, TERRIMP_E_RANGE);
     for (i = 0; i < border->point_count; i++) {
         if (!terrimpi_finite(border->points[i].height))
             return TERRIMP_E_NOT_FINITE;
@@ -6356,11 +6213,9 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
 {
     const terrimp_border *b = desc->borders;
     uint32_t i;
-    if (!desc->heights)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
-        desc->triangle_budget > TERRIMP_MAX_TRIANGLES)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
+                    desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
     for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
         terrimp_result r = terrimpi_check_border(
             b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
@@ -6382,8 +6237,7 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
 static terrimp_result terrimpi_check_mesh_arrays(const terrimp_mesh *mesh,
                                                  const terrimpi_plan *plan)
 {
-    if (!mesh->vertices || !mesh->indices)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
     if (mesh->vertex_capacity < plan->border + plan->inner ||
         mesh->index_capacity < 3 * (plan->border - 2 + 2 * plan->inner))
         return TERRIMP_E_CAPACITY;
@@ -6438,27 +6292,19 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
 {
     terrimpi_simplifier s;
     terrimpi_plan plan;
-    terrimp_result result;
     uint32_t budget, border = 0;
     int whole, i;
-    if (!desc || !scratch || !mesh)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_desc(desc);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!desc || !scratch || !mesh, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_desc(desc));
     budget = desc->triangle_budget ? desc->triangle_budget : TERRIMP_TRIANGLE_BUDGET;
     for (i = 0; i < TERRIMP_BORDER_COUNT; i++)
         border += desc->borders[i].point_count - 1;
-    if (border > budget + 2)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
     plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
-    result = terrimpi_check_mesh_arrays(mesh, &plan);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_mesh_arrays(mesh, &plan));
     if (scratch_bytes < terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget))
         return TERRIMP_E_MEMORY;
-    if ((uintptr_t)scratch % sizeof(int64_t) != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_REFUSE((uintptr_t)scratch % sizeof(int64_t) != 0, TERRIMP_E_ALIGN);
     terrimpi_lay_out(&s, &plan, scratch);
     s.cols = (int32_t)desc->cols;
     s.rows = (int32_t)desc->rows;
@@ -6483,32 +6329,26 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
 {
-    if (!mesh || !mesh->vertices || !mesh->indices)
-        return TERRIMP_E_NULL;
-    if (mesh->border_vertex_count < 4 || mesh->surface_index_count < 6 ||
-        mesh->surface_vertex_count < mesh->border_vertex_count ||
-        mesh->vertex_count < mesh->surface_vertex_count ||
-        mesh->index_count < mesh->surface_index_count ||
-        mesh->vertex_capacity < mesh->vertex_count || mesh->index_capacity < mesh->index_count)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!mesh || !mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(mesh->border_vertex_count < 4 || mesh->surface_index_count < 6 ||
+                    mesh->surface_vertex_count < mesh->border_vertex_count ||
+                    mesh->vertex_count < mesh->surface_vertex_count ||
+                    mesh->index_count < mesh->surface_index_count ||
+                    mesh->vertex_capacity < mesh->vertex_count ||
+                    mesh->index_capacity < mesh->index_count, TERRIMP_E_STATE);
     return TERRIMP_OK;
 }
 
 /* Appends a wall along the loop: down to a height, or up by a rise. */
 static terrimp_result terrimpi_add_skirt(terrimp_mesh *mesh, float value, int upper)
 {
-    terrimp_result result = terrimpi_check_surface(mesh);
     uint32_t i, n;
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_surface(mesh));
     n = mesh->border_vertex_count;
-    if (mesh->vertex_capacity - mesh->vertex_count < n ||
-        mesh->index_capacity - mesh->index_count < 6 * n)
-        return TERRIMP_E_CAPACITY;
-    if (!terrimpi_finite(value))
-        return TERRIMP_E_NOT_FINITE;
-    if (upper && value < 0.0f)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(mesh->vertex_capacity - mesh->vertex_count < n ||
+                    mesh->index_capacity - mesh->index_count < 6 * n, TERRIMP_E_CAPACITY);
+    TERRIMPI_REFUSE(!terrimpi_finite(value), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(upper && value < 0.0f, TERRIMP_E_RANGE);
     for (i = 0; i < n; i++) {
         terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
         *rim = mesh->vertices[i];
@@ -6687,19 +6527,12 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
                                            const terrimp_mesh *mesh)
 {
     uint32_t i;
-    terrimp_result result = terrimpi_check_surface(mesh);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!desc->heights)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_tile_size_ok(desc->cols, desc->rows))
-        return TERRIMP_E_RANGE;
-    if (!terrimpi_finite(desc->amount))
-        return TERRIMP_E_NOT_FINITE;
-    if (desc->amount < 0.0f || desc->amount > 1.0f)
-        return TERRIMP_E_RANGE;
-    if (mesh->vertex_count != mesh->surface_vertex_count)
-        return TERRIMP_E_STATE;
+    TERRIMPI_TRY(terrimpi_check_surface(mesh));
+    TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_finite(desc->amount), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(desc->amount < 0.0f || desc->amount > 1.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(mesh->vertex_count != mesh->surface_vertex_count, TERRIMP_E_STATE);
     for (i = 0; i < mesh->surface_vertex_count; i++)
         if (mesh->vertices[i].x >= desc->cols || mesh->vertices[i].z >= desc->rows)
             return TERRIMP_E_RANGE;
@@ -6713,15 +6546,11 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
                                               float *work)
 {
-    terrimp_result result;
     uint32_t n, i;
     float *change;
     int pass;
-    if (!desc || !mesh || !work)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_raise(desc, mesh);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!desc || !mesh || !work, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_raise(desc, mesh));
     n = mesh->surface_vertex_count;
     change = work + n;
     for (i = 0; i < n; i++)
@@ -6754,16 +6583,14 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
                                                  uint32_t largest, uint32_t size[2], float *scale)
 {
     float density, width, height, longest, reduce = 1.0f;
-    if (!capture || !size)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!capture || !size, TERRIMP_E_NULL);
     density = pixel_factor * texels_per_px;
     width = (capture->tan_right - capture->tan_left) * density;
     height = (capture->tan_up - capture->tan_down) * density;
-    if (!terrimpi_finite(width) || !terrimpi_finite(height))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) || !(height > 0.0f) ||
-        largest < 1u || largest > 65536u || smallest > largest)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite(width) || !terrimpi_finite(height), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) ||
+                    !(height > 0.0f) || largest < 1u || largest > 65536u ||
+                    smallest > largest, TERRIMP_E_RANGE);
     longest = terrimpi_max(width, height);
     if (longest > (float)largest)
         reduce = (float)largest / longest;
@@ -6785,10 +6612,9 @@ static void terrimpi_pad(float *low, float *high, uint32_t inner, uint32_t margi
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin)
 {
-    if (!capture || !slot)
-        return TERRIMP_E_NULL;
-    if (margin > 65536u || slot[0] <= 2u * margin || slot[1] <= 2u * margin)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(margin > 65536u || slot[0] <= 2u * margin ||
+                    slot[1] <= 2u * margin, TERRIMP_E_RANGE);
     terrimpi_pad(&capture->tan_left, &capture->tan_right, slot[0] - 2u * margin, margin);
     terrimpi_pad(&capture->tan_down, &capture->tan_up, slot[1] - 2u * margin, margin);
     return TERRIMP_OK;
@@ -6801,12 +6627,11 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
     float view[16], projection[16];
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
-    if (!capture || !slot || !matrix)
-        return TERRIMP_E_NULL;
-    if (slot->width < 1u || slot->height < 1u || atlas_width < 1u || atlas_height < 1u ||
-        slot->x > atlas_width || slot->width > atlas_width - slot->x || slot->y > atlas_height ||
-        slot->height > atlas_height - slot->y)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
+                    atlas_height < 1u || slot->x > atlas_width ||
+                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
+                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
     terrimp_capture_matrices(capture, 0, view, projection);
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
@@ -6835,8 +6660,7 @@ TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], c
     static const int rows[3] = {0, 1, 3};
     size_t i;
     int k;
-    if (!matrix || (count && (!xyz || !stq)))
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!matrix || (count && (!xyz || !stq)), TERRIMP_E_NULL);
     for (i = 0; i < count; i++, xyz += 3, stq += 3)
         for (k = 0; k < 3; k++) {
             const float *m = matrix + rows[k];
@@ -6848,8 +6672,7 @@ TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], c
 static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float captured_eye[3],
                                           const float eye[3], const float *out)
 {
-    if (!box || !captured_eye || !eye || !out)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!box || !captured_eye || !eye || !out, TERRIMP_E_NULL);
     return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
                    terrimpi_finite3(captured_eye) && terrimpi_finite3(eye)
                ? TERRIMP_OK
@@ -6860,10 +6683,8 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
                                               const float eye[3], float *angle_rad)
 {
     float worst = 0.0f; /* grows with the angle: its sine up to 60 degrees, then 2 - its cosine */
-    terrimp_result result = terrimpi_check_eyes(box, captured_eye, eye, angle_rad);
     int i;
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
     for (i = 0; i < 8; i++) {
         float a[3], b[3], across[3], cosine;
         terrimpi_box_corner(box, i, captured_eye, a);
@@ -6919,13 +6740,10 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
                                                   float pixel_factor, float *error_px)
 {
     float move[3], move_length, distance, sine;
-    terrimp_result result = terrimpi_check_eyes(box, captured_eye, eye, error_px);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite(error) || !terrimpi_finite(pixel_factor))
-        return TERRIMP_E_NOT_FINITE;
-    if (error < 0.0f || !(pixel_factor > 0.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
+    TERRIMPI_REFUSE(!terrimpi_finite(error) ||
+                    !terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
     *error_px = 0.0f;
@@ -6948,12 +6766,11 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
                                                      float speed, float *seconds)
 {
     float sine;
-    if (!seconds)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(distance) || !terrimpi_finite(max_angle_rad) || !terrimpi_finite(speed))
-        return TERRIMP_E_NOT_FINITE;
-    if (distance < 0.0f || max_angle_rad < 0.0f || max_angle_rad > 3.1415928f || !(speed > 0.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!seconds, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(distance) || !terrimpi_finite(max_angle_rad) ||
+                    !terrimpi_finite(speed), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(distance < 0.0f || max_angle_rad < 0.0f || max_angle_rad > 3.1415928f ||
+                    !(speed > 0.0f), TERRIMP_E_RANGE);
     sine = max_angle_rad < 1.5707963f ? TERRIMP_SINF(max_angle_rad) : 1.0f;
     *seconds = distance * sine / speed;
     return TERRIMP_OK;
@@ -6966,12 +6783,9 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
 {
     float rate = 0.0f, seconds;
     size_t i;
-    if ((count && !boxes) || !eye || !captures_per_s)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
-    if (terrimpi_finite(distance) && !(distance > 0.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE((count && !boxes) || !eye || !captures_per_s, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(terrimpi_finite(distance) && !(distance > 0.0f), TERRIMP_E_RANGE);
     for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
         float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
         terrimp_result result = terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds);
@@ -7041,10 +6855,8 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 {
     float all = 0.0f, saved[TERRIMPI_SPLITS], first, last, step;
     uint32_t i, k, best = 0;
-    if (!capture || !xyz || !indices || !split)
-        return TERRIMP_E_NULL;
-    if (vertex_count == 0 || index_count % 3u != 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
     for (i = 0; i < index_count; i++)
         if (indices[i] >= vertex_count)
             return TERRIMP_E_RANGE;
@@ -7085,11 +6897,9 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity)
 {
-    if (!shelves || !items)
-        return TERRIMP_E_NULL;
-    if (width < 1u || width > 65536u || height < 1u || height > 65536u || padding > 65536u ||
-        capacity < 1u)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!shelves || !items, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(width < 1u || width > 65536u || height < 1u || height > 65536u ||
+                    padding > 65536u || capacity < 1u, TERRIMP_E_RANGE);
     shelves->width = width;
     shelves->height = height;
     shelves->padding = padding;
@@ -7104,12 +6914,10 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
 {
     terrimp_shelf *shelf;
     uint32_t i;
-    if (!shelves || !shelves->items || !rect)
-        return TERRIMP_E_NULL;
-    if (rect->width < 1u || rect->height < 1u)
-        return TERRIMP_E_RANGE;
-    if (rect->width > shelves->width || rect->height > shelves->height)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || !rect, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(rect->width < 1u || rect->height < 1u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(rect->width > shelves->width ||
+                    rect->height > shelves->height, TERRIMP_E_CAPACITY);
     for (i = 0; i < shelves->count; i++) {
         shelf = &shelves->items[i];
         if (rect->height <= shelf->height && shelf->used <= shelves->width - rect->width)
@@ -7191,8 +6999,7 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_p
                                              uint32_t count, uint32_t *order, uint32_t *placed)
 {
     uint32_t i, done = 0;
-    if (!shelves || !shelves->items || (count && (!items || !order)))
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || (count && (!items || !order)), TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         if (items[i].rect.width < 1u || items[i].rect.height < 1u)
             return TERRIMP_E_RANGE;
@@ -7216,12 +7023,8 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
                                              uint32_t height, terrimp_shelf *items,
                                              uint32_t capacity)
 {
-    terrimp_result result;
-    if (!pair || !items)
-        return TERRIMP_E_NULL;
-    result = terrimp_shelves_init(&pair->shelves[0], width, height, 0, items, capacity);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!pair || !items, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_shelves_init(&pair->shelves[0], width, height, 0, items, capacity));
     terrimp_shelves_init(&pair->shelves[1], width, height, 0, items + capacity, capacity);
     pair->newest = 0;
     pair->repacks = 0;
@@ -7263,8 +7066,8 @@ TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp
     uint32_t i, atlas;
     float by = 1.0f;
     int fits;
-    if (!pair || !pair->shelves[0].items || (count && (!slots || !items || !order)))
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!pair || !pair->shelves[0].items ||
+                    (count && (!slots || !items || !order)), TERRIMP_E_NULL);
     atlas = 1u - pair->newest;
     for (i = 0; i < count; i++)
         slots[i].assigned[atlas] = slots[i].filled[atlas] = 0;
@@ -7296,15 +7099,11 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
                                                uint32_t width, uint32_t height)
 {
     terrimp_rect rect;
-    terrimp_result result;
-    if (!pair || !slot)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
     rect.x = rect.y = 0;
     rect.width = width;
     rect.height = height;
-    result = terrimp_shelves_insert(&pair->shelves[pair->newest], &rect);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_shelves_insert(&pair->shelves[pair->newest], &rect));
     slot->rect[pair->newest] = rect;
     slot->assigned[pair->newest] = 1;
     slot->filled[pair->newest] = 0;
@@ -7314,10 +7113,8 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
 TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
                                              terrimp_pair_slot *slot)
 {
-    if (!pair || !slot)
-        return TERRIMP_E_NULL;
-    if (!slot->assigned[pair->newest])
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!slot->assigned[pair->newest], TERRIMP_E_STATE);
     slot->filled[pair->newest] = 1;
     slot->assigned[1u - pair->newest] = slot->filled[1u - pair->newest] = 0;
     return TERRIMP_OK;
@@ -7484,14 +7281,10 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes)
 {
-    if (!atlas || !desc || !memory)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_live_desc_ok(desc))
-        return TERRIMP_E_RANGE;
-    if ((uintptr_t)memory % 8u != 0)
-        return TERRIMP_E_ALIGN;
-    if (bytes < terrimp_live_atlas_bytes(desc))
-        return TERRIMP_E_MEMORY;
+    TERRIMPI_REFUSE(!atlas || !desc || !memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_live_desc_ok(desc), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE((uintptr_t)memory % 8u != 0, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(bytes < terrimp_live_atlas_bytes(desc), TERRIMP_E_MEMORY);
     atlas->desc = *desc;
     atlas->slots = (terrimp_rect *)memory;
     atlas->holes = atlas->slots + desc->max_slots;
@@ -7502,10 +7295,8 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
 {
     uint32_t i;
-    if (!atlas)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     for (i = 0; i < atlas->desc.max_slots; i++)
         atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
     atlas->holes[0] = terrimpi_live_whole(atlas);
@@ -7585,12 +7376,9 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
 {
     uint32_t hole, handle;
     terrimp_rect taken, whole;
-    if (!atlas || !slot)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (width < 1u || height < 1u)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
     hole = terrimpi_live_find(atlas, width, height);
     handle = atlas->unused;
     if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
@@ -7613,12 +7401,9 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
 /* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
 static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint32_t slot)
 {
-    if (!atlas)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (slot >= atlas->desc.max_slots)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
     return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
@@ -7645,10 +7430,8 @@ static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect 
 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
 {
-    terrimp_result result = terrimpi_live_check(atlas, slot);
     terrimp_rect freed;
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
     freed = terrimpi_live_padded(atlas, slot);
     atlas->texels_used -= atlas->slots[slot].width * atlas->slots[slot].height;
     atlas->slot_count--;
@@ -7662,8 +7445,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
                                                    terrimp_rect *rect)
 {
     terrimp_result result = terrimpi_live_check(atlas, slot);
-    if (!rect)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!rect, TERRIMP_E_NULL);
     if (result == TERRIMP_OK)
         *rect = atlas->slots[slot];
     return result;
@@ -7673,12 +7455,10 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
                                                    uint32_t height, uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    if (!atlas || !size)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (width < 1u || width > 65536u || height < 1u || height > 65536u)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || width > 65536u || height < 1u ||
+                    height > 65536u, TERRIMP_E_RANGE);
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
         uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
@@ -7841,14 +7621,10 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
 {
     terrimpi_live_search search;
     int fits;
-    if (!atlas || !costs || !victims || !count)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (width < 1u || height < 1u)
-        return TERRIMP_E_RANGE;
-    if (width > atlas->desc.width || height > atlas->desc.height)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!atlas || !costs || !victims || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(width > atlas->desc.width || height > atlas->desc.height, TERRIMP_E_CAPACITY);
     fits = terrimpi_live_find(atlas, width, height) < atlas->hole_count;
     if (fits && atlas->unused < atlas->desc.max_slots) {
         *count = 0;
@@ -7868,10 +7644,8 @@ TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *at
                                                     terrimp_live_atlas_stats *stats)
 {
     uint32_t i, padding;
-    if (!atlas || !stats)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!atlas || !stats, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     padding = atlas->desc.padding;
     stats->slots = atlas->slot_count;
     stats->texels_used = atlas->texels_used;
@@ -7941,16 +7715,11 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
                                                         terrimp_terrain_desc *out)
 {
     terrimp_terrain_desc d;
-    terrimp_result result;
-    if (!desc || !out)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!desc || !out, TERRIMP_E_NULL);
     d = *desc;
-    result = terrimp_heightfield_resolve(&d.field, &d.field);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite(d.proud) || !terrimpi_finite(d.height_low) ||
-        !terrimpi_finite(d.height_high))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(&d.field, &d.field));
+    TERRIMPI_REFUSE(!terrimpi_finite(d.proud) || !terrimpi_finite(d.height_low) ||
+                    !terrimpi_finite(d.height_high), TERRIMP_E_NOT_FINITE);
     if (d.chunk_quads == 0)
         d.chunk_quads = 64;
     if (d.triangle_budget == 0)
@@ -7959,10 +7728,9 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
         d.proud = 0.0f;
     else if (d.proud == 0.0f)
         d.proud = 1.0f;
-    if (!terrimpi_mip_quads_fit(d.chunk_quads) || d.triangle_budget < 32u ||
-        d.triangle_budget > 400u || d.proud < 0.0f || d.proud > 1.0f ||
-        d.height_low > d.height_high)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) || d.triangle_budget < 32u ||
+                    d.triangle_budget > 400u || d.proud < 0.0f || d.proud > 1.0f ||
+                    d.height_low > d.height_high, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8029,10 +7797,8 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 
 static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
 {
-    if (!memory)
-        return TERRIMP_E_NULL;
-    if ((uintptr_t)memory % TERRIMPI_ALIGN != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
     return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
@@ -8542,8 +8308,8 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
         return result;
     terrimpi_store_surface(t, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
-    if (!terrimpi_finite(error.above) || !terrimpi_finite(error.below))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_REFUSE(!terrimpi_finite(error.above) ||
+                    !terrimpi_finite(error.below), TERRIMP_E_NOT_FINITE);
     terrimpi_store_mesh(t, node, &mesh, &error, rms);
     return TERRIMP_OK;
 }
@@ -8576,21 +8342,14 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
                                                 size_t bytes, terrimp_terrain **terrain)
 {
     terrimp_terrain t;
-    terrimp_result result;
     size_t needed, at = 0;
     int ok = 1;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     memset(&t, 0, sizeof t);
-    result = terrimp_terrain_desc_resolve(desc, &t.desc);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &t.desc));
     needed = terrimp_terrain_bytes(&t.desc);
-    if (needed == 0)
-        return TERRIMP_E_OVERFLOW;
-    result = terrimpi_check_block(memory, bytes, needed);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_place(&at, 1, sizeof t, &ok);
     terrimpi_terrain_layout(&t, (unsigned char *)memory + at);
@@ -8606,8 +8365,7 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 {
     float low, high, room, step;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     low = terrain->desc.height_low;
     high = terrain->desc.height_high;
     if (low == 0.0f && high == 0.0f) {
@@ -8619,8 +8377,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
     step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
-    if (!terrimpi_finite(step) || !terrimpi_finite(low - room))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite(step) || !terrimpi_finite(low - room), TERRIMP_E_RANGE);
     terrain->sample_low = low;
     terrain->sample_high = high;
     terrain->range_low = low - room;
@@ -8633,21 +8390,13 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
                                                       void *scratch, size_t bytes)
 {
     terrimpi_build build;
-    terrimp_result result;
-    if (!terrain)
-        return TERRIMP_E_NULL;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
-    result = terrimpi_check_block(scratch, bytes,
-                                  terrimpi_build_layout(&terrain->desc, NULL, &build));
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrain->begun)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= terrain->tree.node_count, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_REFUSE(!terrain->begun, TERRIMP_E_STATE);
     terrimpi_build_layout(&terrain->desc, scratch, &build);
-    result = terrimp_geomip_build_node(&terrain->tree, node, build.row);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_geomip_build_node(&terrain->tree, node, build.row));
     if (node < terrain->tree.level_first[1] &&
         (terrain->tree.nodes[node].low < terrain->sample_low ||
          terrain->tree.nodes[node].high > terrain->sample_high))
@@ -8666,8 +8415,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
 {
     const terrimp_geomip *tree;
     uint32_t node;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
         if (terrain->meshes[node].vertex_count == 0)
@@ -8691,8 +8439,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
     terrimpi_build build;
     terrimp_result result;
     uint32_t node;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     result = terrimpi_check_block(scratch, bytes,
                                   terrimpi_build_layout(&terrain->desc, NULL, &build));
     if (result == TERRIMP_OK)
@@ -8710,10 +8457,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
 static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32_t node,
                                           const void *out)
 {
-    if (!terrain || !out)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
@@ -8734,10 +8479,8 @@ static void terrimpi_node_box(const terrimp_terrain *t, uint32_t level, uint32_t
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box)
 {
-    terrimp_result result = terrimpi_check_node(terrain, node, box);
     terrimpi_mip_place place;
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, box));
     place = terrimpi_mip_place_of(&terrain->tree, node);
     terrimpi_node_box(terrain, place.level, place.x, place.z, box);
     return TERRIMP_OK;
@@ -8800,13 +8543,10 @@ static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const t
 
 static terrimp_result terrimpi_check_touched(const terrimp_terrain *t, const terrimp_rect *rect)
 {
-    if (!t || !rect)
-        return TERRIMP_E_NULL;
-    if (!t->built)
-        return TERRIMP_E_STATE;
-    if (rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
-        rect->y >= t->desc.field.depth)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!t || !rect, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!t->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
+                    rect->y >= t->desc.field.depth, TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -8818,8 +8558,7 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
     terrimp_result result = terrimpi_check_touched(terrain, samples);
     uint32_t level, x, z, all = 0;
     int pass;
-    if (!count)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!count, TERRIMP_E_NULL);
     if (result != TERRIMP_OK)
         return result;
     for (pass = 0; pass < 2; pass++) {
@@ -8861,11 +8600,8 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                       terrimpi_build_layout(&terrain->desc, NULL, &build));
     if (result != TERRIMP_OK)
         return result;
-    result = terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high);
-    if (result != TERRIMP_OK)
-        return result;
-    if (low < terrain->sample_low || high > terrain->sample_high)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high));
+    TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
     for (level = 0; level < terrain->tree.level_count; level++) {
         /* errors are also against what a finer neighbour draws next to the border */
         terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, (1u << level) / 2u);
@@ -8986,10 +8722,8 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
 {
     const terrimp_geomip *tree;
     uint32_t quads;
-    if (!terrain || !info)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain || !info, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     tree = &terrain->tree;
     quads = terrain->desc.chunk_quads;
     info->chunk_quads = quads;
@@ -9014,10 +8748,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
                                                         uint16_t *indices, size_t capacity)
 {
     uint32_t quads, i, strips;
-    if (!terrain || !indices)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain || !indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     quads = terrain->desc.chunk_quads;
     if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
         return TERRIMP_E_CAPACITY;
@@ -9038,11 +8770,8 @@ static size_t terrimpi_ground_vertices(const terrimp_terrain *t)
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
-    terrimp_result result = terrimpi_check_node(terrain, node, xyz);
-    if (result != TERRIMP_OK)
-        return result;
-    if (capacity < 3u * terrimpi_ground_vertices(terrain))
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, xyz));
+    TERRIMPI_REFUSE(capacity < 3u * terrimpi_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
 }
 
@@ -9051,11 +8780,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity)
 {
-    terrimp_result result = terrimpi_check_node(terrain, node, vertices);
-    if (result != TERRIMP_OK)
-        return result;
-    if (capacity < terrimpi_ground_vertices(terrain))
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, vertices));
+    TERRIMPI_REFUSE(capacity < terrimpi_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
 }
 
@@ -9133,17 +8859,14 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
 {
     uint32_t vertices, index_count;
     int is_floor;
-    if (!terrain || !xyz || !indices)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node > terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrain || !xyz || !indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(node > terrain->tree.node_count, TERRIMP_E_RANGE);
     is_floor = node == terrain->tree.node_count;
     vertices = is_floor ? terrimpi_floor_vertices(terrain) : terrain->vertex_stride;
     index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
-    if (xyz_capacity / 3u < vertices || index_capacity < index_count)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
+                    index_capacity < index_count, TERRIMP_E_CAPACITY);
     terrimpi_fill_mesh(terrain, node, xyz, indices);
     return TERRIMP_OK;
 }
@@ -9206,15 +8929,11 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
     terrimp_result result;
     size_t bytes, scratch_bytes;
     void *memory, *scratch;
-    if (!terrain || !terrimpi_pick_allocator(allocator, &from))
-        return TERRIMP_E_NULL;
-    result = terrimp_terrain_desc_resolve(desc, &resolved);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!terrain || !terrimpi_pick_allocator(allocator, &from), TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &resolved));
     bytes = terrimp_terrain_bytes(&resolved);
     scratch_bytes = terrimp_terrain_scratch_bytes(&resolved);
-    if (bytes == 0 || scratch_bytes == 0)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(bytes == 0 || scratch_bytes == 0, TERRIMP_E_OVERFLOW);
     memory = from.allocate(from.user, bytes);
     scratch = from.allocate(from.user, scratch_bytes);
     result = memory && scratch ? terrimp_terrain_init(&resolved, memory, bytes, &made)
