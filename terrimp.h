@@ -1863,6 +1863,10 @@ extern "C" {
         terrimp_result tried = (call); if (tried != TERRIMP_OK) return tried; \
     } while (0)
 
+/* Descriptors say with 0 that they want the default. */
+#define TERRIMPI_DEFAULT(field, value) \
+    do { if ((field) == 0) (field) = (value); } while (0)
+
 TERRIMP_API const char *terrimp_result_text(int result)
 {
     switch (result) {
@@ -2118,33 +2122,22 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
                                                        terrimp_heightfield *out)
 {
     terrimp_heightfield field;
-    terrimp_result result;
     TERRIMPI_REFUSE(in == NULL || out == NULL || in->samples == NULL, TERRIMP_E_NULL);
     field = *in;
     TERRIMPI_REFUSE(field.width < 2u || field.width > TERRIMP_MAX_DIM || field.depth < 2u ||
                     field.depth > TERRIMP_MAX_DIM || field.format < 0 ||
                     field.format >= TERRIMP_FORMAT_COUNT, TERRIMP_E_RANGE);
-    if (field.format == TERRIMP_FORMAT_DEFAULT)
-        field.format = TERRIMP_FORMAT_F32;
-    if (field.row_bytes == 0)
-        field.row_bytes = (size_t)field.width * terrimpi_sample_bytes(field.format);
-    if (field.spacing_x == 0.0f)
-        field.spacing_x = 1.0f;
-    if (field.spacing_z == 0.0f)
-        field.spacing_z = 1.0f;
-    if (field.height_scale == 0.0f)
-        field.height_scale = 1.0f;
-
-    result = terrimpi_axis_check(field.origin_x, field.spacing_x, field.width);
-    if (result == TERRIMP_OK)
-        result = terrimpi_axis_check(field.origin_z, field.spacing_z, field.depth);
-    if (result == TERRIMP_OK)
-        result = terrimpi_heights_check(&field);
-    if (result == TERRIMP_OK)
-        result = terrimpi_memory_check(&field);
-    if (result == TERRIMP_OK)
-        *out = field;
-    return result;
+    TERRIMPI_DEFAULT(field.format, TERRIMP_FORMAT_F32);
+    TERRIMPI_DEFAULT(field.row_bytes, field.width * terrimpi_sample_bytes(field.format));
+    TERRIMPI_DEFAULT(field.spacing_x, 1.0f);
+    TERRIMPI_DEFAULT(field.spacing_z, 1.0f);
+    TERRIMPI_DEFAULT(field.height_scale, 1.0f);
+    TERRIMPI_TRY(terrimpi_axis_check(field.origin_x, field.spacing_x, field.width));
+    TERRIMPI_TRY(terrimpi_axis_check(field.origin_z, field.spacing_z, field.depth));
+    TERRIMPI_TRY(terrimpi_heights_check(&field));
+    TERRIMPI_TRY(terrimpi_memory_check(&field));
+    *out = field;
+    return TERRIMP_OK;
 }
 
 /* ---- samples of a resolved field, unchecked ---- */
@@ -2331,7 +2324,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
     terrimp_heightfield f;
     terrimpi_scan scan;
     int ok = 1;
-    terrimp_result result;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(out == NULL, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0 ||
@@ -2339,10 +2331,9 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
     (void)terrimpi_mul(terrimpi_mul(cols, rows, &ok), sizeof(float), &ok);
     TERRIMPI_REFUSE(!ok, TERRIMP_E_OVERFLOW);
     scan.skip_voids = 0;
-    result = terrimpi_scan_tile(&f, x, z, cols, rows, stride, &scan);
-    if (result == TERRIMP_OK)
-        terrimpi_heightfield_tile(&f, x, z, cols, rows, stride, out);
-    return result;
+    TERRIMPI_TRY(terrimpi_scan_tile(&f, x, z, cols, rows, stride, &scan));
+    terrimpi_heightfield_tile(&f, x, z, cols, rows, stride, out);
+    return TERRIMP_OK;
 }
 
 /* The range of the world heights of a rectangle of samples, cut at the last column and row.
@@ -2767,12 +2758,10 @@ TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield 
 {
     terrimpi_quad quad;
     float u, v;
-    terrimp_result result;
     TERRIMPI_REFUSE(height == NULL, TERRIMP_E_NULL);
-    result = terrimpi_surface(field, x, z, &quad, &u, &v);
-    if (result == TERRIMP_OK)
-        *height = terrimpi_quad_height(&quad, terrimpi_quad_side(u, v), u, v);
-    return result;
+    TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
+    *height = terrimpi_quad_height(&quad, terrimpi_quad_side(u, v), u, v);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield *field, float x,
@@ -3016,8 +3005,7 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) ||
                     !terrimpi_finite3(c.up) || !terrimpi_finite(c.fov_y_rad) ||
                     !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far), TERRIMP_E_NOT_FINITE);
-    if (c.fov_y_rad == 0.0f)
-        c.fov_y_rad = 1.0471976f;
+    TERRIMPI_DEFAULT(c.fov_y_rad, 1.0471976f);
     if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
         c.up[1] = 1.0f;
     TERRIMPI_REFUSE(c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u ||
@@ -4020,11 +4008,9 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tre
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch)
 {
     uint32_t node;
-    terrimp_result result = terrimp_geomip_fit(tree, scratch);
-    for (node = 0; node < (tree ? tree->node_count : 0) && result == TERRIMP_OK; node++)
-        result = terrimp_geomip_build_node(tree, node, scratch);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_geomip_fit(tree, scratch));
+    for (node = 0; node < tree->node_count; node++)
+        TERRIMPI_TRY(terrimp_geomip_build_node(tree, node, scratch));
     return terrimp_geomip_build_finish(tree);
 }
 
@@ -4437,12 +4423,9 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
 static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
                                                 terrimp_geomip_view *view)
 {
-    if (view->rule == TERRIMP_GEOMIP_DEFAULT)
-        view->rule = TERRIMP_GEOMIP_PICTURE;
-    if (view->tolerance_px == 0.0f)
-        view->tolerance_px = 1.0f;
-    if (view->morph_ratio == 0.0f)
-        view->morph_ratio = 1.0f;
+    TERRIMPI_DEFAULT(view->rule, TERRIMP_GEOMIP_PICTURE);
+    TERRIMPI_DEFAULT(view->tolerance_px, 1.0f);
+    TERRIMPI_DEFAULT(view->morph_ratio, 1.0f);
     TERRIMPI_REFUSE(!view->distances || !view->marks || !view->draws, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(view->hysteresis < 0.0f || view->hysteresis > 1.0f, TERRIMP_E_RANGE);
@@ -4456,7 +4439,6 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
     terrimpi_mip_frame f;
     terrimp_geomip_view v;
     terrimp_camera c;
-    terrimp_result result;
     float pixel_factor;
     uint32_t level;
     TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
@@ -4479,10 +4461,11 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
     view->frame = v.frame;
     memcpy(view->distances_for, v.distances_for, sizeof v.distances_for);
     view->draws_needed = v.draws_needed;
-    result = v.draws_needed > v.draw_capacity ? TERRIMP_E_CAPACITY : TERRIMP_OK;
-    view->draw_count = result == TERRIMP_OK ? v.draws_needed : 0;
-    view->triangle_count = result == TERRIMP_OK ? v.triangle_count : 0;
-    return result;
+    view->draw_count = view->triangle_count = 0;
+    TERRIMPI_REFUSE(v.draws_needed > v.draw_capacity, TERRIMP_E_CAPACITY);
+    view->draw_count = v.draws_needed;
+    view->triangle_count = v.triangle_count;
+    return TERRIMP_OK;
 }
 
 /* ---- vertices and morphing ---- */
@@ -6788,9 +6771,7 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
     TERRIMPI_REFUSE(terrimpi_finite(distance) && !(distance > 0.0f), TERRIMP_E_RANGE);
     for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
         float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
-        terrimp_result result = terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds);
-        if (result != TERRIMP_OK)
-            return result;
+        TERRIMPI_TRY(terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds));
         if (!(seconds > 0.0f) && i == count)
             return TERRIMP_E_RANGE;
         if (i < count && to_box >= distance)
@@ -7444,11 +7425,10 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
 TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
                                                    terrimp_rect *rect)
 {
-    terrimp_result result = terrimpi_live_check(atlas, slot);
     TERRIMPI_REFUSE(!rect, TERRIMP_E_NULL);
-    if (result == TERRIMP_OK)
-        *rect = atlas->slots[slot];
-    return result;
+    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
+    *rect = atlas->slots[slot];
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
@@ -7720,14 +7700,10 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     TERRIMPI_TRY(terrimp_heightfield_resolve(&d.field, &d.field));
     TERRIMPI_REFUSE(!terrimpi_finite(d.proud) || !terrimpi_finite(d.height_low) ||
                     !terrimpi_finite(d.height_high), TERRIMP_E_NOT_FINITE);
-    if (d.chunk_quads == 0)
-        d.chunk_quads = 64;
-    if (d.triangle_budget == 0)
-        d.triangle_budget = TERRIMP_TRIANGLE_BUDGET;
-    if (d.not_proud)
-        d.proud = 0.0f;
-    else if (d.proud == 0.0f)
-        d.proud = 1.0f;
+    TERRIMPI_DEFAULT(d.chunk_quads, 64u);
+    TERRIMPI_DEFAULT(d.triangle_budget, TERRIMP_TRIANGLE_BUDGET);
+    TERRIMPI_DEFAULT(d.proud, 1.0f);
+    d.proud = d.not_proud ? 0.0f : d.proud;
     TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) || d.triangle_budget < 32u ||
                     d.triangle_budget > 400u || d.proud < 0.0f || d.proud > 1.0f ||
                     d.height_low > d.height_high, TERRIMP_E_RANGE);
@@ -8116,14 +8092,12 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     desc.triangle_budget = t->desc.triangle_budget;
     for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_tile_border(p, side, &first, &step);
-        terrimp_result result;
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        result = terrimp_border_simplify(line, count,
-                                         terrimpi_border_points(t->desc.triangle_budget),
-                                         points[side], 16, &desc.borders[side].point_count);
-        if (result != TERRIMP_OK)
-            return result;
+        TERRIMPI_TRY(terrimp_border_simplify(line, count,
+                                             terrimpi_border_points(t->desc.triangle_budget),
+                                             points[side], 16,
+                                             &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
@@ -8197,7 +8171,6 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
                                           terrimp_mesh *mesh, const terrimpi_build *build)
 {
     terrimp_raise_desc raise;
-    terrimp_result result;
     uint32_t i;
     terrimpi_fill_misses(t, p, mesh, build);
     raise.heights = build->tile;
@@ -8208,10 +8181,10 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
         build->heights[i] = mesh->vertices[i].height;
         mesh->vertices[i].height = 0.0f;
     }
-    result = terrimp_mesh_raise(&raise, mesh, build->work);
+    TERRIMPI_TRY(terrimp_mesh_raise(&raise, mesh, build->work));
     for (i = 0; i < mesh->surface_vertex_count; i++)
         mesh->vertices[i].height += build->heights[i];
-    return result;
+    return TERRIMP_OK;
 }
 
 /* The steps that a height is stored as: rounded up when meshes stand proud. */
@@ -8298,14 +8271,11 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
     terrimpi_patch p = terrimpi_patch_of(t, node);
     terrimp_mesh mesh;
     terrimpi_error error;
-    terrimp_result result;
     float rms;
     terrimpi_fill_tile(t, &p, build);
-    result = terrimpi_simplify_tile(t, &p, build, &mesh);
-    if (result == TERRIMP_OK && t->desc.proud > 0.0f)
-        result = terrimpi_raise_tile(t, &p, &mesh, build);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_simplify_tile(t, &p, build, &mesh));
+    if (t->desc.proud > 0.0f)
+        TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
     terrimpi_store_surface(t, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
     TERRIMPI_REFUSE(!terrimpi_finite(error.above) ||
@@ -8370,10 +8340,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
     high = terrain->desc.height_high;
     if (low == 0.0f && high == 0.0f) {
         const terrimp_heightfield *f = &terrain->desc.field;
-        terrimp_result result =
-            terrimpi_height_range(f, terrimpi_rect(0, 0, f->width, f->depth), 0, &low, &high);
-        if (result != TERRIMP_OK)
-            return result;
+        terrimp_rect all = terrimpi_rect(0, 0, f->width, f->depth);
+        TERRIMPI_TRY(terrimpi_height_range(f, all, 0, &low, &high));
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
     step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
@@ -8437,16 +8405,14 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
                                                  size_t bytes)
 {
     terrimpi_build build;
-    terrimp_result result;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    result = terrimpi_check_block(scratch, bytes,
-                                  terrimpi_build_layout(&terrain->desc, NULL, &build));
-    if (result == TERRIMP_OK)
-        result = terrimp_terrain_build_begin(terrain);
-    for (node = 0; result == TERRIMP_OK && node < terrain->tree.node_count; node++)
-        result = terrimp_terrain_build_node(terrain, node, scratch, bytes);
-    return result == TERRIMP_OK ? terrimp_terrain_build_finish(terrain) : result;
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimp_terrain_build_begin(terrain));
+    for (node = 0; node < terrain->tree.node_count; node++)
+        TERRIMPI_TRY(terrimp_terrain_build_node(terrain, node, scratch, bytes));
+    return terrimp_terrain_build_finish(terrain);
 }
 
 #endif /* TERRIMP_NO_BUILD */
@@ -8503,10 +8469,9 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                     terrimp_mesh_info *mesh)
 {
-    terrimp_result result = terrimpi_check_node(terrain, node, mesh);
-    if (result == TERRIMP_OK)
-        terrimpi_mesh_place(terrain, node, mesh);
-    return result;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, mesh));
+    terrimpi_mesh_place(terrain, node, mesh);
+    return TERRIMP_OK;
 }
 
 /* ---- edits ---- */
@@ -8555,12 +8520,10 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
                                                    uint32_t *nodes, uint32_t capacity,
                                                    uint32_t *count)
 {
-    terrimp_result result = terrimpi_check_touched(terrain, samples);
     uint32_t level, x, z, all = 0;
     int pass;
     TERRIMPI_REFUSE(!count, TERRIMP_E_NULL);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
     for (pass = 0; pass < 2; pass++) {
         for (level = 0; level < terrain->tree.level_count; level++) {
             /* what vertices move by hangs on the triangles of two levels above, how far down skirts
@@ -8589,17 +8552,13 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, void *scratch,
                                                    size_t bytes)
 {
-    terrimp_result result = terrimpi_check_touched(terrain, samples);
     terrimpi_build build;
     uint32_t level, x, z;
     float low, high;
-    if (result == TERRIMP_OK && terrain->baked)
-        result = TERRIMP_E_STATE;
-    if (result == TERRIMP_OK)
-        result = terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build));
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
+    TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
     TERRIMPI_TRY(terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high));
     TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
     for (level = 0; level < terrain->tree.level_count; level++) {
@@ -8608,9 +8567,7 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++) {
                 uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
-                result = terrimp_terrain_build_node(terrain, node, scratch, bytes);
-                if (result != TERRIMP_OK)
-                    return result;
+                TERRIMPI_TRY(terrimp_terrain_build_node(terrain, node, scratch, bytes));
             }
     }
     return terrimp_terrain_build_finish(terrain);
@@ -8875,10 +8832,9 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity)
 {
-    terrimp_result result = terrimpi_check_node(terrain, 0, xyz);
     size_t node, nodes;
-    if (result != TERRIMP_OK || !indices)
-        return result != TERRIMP_OK ? result : TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_node(terrain, 0, xyz));
     nodes = terrain->tree.node_count;
     if (xyz_capacity / 3u < nodes * terrain->vertex_stride + terrimpi_floor_vertices(terrain) ||
         index_capacity < nodes * terrain->index_stride + terrimpi_floor_indices(terrain))
