@@ -2659,7 +2659,8 @@ typedef struct terrimpi_quad {
 
 /* Finds the quad that holds a coordinate along one axis; 0 when it is outside. The quotient is only
    a guess where the origin is distant; the lines themselves decide. */
-static int terrimpi_locate(float origin, float spacing, uint32_t count, float at, uint32_t *quad)
+static int terrimpi_locate_along(float origin, float spacing, uint32_t count, float at,
+                                 uint32_t *quad)
 {
     float guess = (at - origin) / spacing;
     uint32_t i;
@@ -2672,6 +2673,12 @@ static int terrimpi_locate(float origin, float spacing, uint32_t count, float at
         ++i;
     *quad = i;
     return 1;
+}
+
+static int terrimpi_locate(const terrimp_heightfield *f, float x, float z, uint32_t *i, uint32_t *j)
+{
+    return terrimpi_locate_along(f->origin_x, f->spacing_x, f->width, x, i) &&
+           terrimpi_locate_along(f->origin_z, f->spacing_z, f->depth, z, j);
 }
 
 /* Fills quad; on E_VOID and E_NOT_FINITE, when it is a hole, only the place of it. */
@@ -2745,8 +2752,7 @@ static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x
     uint32_t i, j;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(!terrimpi_finite(x) || !terrimpi_finite(z), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!terrimpi_locate(f.origin_x, f.spacing_x, f.width, x, &i) ||
-                    !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, z, &j), TERRIMP_E_MISS);
+    TERRIMPI_REFUSE(!terrimpi_locate(&f, x, z, &i, &j), TERRIMP_E_MISS);
     TERRIMPI_TRY(terrimpi_quad_load(&f, i, j, quad));
     *u = terrimpi_fraction(x, quad->x0, quad->x1);
     *v = terrimpi_fraction(z, quad->z0, quad->z1);
@@ -2986,10 +2992,8 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
                     !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!(max_distance > 0.0f) ||
                     !terrimpi_ray_aim(direction, ray.way), TERRIMP_E_RANGE);
-    if (!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
-        !terrimpi_locate(f.origin_x, f.spacing_x, f.width, ray.start[0], &x) ||
-        !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, ray.start[2], &z))
-        return TERRIMP_E_MISS;
+    TERRIMPI_REFUSE(!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
+                    !terrimpi_locate(&f, ray.start[0], ray.start[2], &x, &z), TERRIMP_E_MISS);
     return terrimpi_ray_walk(&f, &ray, x, z, hit);
 }
 
@@ -6217,16 +6221,6 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
                                                                        : TERRIMP_E_NOT_FINITE;
 }
 
-static terrimp_result terrimpi_check_mesh_arrays(const terrimp_mesh *mesh,
-                                                 const terrimpi_plan *plan)
-{
-    TERRIMPI_REFUSE(!mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
-    if (mesh->vertex_capacity < plan->border + plan->inner ||
-        mesh->index_capacity < 3 * (plan->border - 2 + 2 * plan->inner))
-        return TERRIMP_E_CAPACITY;
-    return TERRIMP_OK;
-}
-
 /* Writes the inner vertices and the triangles; the border's vertices are in place. */
 static void terrimpi_emit(const terrimpi_simplifier *s, const float *exact_heights,
                           terrimp_mesh *mesh)
@@ -6284,9 +6278,11 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
         border += desc->borders[i].point_count - 1;
     TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
     plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
-    TERRIMPI_TRY(terrimpi_check_mesh_arrays(mesh, &plan));
-    if (scratch_bytes < terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget))
-        return TERRIMP_E_MEMORY;
+    TERRIMPI_REFUSE(!mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(mesh->vertex_capacity < border + plan.inner ||
+                    mesh->index_capacity < 3 * (border - 2 + 2 * plan.inner), TERRIMP_E_CAPACITY);
+    TERRIMPI_REFUSE(scratch_bytes < terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget),
+                    TERRIMP_E_MEMORY);
     TERRIMPI_REFUSE((uintptr_t)scratch % sizeof(int64_t) != 0, TERRIMP_E_ALIGN);
     terrimpi_lay_out(&s, &plan, scratch);
     s.cols = (int32_t)desc->cols;
@@ -6373,15 +6369,6 @@ static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
     return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
 }
 
-/* The polyline of one border while it is raised, in rising order whichever way the loop runs: both
-   neighbours compute the same bits. */
-typedef struct terrimpi_rise {
-    uint32_t count;
-    uint16_t vertex[TERRIMP_MAX_TILE_DIM]; /* of the mesh */
-    float raise[TERRIMP_MAX_TILE_DIM];
-    float change[TERRIMP_MAX_TILE_DIM];
-} terrimpi_rise;
-
 /* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
    rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
 static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
@@ -6398,73 +6385,61 @@ static void terrimpi_rise_sample(const float *w, float *const *change, int n, fl
     }
 }
 
-/* Goes once over the samples between points i and i + 1 of a border. */
-static void terrimpi_rise_segment(const float *samples, int32_t stride, float h0, float h1,
-                                  int32_t count, terrimpi_rise *rise, uint32_t i, int lowering)
+static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
 {
-    float *change[2], w[2];
-    int32_t k;
-    change[0] = rise->change + i;
-    change[1] = change[0] + 1;
-    for (k = 0; k <= count; k++) {
-        float sample = samples[k * stride], surface, wanted;
+    return (v->x == 0 || v->x == desc->cols - 1) && (v->z == 0 || v->z == desc->rows - 1);
+}
+
+/* Goes once over the samples of a border between vertices a and b, which are in rising order
+   whichever way the loop runs: both neighbours compute the same bits. */
+static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
+                                  uint32_t a, uint32_t b, const float *raise, float *change,
+                                  int lowering)
+{
+    const terrimp_mesh_vertex *p = mesh->vertices + a, *q = mesh->vertices + b;
+    uint32_t cols = desc->cols, stride = p->z == q->z ? 1 : cols;
+    const float *samples = desc->heights + p->z * cols + p->x;
+    int32_t k, count = p->z == q->z ? q->x - p->x : q->z - p->z;
+    float *to[2], w[2], is_free[2];
+    to[0] = change + a;
+    to[1] = change + b;
+    is_free[0] = terrimpi_is_corner(desc, p) ? 0.0f : 1.0f;
+    is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
+    for (k = 0; k <= count; k++, samples += stride) {
+        float surface, wanted;
         w[1] = (float)k / (float)count;
         w[0] = 1.0f - w[1];
-        surface = w[0] * (h0 + rise->raise[i]) + w[1] * (h1 + rise->raise[i + 1]);
-        wanted = terrimpi_wanted_raise(
-            sample - surface, sample - (w[0] * h0 + w[1] * h1),
-            (i > 0 ? w[0] : 0.0f) + (i + 2 < rise->count ? w[1] : 0.0f));
-        terrimpi_rise_sample(w, change, 2, wanted, surface - sample, lowering);
+        surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
+        wanted = terrimpi_wanted_raise(*samples - surface,
+                                       *samples - (w[0] * p->height + w[1] * q->height),
+                                       w[0] * is_free[0] + w[1] * is_free[1]);
+        terrimpi_rise_sample(w, to, 2, wanted, surface - *samples, lowering);
     }
 }
 
-/* Raises the inner points of one border. */
-static void terrimpi_raise_border(const float *samples, int32_t stride, int along_x,
-                                  const terrimp_mesh_vertex *vertices, terrimpi_rise *rise)
-{
-    int pass;
-    uint32_t i;
-    for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
-        for (i = 0; i < rise->count; i++)
-            rise->change[i] = pass ? TERRIMPI_HUGE : 0.0f;
-        for (i = 0; i + 1 < rise->count; i++) {
-            const terrimp_mesh_vertex *p = vertices + rise->vertex[i];
-            const terrimp_mesh_vertex *q = vertices + rise->vertex[i + 1];
-            int32_t at = along_x ? p->x : p->z, end = along_x ? q->x : q->z;
-            terrimpi_rise_segment(samples + at * stride, stride, p->height, q->height, end - at,
-                                  rise, i, pass > 0);
-        }
-        for (i = 1; i + 1 < rise->count; i++)
-            rise->raise[i] = pass ? terrimpi_max(0.0f, rise->raise[i] - rise->change[i])
-                                  : rise->change[i];
-    }
-}
-
-/* Raises the loop's vertices, border by border. */
+/* Raises the loop's vertices, border by border, but for the corners. */
 static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                float *raise)
+                                float *raise, float *change)
 {
-    int32_t cols = (int32_t)desc->cols, rows = (int32_t)desc->rows, side;
+    const terrimp_mesh_vertex *v = mesh->vertices;
     uint32_t n = mesh->border_vertex_count, first = 0, last, i;
-    for (side = 0; side < 4; side++) {
+    int side, pass;
+    for (side = 0; side < 4; side++, first = last) {
         int along_x = side & 1, backwards = side >= 2;
-        int32_t offset = side == 1 ? (rows - 1) * cols : side == 2 ? cols - 1 : 0;
-        const terrimp_mesh_vertex *v = mesh->vertices;
-        terrimpi_rise rise;
         for (last = first + 1; last < n && (along_x ? v[last].z == v[first].z
                                                     : v[last].x == v[first].x); last++) {
         }
         if (side < 3)
             last--; /* the loop's end closes the last side itself */
-        rise.count = last - first + 1;
-        for (i = 0; i < rise.count; i++) {
-            rise.vertex[i] = (uint16_t)((backwards ? last - i : first + i) % n);
-            rise.raise[i] = 0.0f;
+        for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
+            for (i = first; i <= last; i++)
+                change[i % n] = pass ? TERRIMPI_HUGE : 0.0f;
+            for (i = first; i < last; i++)
+                terrimpi_rise_segment(desc, mesh, backwards ? (i + 1) % n : i,
+                                      backwards ? i : (i + 1) % n, raise, change, pass > 0);
+            for (i = first + 1; i < last; i++)
+                raise[i] = pass ? terrimpi_max(0.0f, raise[i] - change[i]) : change[i];
         }
-        terrimpi_raise_border(desc->heights + offset, along_x ? 1 : cols, along_x, v, &rise);
-        for (i = 0; i < rise.count; i++)
-            raise[rise.vertex[i]] = rise.raise[i];
-        first = last;
     }
 }
 
@@ -6538,7 +6513,7 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     change = work + n;
     for (i = 0; i < n; i++)
         work[i] = 0.0f;
-    terrimpi_raise_loop(desc, mesh, work);
+    terrimpi_raise_loop(desc, mesh, work, change);
     for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
         for (i = 0; i < n; i++)
             change[i] = pass ? TERRIMPI_HUGE : 0.0f;
@@ -8365,10 +8340,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
     TERRIMPI_REFUSE(!terrain->begun, TERRIMP_E_STATE);
     terrimpi_build_layout(&terrain->desc, scratch, &build);
     TERRIMPI_TRY(terrimp_geomip_build_node(&terrain->tree, node, build.row));
-    if (node < terrain->tree.level_first[1] &&
-        (terrain->tree.nodes[node].low < terrain->sample_low ||
-         terrain->tree.nodes[node].high > terrain->sample_high))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(node < terrain->tree.level_first[1] &&
+                    (terrain->tree.nodes[node].low < terrain->sample_low ||
+                     terrain->tree.nodes[node].high > terrain->sample_high), TERRIMP_E_RANGE);
     return terrimpi_build_mesh(terrain, node, &build);
 }
 
@@ -8708,8 +8682,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     TERRIMPI_REFUSE(!terrain || !indices, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     quads = terrain->desc.chunk_quads;
-    if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index,
+                    TERRIMP_E_CAPACITY);
     terrimp_pattern_fill(quads, TERRIMP_FORM_LIST, indices, capacity);
     strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
     for (i = 1; i <= strips; i++) {
