@@ -1124,7 +1124,7 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
    placed     out, how many were placed; may be NULL
    Errors     E_NULL; E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all
               fit: those that did are flagged PLACED
-   Cost       O(n log n + n * shelves), no allocation
+   Cost       O(n^1.5 + n * shelves), no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
 TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_pack_item *items,
@@ -2731,10 +2731,11 @@ static void terrimpi_quad_slope(const terrimpi_quad *quad, int side, float slope
     slope[1] = along_z / (quad->z1 - quad->z0);
 }
 
-/* The upward unit normal of a slope; 0 when the slope is beyond float. */
-static int terrimpi_slope_normal(const float slope[2], float normal[3])
+/* The upward unit normal of a triangle; 0 when its slope is beyond float. */
+static int terrimpi_quad_normal(const terrimpi_quad *quad, int side, float normal[3])
 {
-    float n[3];
+    float n[3], slope[2];
+    terrimpi_quad_slope(quad, side, slope);
     n[0] = -slope[0];
     n[1] = 1.0f;
     n[2] = -slope[1];
@@ -2774,11 +2775,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield 
                                                       float z, float normal[3])
 {
     terrimpi_quad quad;
-    float u, v, slope[2];
+    float u, v;
     TERRIMPI_REFUSE(normal == NULL, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
-    terrimpi_quad_slope(&quad, terrimpi_quad_side(u, v), slope);
-    return terrimpi_slope_normal(slope, normal) ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
+    return terrimpi_quad_normal(&quad, terrimpi_quad_side(u, v), normal) ? TERRIMP_OK
+                                                                         : TERRIMP_E_NOT_FINITE;
 }
 
 /* ---- the ray ----
@@ -2803,14 +2804,14 @@ typedef struct terrimpi_ray {
     float length;   /* [wu] from start to the end */
 } terrimpi_ray;
 
-/* Narrows [*t0, *t1] to where origin + t * way is within [low, high]; 0 when nothing is left. */
-static int terrimpi_ray_clip(float origin, float way, float low, float high, float *t0, float *t1)
+/* Narrows [*t0, *t1] to where start + t * way is within [low, high]; 0 when nothing is left. */
+static int terrimpi_ray_clip(float start, float way, float low, float high, float *t0, float *t1)
 {
     float a, b;
     if (way == 0.0f)
-        return origin >= low && origin <= high;
-    a = ((way > 0.0f ? low : high) - origin) / way;
-    b = ((way > 0.0f ? high : low) - origin) / way;
+        return start >= low && start <= high;
+    a = ((way > 0.0f ? low : high) - start) / way;
+    b = ((way > 0.0f ? high : low) - start) / way;
     *t0 = terrimpi_max(*t0, a);
     *t1 = terrimpi_min(*t1, b);
     return *t0 <= *t1;
@@ -2916,26 +2917,15 @@ static float terrimpi_ray_leave(float start, float way, float low, float high)
     return ((way > 0.0f ? high : low) - start) / way;
 }
 
-/* Moves one index a step along the way; 0 when that leaves the field. */
-static int terrimpi_ray_step(uint32_t *index, uint32_t last, float way)
-{
-    if (way > 0.0f ? *index == last : *index == 0u)
-        return 0;
-    *index = way > 0.0f ? *index + 1u : *index - 1u;
-    return 1;
-}
-
 static void terrimpi_ray_report(const terrimpi_ray *ray, const terrimpi_quad *quad, int side,
                                 float t, terrimp_ray_hit *hit)
 {
     terrimpi_ray_point point = terrimpi_ray_at(ray, quad, t);
-    float slope[2];
     hit->distance = ray->before + t;
     hit->position[0] = terrimpi_clamp(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
     hit->position[1] = terrimpi_quad_height(quad, side, point.u, point.v);
     hit->position[2] = terrimpi_clamp(ray->start[2] + t * ray->way[2], quad->z0, quad->z1);
-    terrimpi_quad_slope(quad, side, slope);
-    if (!terrimpi_slope_normal(slope, hit->normal)) { /* steeper than float can say */
+    if (!terrimpi_quad_normal(quad, side, hit->normal)) { /* steeper than float can say */
         hit->normal[0] = hit->normal[2] = 0.0f;
         hit->normal[1] = 1.0f;
     }
@@ -2955,6 +2945,7 @@ static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const 
         float next = terrimpi_min(leave_x, leave_z), t;
         int along_x = leave_x <= leave_z, ends = !(next < ray->length), side;
         float way = along_x ? ray->way[0] : ray->way[2];
+        uint32_t *index = along_x ? &x : &z, last = (along_x ? field->width : field->depth) - 2u;
         terrimpi_ray_point leave =
             terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, enter.t, ray->length));
         float *across = along_x ? &leave.u : &leave.v;
@@ -2969,9 +2960,9 @@ static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const 
             }
             return TERRIMP_OK;
         }
-        if (ends || !terrimpi_ray_step(along_x ? &x : &z,
-                                       (along_x ? field->width : field->depth) - 2u, way))
+        if (ends || *index == (way > 0.0f ? last : 0u))
             return TERRIMP_E_MISS;
+        *index = way > 0.0f ? *index + 1u : *index - 1u;
         *across = 1.0f - *across;
         enter = leave;
         loaded = terrimpi_quad_load(field, x, z, &quad);
@@ -3138,17 +3129,6 @@ static void terrimpi_box_corner(const terrimp_box *box, int i, const float point
         corner[k] = ((i >> k) & 1 ? box->max[k] : box->min[k]) - point[k];
 }
 
-static terrimp_result terrimpi_check_box(const terrimp_box *box)
-{
-    int i;
-    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) ||
-                    !terrimpi_finite3(box->max), TERRIMP_E_NOT_FINITE);
-    for (i = 0; i < 3; i++)
-        if (box->min[i] > box->max[i])
-            return TERRIMP_E_RANGE;
-    return TERRIMP_OK;
-}
-
 /* Fits the sides and clip distances of a capture to points, with a hair's breadth more, so that
    rounding leaves none outside and a flat box has a volume. Returns 0 when the cosine between
    forward and the way to one of them is not above `least`. */
@@ -3191,8 +3171,10 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     float corners[8][3];
     int i;
     TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_box(box));
-    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
+                    !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
+                    box->min[2] > box->max[2], TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
     for (i = 0; i < 3; i++) {
         c.eye[i] = eye[i];
@@ -4514,14 +4496,6 @@ static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_
                                     terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
 }
 
-/* Place on the grid of the k-th vertex of a coarse border. */
-static void terrimpi_mip_border_vertex(uint32_t quads, int side, uint32_t k, uint32_t at[2])
-{
-    int along_x = terrimpi_along_x(side);
-    at[!along_x] = 2u * (k + 1u);
-    at[along_x] = side & 1 ? quads : 0;
-}
-
 /* Writes one position, and moves on to the next. */
 static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z,
                                   float **xyz)
@@ -4538,20 +4512,19 @@ static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint3
 static void terrimpi_mip_fill_borders(const terrimp_geomip *t, terrimpi_mip_place p, float *xyz,
                                       terrimp_geomip_vertex *vertices)
 {
-    uint32_t quads = t->chunk_quads, k, at[2];
+    uint32_t quads = t->chunk_quads, along;
     int side;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        for (k = 0; k < terrimpi_mip_border_vertices(quads); k++) {
-            uint32_t x, z;
-            terrimpi_mip_border_vertex(quads, side, k, at);
-            x = terrimpi_mip_col(t, p.level, p.x * quads + at[0]);
-            z = terrimpi_mip_row(t, p.level, p.z * quads + at[1]);
+        for (along = 2; along < quads; along += 2u) {
+            uint32_t across = side & 1 ? quads : 0u;
+            uint32_t i = p.x * quads + (terrimpi_along_x(side) ? along : across);
+            uint32_t j = p.z * quads + (terrimpi_along_x(side) ? across : along);
+            uint32_t x = terrimpi_mip_col(t, p.level, i), z = terrimpi_mip_row(t, p.level, j);
             terrimpi_mip_position(t, p.level + 1u, x, z, &xyz);
             if (!vertices)
                 continue;
             vertices->height = terrimpi_mip_stand(t, p.level + 1u, x, z);
-            vertices->move =
-                terrimpi_mip_move(t, p.level, p.x * quads + at[0], p.z * quads + at[1], 1);
+            vertices->move = terrimpi_mip_move(t, p.level, i, j, 1);
             vertices->beside[0] = vertices->beside[1] = 0.0f;
             vertices++;
         }
@@ -6895,10 +6868,28 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
     return TERRIMP_OK;
 }
 
-/* Whether item a comes after item b: lower, or as high and narrower, or later. */
-static int terrimpi_pack_after(const terrimp_pack_item *items, uint32_t a, uint32_t b)
+/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
+   extra memory. */
+static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
+                          int (*after)(const void *items, uint32_t a, uint32_t b))
 {
-    const terrimp_rect *p = &items[a].rect, *q = &items[b].rect;
+    uint32_t i, k, gap;
+    for (gap = 1; gap < count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < count; i++) {
+            uint32_t moved = order[i];
+            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
+                order[k] = order[k - gap];
+            order[k] = moved;
+        }
+}
+
+/* Whether item a comes after item b: lower, or as high and narrower, or later. */
+static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
+{
+    const terrimp_pack_item *item = (const terrimp_pack_item *)items;
+    const terrimp_rect *p = &item[a].rect, *q = &item[b].rect;
     if (p->height != q->height)
         return p->height < q->height;
     if (p->width != q->width)
@@ -6906,36 +6897,12 @@ static int terrimpi_pack_after(const terrimp_pack_item *items, uint32_t a, uint3
     return a > b;
 }
 
-/* Restores the heap below `root`: the item that comes last is on top. */
-static void terrimpi_pack_sift(const terrimp_pack_item *items, uint32_t *order, uint32_t root,
-                               uint32_t count)
-{
-    uint32_t moved = order[root], child;
-    while ((child = 2u * root + 1u) < count) {
-        if (child + 1u < count && terrimpi_pack_after(items, order[child + 1u], order[child]))
-            child++;
-        if (!terrimpi_pack_after(items, order[child], moved))
-            break;
-        order[root] = order[child];
-        root = child;
-    }
-    order[root] = moved;
-}
-
-/* Heapsort: no recursion, no extra memory, the same order everywhere. */
 static void terrimpi_pack_sort(const terrimp_pack_item *items, uint32_t *order, uint32_t count)
 {
     uint32_t i;
     for (i = 0; i < count; i++)
         order[i] = i;
-    for (i = count / 2u; i-- > 0;)
-        terrimpi_pack_sift(items, order, i, count);
-    for (i = count; i-- > 1u;) {
-        uint32_t last = order[0];
-        order[0] = order[i];
-        order[i] = last;
-        terrimpi_pack_sift(items, order, 0, i);
-    }
+    terrimpi_sort(order, count, items, terrimpi_pack_after);
 }
 
 /* Reduces a rectangle that is larger than the atlas, keeping its shape; returns whether it was. */
@@ -7449,26 +7416,23 @@ typedef struct terrimpi_live_search {
     float best_cost;
 } terrimpi_live_search;
 
-/* Lists the slots in use from left to right (Shell's sort: no recursion, no extra memory). */
+static int terrimpi_live_right_of(const void *slots, uint32_t a, uint32_t b)
+{
+    return ((const terrimp_rect *)slots)[a].x > ((const terrimp_rect *)slots)[b].x;
+}
+
+/* Lists the slots in use from left to right. */
 static void terrimpi_live_list(terrimpi_live_search *s)
 {
     const terrimp_rect *slots = s->atlas->slots;
-    uint32_t i, k, gap;
+    uint32_t i;
     s->count = s->widest = 0;
     for (i = 0; i < s->atlas->slot_end; i++)
         if (slots[i].width > 0) {
             s->by_x[s->count++] = i;
             s->widest = terrimpi_max_u32(s->widest, slots[i].width + s->atlas->desc.padding);
         }
-    for (gap = 1; gap < s->count / 3u;)
-        gap = 3u * gap + 1u;
-    for (; gap > 0; gap /= 3u)
-        for (i = gap; i < s->count; i++) {
-            uint32_t moved = s->by_x[i];
-            for (k = i; k >= gap && slots[s->by_x[k - gap]].x > slots[moved].x; k -= gap)
-                s->by_x[k] = s->by_x[k - gap];
-            s->by_x[k] = moved;
-        }
+    terrimpi_sort(s->by_x, s->count, slots, terrimpi_live_right_of);
 }
 
 /* The first in the list of slots that may reach over a column. */
@@ -8573,19 +8537,13 @@ static uint32_t terrimpi_strip_count(uint32_t chunk_quads)
     return count;
 }
 
-/* Offset of a neighbour: 0 to 7 run around the node, row by row. */
-static void terrimpi_direction(uint32_t direction, int *dx, int *dz)
+/* The quads of a neighbour that lie within `strip` quads of the node, along one axis on which it is
+   before (0), beside (1) or behind (2) the node. */
+static void terrimpi_strip_span(uint32_t place, uint32_t quads, uint32_t strip, uint32_t *from,
+                                uint32_t *to)
 {
-    uint32_t cell = direction < 4u ? direction : direction + 1u; /* of 3 x 3, without the middle */
-    *dx = (int)(cell % 3u) - 1;
-    *dz = (int)(cell / 3u) - 1;
-}
-
-/* The quads of a neighbour that lie within `strip` quads of the node, along one axis. */
-static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t *from, uint32_t *to)
-{
-    *from = d < 0 ? quads - strip : 0;
-    *to = d > 0 ? strip : quads;
+    *from = place == 0 ? quads - strip : 0;
+    *to = place == 2u ? strip : quads;
 }
 
 /* Pattern 0 is the whole node, as geomip pattern 0; then come, for each strip width but the whole,
@@ -8595,7 +8553,6 @@ static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
     uint32_t width, strip = 0, direction = (wanted - 1u) % TERRIMPI_DIRECTIONS, k;
-    int dx, dz;
     p.x0 = p.z0 = p.first_index = 0;
     p.x1 = p.z1 = quads;
     p.index_count = terrimpi_mip_indices(quads, TERRIMP_FORM_LIST, 0);
@@ -8612,10 +8569,10 @@ static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
             return p;
     }
     for (k = 0; k <= direction; k++) {
+        uint32_t cell = k < 4u ? k : k + 1u; /* of 3 x 3, row by row, without the middle */
         p.first_index += p.index_count;
-        terrimpi_direction(k, &dx, &dz);
-        terrimpi_strip_span(dx, quads, strip, &p.x0, &p.x1);
-        terrimpi_strip_span(dz, quads, strip, &p.z0, &p.z1);
+        terrimpi_strip_span(cell % 3u, quads, strip, &p.x0, &p.x1);
+        terrimpi_strip_span(cell / 3u, quads, strip, &p.z0, &p.z1);
         p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
         p.index_count = 3u * p.triangle_count;
     }
