@@ -3723,14 +3723,14 @@ static void terrimpi_mip_sweep(const terrimp_geomip *t, uint32_t level, uint32_t
    row behind the one before; scratch keeps the loads of the rows that they are at. */
 static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *scratch)
 {
-    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), i, j, sweep;
+    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), j, sweep;
     float *fit = t->fits + t->fit_first[level];
     for (j = 0; j < rows + TERRIMPI_MIP_SWEEPS; j++) {
         if (j < rows) {
             memcpy(scratch + j % (TERRIMPI_MIP_SWEEPS + 1u) * cols, fit + j * cols,
                    cols * sizeof *fit);
-            for (i = 0; i < cols; i++)
-                fit[j * cols + i] = terrimpi_sample(&t->field, i << level, j << level);
+            terrimpi_heightfield_tile(&t->field, 0, j << level, cols, 1, 1u << level,
+                                      fit + j * cols);
         }
         for (sweep = 1; sweep <= TERRIMPI_MIP_SWEEPS; sweep++)
             if (j > sweep && j - sweep + 1u < rows)
@@ -7486,14 +7486,11 @@ static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
     }
 }
 
-/* Searches at the corners of holes and slots; where these are very many, of every n-th.
-   Returns 0 when all such places hold a slot that stays. */
-static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
+/* Searches at the corners of holes and slots; where these are very many, of every n-th. */
+static void terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
 {
-    const float none = 3e38f;
     const terrimp_live_atlas *atlas = s->atlas;
     uint32_t i, step = 1u + (atlas->hole_count + atlas->slot_count) / 512u;
-    s->best_cost = none;
     s->best = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
     terrimpi_live_list(s);
     for (i = 0; i < atlas->hole_count; i += step)
@@ -7502,21 +7499,17 @@ static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint3
         terrimp_rect slot = terrimpi_live_padded(atlas, s->by_x[i]);
         terrimpi_live_try(s, &slot);
     }
-    return s->best_cost < none;
 }
 
 /* The same for a mere handle: the slot that costs least. */
-static int terrimpi_live_cheapest_slot(terrimpi_live_search *s)
+static void terrimpi_live_cheapest_slot(terrimpi_live_search *s)
 {
-    const float none = 3e38f;
     uint32_t i;
-    s->best_cost = none;
     for (i = 0; i < s->atlas->slot_end; i++)
         if (s->atlas->slots[i].width > 0 && s->costs[i] >= 0.0f && s->costs[i] < s->best_cost) {
             s->best_cost = s->costs[i];
             s->best = terrimpi_live_padded(s->atlas, i);
         }
-    return s->best_cost < none;
 }
 
 /* Frees the slots that overlap a place; returns how many. */
@@ -7538,6 +7531,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count)
 {
+    const float none = 3e38f;
     terrimpi_live_search search;
     int fits;
     TERRIMPI_REFUSE(!atlas || !costs || !victims || !count, TERRIMP_E_NULL);
@@ -7552,9 +7546,12 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
     search.atlas = atlas;
     search.costs = costs;
     search.by_x = victims;
-    if (!(fits ? terrimpi_live_cheapest_slot(&search)
-               : terrimpi_live_cheapest(&search, width, height)))
-        return TERRIMP_E_CAPACITY;
+    search.best_cost = none;
+    if (fits)
+        terrimpi_live_cheapest_slot(&search);
+    else
+        terrimpi_live_cheapest(&search, width, height);
+    TERRIMPI_REFUSE(!(search.best_cost < none), TERRIMP_E_CAPACITY);
     *count = terrimpi_live_clear(atlas, &search.best, victims);
     return TERRIMP_OK;
 }
@@ -7961,16 +7958,13 @@ static float terrimpi_line_mean(const float *line, uint32_t k, uint32_t level, u
 static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_patch *p, int side,
                                      float *line)
 {
-    const terrimp_heightfield *f = &t->desc.field;
-    uint32_t i, x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
+    int along_x = terrimpi_along_x(side);
+    uint32_t x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
     uint32_t z = side == TERRIMP_BORDER_Z1 ? p->z + p->span_z : p->z;
-    if (terrimpi_along_x(side)) {
-        terrimpi_heightfield_tile(f, x, z, p->span_x + 1u, 1, 1, line);
-        return p->span_x;
-    }
-    for (i = 0; i <= p->span_z; i++)
-        line[i] = terrimpi_sample(f, x, z + i);
-    return p->span_z;
+    uint32_t span = along_x ? p->span_x : p->span_z;
+    terrimpi_heightfield_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
+                              along_x ? 1u : span + 1u, 1, line);
+    return span;
 }
 
 /* Where a border stands in a tile: its first place, and the way to the next; returns the places. */
@@ -8432,10 +8426,13 @@ static void terrimpi_touched_along(uint32_t first, uint32_t count, uint32_t marg
     *to = terrimpi_min_u32(last / side, nodes - 1u);
 }
 
+/* What vertices move by hangs on the triangles of two levels above; errors, and how far down skirts
+   reach, on what a finer neighbour draws next to the border. */
 static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const terrimp_rect *rect,
-                                               uint32_t level, uint32_t margin)
+                                               uint32_t level, int morph)
 {
     uint32_t side = t->desc.chunk_quads << level;
+    uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
     terrimpi_touched out;
     terrimpi_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
                            t->tree.level_x[level], &out.x0, &out.x1);
@@ -8459,27 +8456,19 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
                                                    uint32_t *count)
 {
     uint32_t level, x, z, all = 0;
-    int pass;
     TERRIMPI_REFUSE(!count, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
-    for (pass = 0; pass < 2; pass++) {
-        for (level = 0; level < terrain->tree.level_count; level++) {
-            /* what vertices move by hangs on the triangles of two levels above, how far down skirts
-               reach on what a finer neighbour draws next to the border */
-            uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
-            terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, margin);
-            if (pass == 0)
-                all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
-            else
-                for (z = in.z0; z <= in.z1; z++)
-                    for (x = in.x0; x <= in.x1; x++)
-                        *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
-        }
-        *count = all;
-        if (!nodes)
-            return TERRIMP_OK;
-        if (all > capacity)
-            return TERRIMP_E_CAPACITY;
+    for (level = 0; level < terrain->tree.level_count; level++) {
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
+        all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
+    }
+    *count = all;
+    TERRIMPI_REFUSE(nodes && all > capacity, TERRIMP_E_CAPACITY);
+    for (level = 0; nodes && level < terrain->tree.level_count; level++) {
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++)
+                *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
     }
     return TERRIMP_OK;
 }
@@ -8500,13 +8489,11 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
     TERRIMPI_TRY(terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high));
     TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
     for (level = 0; level < terrain->tree.level_count; level++) {
-        /* errors are also against what a finer neighbour draws next to the border */
-        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, (1u << level) / 2u);
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, 0);
         for (z = in.z0; z <= in.z1; z++)
-            for (x = in.x0; x <= in.x1; x++) {
-                uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
-                TERRIMPI_TRY(terrimp_terrain_build_node(terrain, node, scratch, bytes));
-            }
+            for (x = in.x0; x <= in.x1; x++)
+                TERRIMPI_TRY(terrimp_terrain_build_node(
+                    terrain, terrimpi_mip_number(&terrain->tree, level, x, z), scratch, bytes));
     }
     return terrimp_terrain_build_finish(terrain);
 }
