@@ -248,9 +248,8 @@ typedef struct terrimp_heightfield {
 } terrimp_heightfield;
 
 /* Every function below takes the descriptor as it was filled in, or as resolve wrote it. The
-   surface that the queries speak of is the full-resolution one: column x lies at
-   origin_x + x * spacing_x, row z at origin_z + z * spacing_z, both rounded to float, and each quad
-   is the two triangles of CONVENTIONS. A quad with a void at one of its four corners is a hole. */
+   surface of the queries is the full-resolution one: columns and rows rounded to float, each quad
+   the two triangles of CONVENTIONS. A quad with a void at one of its four corners is a hole. */
 
 /* Checks a descriptor and fills in its defaults.
 
@@ -418,9 +417,7 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
    height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-
-   Errors     those of terrimp_camera_resolve
-   Source     de Boer 2000, equations 1a to 1c: K = C * tolerance */
+   Errors: those of terrimp_camera_resolve. Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
 /* The six planes of a viewing volume. A point p is inside plane i when
@@ -996,11 +993,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   const terrimp_rect *slot, uint32_t atlas_width,
                                                   uint32_t atlas_height, float matrix[16]);
 
-/* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices.
-
-   xyz        [count][3] world positions
-   stq        [count][3] out; may not overlap xyz
-   Errors     E_NULL */
+/* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
+   xyz [count][3], world positions, to stq [count][3], which may not overlap it. Errors: E_NULL. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
                                                        size_t count, float *stq);
 
@@ -1359,8 +1353,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
-/* Ends the building: boxes and errors of parents hold those of their children.
-   Errors: E_NULL; E_STATE when a node has not been built. */
+/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_NULL;
+   E_STATE when a node has not been built. */
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain);
 
 /* Begins, builds all nodes, one after the other, and finishes. Errors: those of the three above. */
@@ -4799,23 +4793,15 @@ typedef struct terrimpi_walk {
 static terrimpi_walk terrimpi_walk_edge(int32_t x0, int32_t z0, int32_t x1, int32_t z1)
 {
     terrimpi_walk w;
-    int32_t run;
-    if (z0 > z1) {
-        int32_t t = x0;
-        x0 = x1;
-        x1 = t;
-        t = z0;
-        z0 = z1;
-        z1 = t;
-    }
+    int32_t run = (x1 - x0) * (1 << 20);
+    if (z0 > z1)
+        return terrimpi_walk_edge(x1, z1, x0, z0);
     w.z = z0;
     w.end = z1;
     w.at = x0 * (1 << 20) + (1 << 20) - 1;
     w.slope = 0;
-    if (z1 > z0) {
-        run = (x1 - x0) * (1 << 20);
+    if (z1 > z0)
         w.slope = (run < 0 ? run - (z1 - z0) + 1 : run) / (z1 - z0); /* rounds down */
-    }
     return w;
 }
 
@@ -6057,8 +6043,7 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
         for (round = 0; round < 8 && terrimpi_improve_border(heights, kept, wanted); round++) {
         }
     }
-    for (i = 0; i < wanted; i++)
-        points[i] = kept[i];
+    memcpy(points, kept, wanted * sizeof *points);
     *point_count = wanted;
     return TERRIMP_OK;
 }
@@ -6834,8 +6819,7 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
     shelves->padding = padding;
     shelves->items = items;
     shelves->capacity = capacity;
-    shelves->count = 0;
-    shelves->top = 0;
+    shelves->count = shelves->top = 0;
     return TERRIMP_OK;
 }
 
@@ -6967,8 +6951,7 @@ static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_p
                              float scale)
 {
     uint32_t i;
-    shelves->count = 0;
-    shelves->top = 0;
+    shelves->count = shelves->top = 0;
     for (i = 0; i < count; i++) {
         uint32_t k = order[i];
         terrimp_rect *rect = &slots[k].rect[atlas];
