@@ -1895,6 +1895,16 @@ static int terrimpi_finite3(const float value[3])
     return terrimpi_finite(value[0]) && terrimpi_finite(value[1]) && terrimpi_finite(value[2]);
 }
 
+static int terrimpi_finite2(float a, float b) { return terrimpi_finite(a) && terrimpi_finite(b); }
+
+/* NaN is not within anything. */
+static int terrimpi_within(float v, float low, float high) { return v >= low && v <= high; }
+
+static int terrimpi_within_u32(uint32_t v, uint32_t low, uint32_t high)
+{
+    return v >= low && v <= high;
+}
+
 static float terrimpi_min(float a, float b) { return a < b ? a : b; }
 static float terrimpi_max(float a, float b) { return a > b ? a : b; }
 static float terrimpi_abs(float a) { return a < 0.0f ? -a : a; }
@@ -2091,13 +2101,11 @@ static terrimp_result terrimpi_axis_check(float origin, float spacing, uint32_t 
 
 static terrimp_result terrimpi_heights_check(const terrimp_heightfield *field)
 {
-    float steps = field->format == TERRIMP_FORMAT_F32 ? 0.0f : 65535.0f;
-    float height = field->height_scale * steps;
-    TERRIMPI_REFUSE(!terrimpi_finite(field->height_scale) ||
-                    !terrimpi_finite(field->height_offset), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(field->height_scale > 0.0f) ||
-                    !terrimpi_finite(field->height_offset + height) ||
-                    !terrimpi_finite(field->height_offset - height), TERRIMP_E_RANGE);
+    float scale = field->height_scale, offset = field->height_offset;
+    float height = scale * (field->format == TERRIMP_FORMAT_F32 ? 0.0f : 65535.0f);
+    TERRIMPI_REFUSE(!terrimpi_finite2(scale, offset), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(scale > 0.0f) || !terrimpi_finite2(offset + height, offset - height),
+                    TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -2112,14 +2120,19 @@ static terrimp_result terrimpi_memory_check(const terrimp_heightfield *field)
     return (uintptr_t)field->samples % size != 0 ? TERRIMP_E_ALIGN : TERRIMP_OK;
 }
 
+static int terrimpi_size_ok(uint32_t width, uint32_t depth)
+{
+    return terrimpi_within_u32(width, 2u, TERRIMP_MAX_DIM) &&
+           terrimpi_within_u32(depth, 2u, TERRIMP_MAX_DIM);
+}
+
 TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield *in,
                                                        terrimp_heightfield *out)
 {
     terrimp_heightfield field;
     TERRIMPI_REFUSE(in == NULL || out == NULL || in->samples == NULL, TERRIMP_E_NULL);
     field = *in;
-    TERRIMPI_REFUSE(field.width < 2u || field.width > TERRIMP_MAX_DIM || field.depth < 2u ||
-                    field.depth > TERRIMP_MAX_DIM || field.format < 0 ||
+    TERRIMPI_REFUSE(!terrimpi_size_ok(field.width, field.depth) || field.format < 0 ||
                     field.format >= TERRIMP_FORMAT_COUNT, TERRIMP_E_RANGE);
     TERRIMPI_DEFAULT(field.format, TERRIMP_FORMAT_F32);
     TERRIMPI_DEFAULT(field.row_bytes, field.width * terrimpi_sample_bytes(field.format));
@@ -2416,9 +2429,7 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
 TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, uint32_t depth)
 {
     terrimpi_fill fill;
-    if (width < 2u || width > TERRIMP_MAX_DIM || depth < 2u || depth > TERRIMP_MAX_DIM)
-        return 0;
-    return terrimpi_fill_layout(width, depth, NULL, &fill);
+    return terrimpi_size_ok(width, depth) ? terrimpi_fill_layout(width, depth, NULL, &fill) : 0;
 }
 
 /* Brings row z of the field into the ring and marks its voids. */
@@ -2746,7 +2757,7 @@ static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x
     terrimp_heightfield f;
     uint32_t i, j;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
-    TERRIMPI_REFUSE(!terrimpi_finite(x) || !terrimpi_finite(z), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!terrimpi_locate(&f, x, z, &i, &j), TERRIMP_E_MISS);
     TERRIMPI_TRY(terrimpi_quad_load(&f, i, j, quad));
     *u = terrimpi_fraction(x, quad->x0, quad->x1);
@@ -2992,15 +3003,15 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!camera || !out, TERRIMP_E_NULL);
     c = *camera;
     TERRIMPI_REFUSE(!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) ||
-                    !terrimpi_finite3(c.up) || !terrimpi_finite(c.fov_y_rad) ||
-                    !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far), TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite3(c.up) || !terrimpi_finite2(c.z_near, c.z_far) ||
+                    !terrimpi_finite(c.fov_y_rad), TERRIMP_E_NOT_FINITE);
     TERRIMPI_DEFAULT(c.fov_y_rad, 1.0471976f);
     if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
         c.up[1] = 1.0f;
-    TERRIMPI_REFUSE(c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u ||
-                    c.width_px > 65536u || c.height_px < 1u || c.height_px > 65536u ||
-                    c.z_near <= 0.0f || c.z_far <= c.z_near ||
-                    !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
+                    !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
+                    !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
+                    c.z_far <= c.z_near || !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
     terrimpi_basis(c.forward, c.up, right);
     *out = c;
     return TERRIMP_OK;
@@ -4028,12 +4039,11 @@ static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, floa
                                          float morph_ratio)
 {
     TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(tolerance_px) ||
-                    !terrimpi_finite(morph_ratio), TERRIMP_E_NOT_FINITE);
-    return rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || tolerance_px < 0.01f ||
-                   tolerance_px > 1000.0f || morph_ratio < 1.0f || morph_ratio > 4.0f
-               ? TERRIMP_E_RANGE
-               : TERRIMP_OK;
+    TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+                    !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
+                    !terrimpi_within(morph_ratio, 1.0f, 4.0f), TERRIMP_E_RANGE);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
@@ -4408,7 +4418,7 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
     TERRIMPI_DEFAULT(view->morph_ratio, 1.0f);
     TERRIMPI_REFUSE(!view->distances || !view->marks || !view->draws, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(view->hysteresis < 0.0f || view->hysteresis > 1.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_within(view->hysteresis, 0.0f, 1.0f), TERRIMP_E_RANGE);
     return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
 }
 
@@ -6108,7 +6118,8 @@ static int terrimpi_all_finite(const float *values, uint32_t count)
 
 static int terrimpi_tile_size_ok(uint32_t cols, uint32_t rows)
 {
-    return cols >= 2 && rows >= 2 && cols <= TERRIMP_MAX_TILE_DIM && rows <= TERRIMP_MAX_TILE_DIM;
+    return terrimpi_within_u32(cols, 2, TERRIMP_MAX_TILE_DIM) &&
+           terrimpi_within_u32(rows, 2, TERRIMP_MAX_TILE_DIM);
 }
 
 TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
@@ -6503,7 +6514,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
     density = pixel_factor * texels_per_px;
     width = (capture->tan_right - capture->tan_left) * density;
     height = (capture->tan_up - capture->tan_down) * density;
-    TERRIMPI_REFUSE(!terrimpi_finite(width) || !terrimpi_finite(height), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_finite2(width, height), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) ||
                     !(height > 0.0f) || largest < 1u || largest > 65536u ||
                     smallest > largest, TERRIMP_E_RANGE);
@@ -6657,8 +6668,7 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
 {
     float move[3], move_length, distance, sine;
     TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
-    TERRIMPI_REFUSE(!terrimpi_finite(error) ||
-                    !terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
@@ -6683,9 +6693,9 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
 {
     float sine;
     TERRIMPI_REFUSE(!seconds, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(distance) || !terrimpi_finite(max_angle_rad) ||
-                    !terrimpi_finite(speed), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(distance < 0.0f || max_angle_rad < 0.0f || max_angle_rad > 3.1415928f ||
+    TERRIMPI_REFUSE(!terrimpi_finite2(distance, max_angle_rad) || !terrimpi_finite(speed),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(distance < 0.0f || !terrimpi_within(max_angle_rad, 0.0f, 3.1415928f) ||
                     !(speed > 0.0f), TERRIMP_E_RANGE);
     sine = max_angle_rad < 1.5707963f ? TERRIMP_SINF(max_angle_rad) : 1.0f;
     *seconds = distance * sine / speed;
@@ -6812,8 +6822,8 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
                                                 terrimp_shelf *items, uint32_t capacity)
 {
     TERRIMPI_REFUSE(!shelves || !items, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(width < 1u || width > 65536u || height < 1u || height > 65536u ||
-                    padding > 65536u || capacity < 1u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) || padding > 65536u ||
+                    !terrimpi_within_u32(height, 1u, 65536u) || capacity < 1u, TERRIMP_E_RANGE);
     shelves->width = width;
     shelves->height = height;
     shelves->padding = padding;
@@ -7171,9 +7181,9 @@ static terrimp_rect terrimpi_live_padded(const terrimp_live_atlas *atlas, uint32
 
 static int terrimpi_live_desc_ok(const terrimp_live_atlas_desc *desc)
 {
-    return desc->width >= 1u && desc->width <= 32768u && desc->height >= 1u &&
-           desc->height <= 32768u && desc->padding <= 1024u && desc->max_slots >= 1u &&
-           desc->max_slots <= 65536u;
+    return terrimpi_within_u32(desc->width, 1u, 32768u) && desc->padding <= 1024u &&
+           terrimpi_within_u32(desc->height, 1u, 32768u) &&
+           terrimpi_within_u32(desc->max_slots, 1u, 65536u);
 }
 
 TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
@@ -7362,8 +7372,8 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
     uint32_t i, best_x = 0, best_y = 0;
     TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || width > 65536u || height < 1u ||
-                    height > 65536u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
         uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
@@ -7617,15 +7627,16 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     TERRIMPI_REFUSE(!desc || !out, TERRIMP_E_NULL);
     d = *desc;
     TERRIMPI_TRY(terrimp_heightfield_resolve(&d.field, &d.field));
-    TERRIMPI_REFUSE(!terrimpi_finite(d.proud) || !terrimpi_finite(d.height_low) ||
-                    !terrimpi_finite(d.height_high), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_finite(d.proud) || !terrimpi_finite2(d.height_low, d.height_high),
+                    TERRIMP_E_NOT_FINITE);
     TERRIMPI_DEFAULT(d.chunk_quads, 64u);
     TERRIMPI_DEFAULT(d.triangle_budget, TERRIMP_TRIANGLE_BUDGET);
     TERRIMPI_DEFAULT(d.proud, 1.0f);
     d.proud = d.not_proud ? 0.0f : d.proud;
-    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) || d.triangle_budget < 32u ||
-                    d.triangle_budget > 400u || d.proud < 0.0f || d.proud > 1.0f ||
-                    d.height_low > d.height_high, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) ||
+                    !terrimpi_within_u32(d.triangle_budget, 32u, 400u) ||
+                    !terrimpi_within(d.proud, 0.0f, 1.0f) || d.height_low > d.height_high,
+                    TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8194,8 +8205,7 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
         TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
     terrimpi_store_surface(t, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
-    TERRIMPI_REFUSE(!terrimpi_finite(error.above) ||
-                    !terrimpi_finite(error.below), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_finite2(error.above, error.below), TERRIMP_E_NOT_FINITE);
     terrimpi_store_mesh(t, node, &mesh, &error, rms);
     return TERRIMP_OK;
 }
@@ -8979,11 +8989,6 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 #endif /* TERRIMP_NO_BUILD */
 
 /* ---- validation: nothing of a block is used before it has been looked at ---- */
-
-static int terrimpi_within(float value, float low, float high)
-{
-    return terrimpi_finite(value) && value >= low && value <= high;
-}
 
 /* Fills in a terrain from a header in this machine's byte order: all but the arrays and the field's
    samples. Returns 0 when the header is wrong or speaks of more bytes than there are. */
