@@ -358,7 +358,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield 
 TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield *field, float x,
                                                       float z, float normal[3]);
 
-/* Where a ray meets the surface. */
 typedef struct terrimp_ray_hit {
     float distance;    /* [wu] from the ray's origin */
     float position[3]; /* [wu] on the surface */
@@ -399,11 +398,8 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal.
-
-   camera     in
-   out        may be camera
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera.
+   Errors: E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
@@ -511,24 +507,21 @@ enum {
     TERRIMP_PATTERN_COUNT = 16 /* bit i of a pattern: side i is coarse */
 };
 
-/* How the index buffer is made. */
-typedef enum terrimp_form {
+typedef enum terrimp_form { /* of the index buffer */
     TERRIMP_FORM_LIST = 0, /* triangle lists */
     TERRIMP_FORM_STRIP,    /* each pattern is one triangle strip */
-    TERRIMP_FORM_STITCHED, /* lists for morphing: odd vertices of coarse borders are kept, on the
-                              neighbour's edge, and triangles of no area close what rounding could
-                              open. To leave a vertex out changes the triangles beside it, which
-                              shows where these have not morphed: the one pop that morphing cannot
-                              prevent otherwise. But a rasteriser was seen to leave one pixel in
-                              ten million open beside such triangles; LIST leaves none */
+    TERRIMP_FORM_STITCHED, /* lists for morphing without any pop: odd vertices of coarse borders
+                              are kept, on the neighbour's edge, and triangles of no area close what
+                              rounding could open (a rasteriser was seen to leave one pixel in ten
+                              million open beside them). LIST leaves none open, but to leave a
+                              vertex out shows where the triangles beside it have not morphed */
     TERRIMP_FORM_FITTED,   /* lists for trees with fits, morphing or not: coarse borders stand on
                               vertices of their own, at the neighbour's heights */
     TERRIMP_FORM_COUNT
 } terrimp_form;
 
-/* Where a pattern stands in the index buffer. */
 typedef struct terrimp_pattern {
-    uint32_t first_index, index_count;
+    uint32_t first_index, index_count; /* in the index buffer */
     uint32_t triangle_count; /* without those of no area */
 } terrimp_pattern;
 
@@ -583,11 +576,10 @@ typedef struct terrimp_geomip {
     uint32_t level_x[TERRIMP_GEOMIP_LEVELS], level_z[TERRIMP_GEOMIP_LEVELS];
     uint32_t scratch_count;     /* floats that building a node needs */
     terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
-    float *fits;                /* [fit_count] the caller's; NULL: vertices of all levels stand on
-                                   samples. Otherwise those above level 0 get the heights that fit
-                                   the samples best in the least-squares sense, which want
-                                   FORM_FITTED: pictures are 1 to 2 dB closer to the full mesh,
-                                   BOUND needs half the triangles */
+    float *fits;                /* [fit_count] the caller's: vertices above level 0 get the heights
+                                   that fit the samples best by least squares, which want
+                                   FORM_FITTED; pictures are 1 to 2 dB closer to the full mesh,
+                                   BOUND needs half the triangles. NULL: all stand on samples */
     uint32_t fit_count;         /* a third of the samples; 0: there is but one level */
     uint32_t fit_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* private: where a level's fits begin */
 } terrimp_geomip;
@@ -602,12 +594,12 @@ TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
 
 #ifndef TERRIMP_NO_BUILD
 
-/* Fills in the fits, if there are any; before any node is built.
+/* Fills in the fits, if there are any; before any node is built: the L2 projection on linear finite
+   elements, as in any book on these.
 
    scratch    [scratch_count]
    Errors     E_NULL
-   Cost       O(samples); about 0.35 s for 4097 x 4097
-   Source     the L2 projection on linear finite elements, as in any book on these */
+   Cost       O(samples); about 0.35 s for 4097 x 4097 */
 TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch);
 
 /* Finds heights, error and rms of one node, from samples and fits alone: different nodes may be
@@ -644,7 +636,6 @@ typedef enum terrimp_geomip_rule {
     TERRIMP_GEOMIP_RULE_COUNT
 } terrimp_geomip_rule;
 
-/* A node to draw. */
 typedef struct terrimp_geomip_draw {
     uint32_t node, level;
     uint32_t x, z;       /* column and row among the nodes of its level */
@@ -778,8 +769,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
 #define TERRIMP_MAX_TRIANGLES 8192u
 
 /* Inner points that terrimp_border_simplify keeps when it is told 0. At 85 triangles over 64 x 64
-   quads of real terrain, 4, 5, 6 and 7 of them gave max errors of 13.7, 12.7, 12.8 and 12.8 %, and
-   rms 2.75, 2.71, 2.71 and 2.74 %; numbers driven by each border's own error gained nothing. */
+   quads of real terrain 4, 5, 6 and 7 of them gave max errors of 13.7, 12.7, 12.8 and 12.8 %. */
 #define TERRIMP_BORDER_POINTS 5u
 
 #ifndef TERRIMP_NO_BUILD
@@ -805,7 +795,6 @@ enum {
     TERRIMP_BORDER_COUNT
 };
 
-/* What terrimp_simplify works on. */
 typedef struct terrimp_simplify_desc {
     const float *heights; /* (required) [rows][cols] of the tile, packed, finite [wu] */
     uint32_t cols;        /* (required) samples along x [Limits: 2..TERRIMP_MAX_TILE_DIM] */
@@ -862,10 +851,8 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
                                                    terrimp_border_point *points,
                                                    uint32_t capacity, uint32_t *point_count);
 
-/* Bytes of scratch memory that terrimp_simplify needs, or 0 when a number is outside its limits.
-
-   cols, rows       samples of the tile [Limits: 2..TERRIMP_MAX_TILE_DIM]
-   triangle_budget  as in the desc; 0 -> TERRIMP_TRIANGLE_BUDGET */
+/* Bytes of scratch memory that terrimp_simplify needs for such a desc; 0 when a number is outside
+   its limits. */
 TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
                                                   uint32_t triangle_budget);
 
@@ -922,7 +909,6 @@ TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, floa
 
 /* --- standing proud (Hess 6.1) --- */
 
-/* How far a mesh is to be raised. */
 typedef struct terrimp_raise_desc {
     const float *heights; /* (required) [rows][cols] of the tile that the mesh was made from */
     uint32_t cols;        /* (required) as then */
@@ -1098,8 +1084,7 @@ typedef struct terrimp_shelves {
 } terrimp_shelves;
 
 /* Empties an atlas. The array stays the caller's and outlives the shelves.
-
-   Errors     E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536 */
+   Errors: E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
 TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity);
@@ -1140,11 +1125,8 @@ typedef struct terrimp_atlas_pair {
     uint32_t repacks; /* so far */
 } terrimp_atlas_pair;
 
-/* Two empty atlases.
-
-   items      [2 * capacity] the caller's
-   Errors     those of terrimp_shelves_init
-   Source     Hess 2010, section 4.3 */
+/* Two empty atlases (Hess 2010, section 4.3); items [2 * capacity] is the caller's.
+   Errors: those of terrimp_shelves_init. */
 TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t width,
                                              uint32_t height, terrimp_shelf *items,
                                              uint32_t capacity);
