@@ -1978,16 +1978,20 @@ static void terrimpi_cross(const float a[3], const float b[3], float out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+static float terrimpi_largest(const float v[3])
+{
+    return terrimpi_max(terrimpi_abs(v[0]), terrimpi_max(terrimpi_abs(v[1]), terrimpi_abs(v[2])));
+}
+
 /* Length without overflow or underflow: the largest component is taken out first. */
 static float terrimpi_length(const float v[3])
 {
-    float x = terrimpi_abs(v[0]), y = terrimpi_abs(v[1]), z = terrimpi_abs(v[2]);
-    float largest = terrimpi_max(x, terrimpi_max(y, z));
+    float largest = terrimpi_largest(v), x, y, z;
     if (!(largest > 0.0f))
         return 0.0f;
-    x /= largest;
-    y /= largest;
-    z /= largest;
+    x = v[0] / largest;
+    y = v[1] / largest;
+    z = v[2] / largest;
     return largest * TERRIMP_SQRTF(x * x + y * y + z * z);
 }
 
@@ -2223,7 +2227,8 @@ static void terrimpi_heightfield_tile(const terrimp_heightfield *field, uint32_t
 
 /* The result of a look at every sample of a tile. */
 typedef struct terrimpi_scan {
-    int skip_voids;  /* given: voids count as nothing, and low > high if there is nothing else */
+    int skip_voids;  /* given: voids are but counted, and low > high if there is nothing else */
+    size_t voids;
     float low, high; /* raw range */
     uint32_t x, z;   /* the first bad sample, if the scan fails */
 } terrimpi_scan;
@@ -2235,6 +2240,7 @@ static terrimp_result terrimpi_scan_values(const terrimp_heightfield *field, con
     uint32_t i;
     for (i = 0; i < count; ++i) {
         if (terrimpi_is_void(field, raw[i])) {
+            scan->voids++;
             if (scan->skip_voids)
                 continue;
             *bad = i;
@@ -2262,6 +2268,7 @@ static terrimp_result terrimpi_scan_tile(const terrimp_heightfield *field, uint3
     terrimp_result result;
     scan->low = TERRIMPI_FLOAT_MAX;
     scan->high = -TERRIMPI_FLOAT_MAX;
+    scan->voids = 0;
     cols = cols < most ? cols : most;
     for (r = 0; r < rows; ++r) {
         row = terrimpi_step(z, last_z, r, stride);
@@ -2587,20 +2594,15 @@ static void terrimpi_fill_fine(const terrimp_heightfield *field, const terrimpi_
     }
 }
 
-/* Reads the field into level 1; returns the number of voids. */
-static size_t terrimpi_fill_read(const terrimp_heightfield *field, const terrimpi_fill *fill)
+/* Reads the field into level 1. */
+static void terrimpi_fill_read(const terrimp_heightfield *field, const terrimpi_fill *fill)
 {
-    size_t voids = 0;
-    uint32_t x, z;
+    uint32_t z;
     for (z = 0; z < field->depth; ++z) {
-        const uint8_t *known = fill->level[0].known + terrimpi_fill_row(fill, 0, z);
         terrimpi_fill_load(field, fill, z);
-        for (x = 0; x < field->width; ++x)
-            voids += !known[x];
         if ((z & 1u) || z == field->depth - 1u)
             terrimpi_fill_pull(fill, 1, z / 2u);
     }
-    return voids;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfield *field,
@@ -2611,7 +2613,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     terrimp_heightfield f;
     terrimpi_fill fill;
     terrimpi_scan scan;
-    size_t needed, voids = 0;
+    size_t needed;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(samples == NULL || scratch == NULL, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(samples != f.samples, TERRIMP_E_RANGE);
@@ -2625,14 +2627,13 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
     fill.low = scan.low;
     fill.high = scan.high;
-    if (f.has_no_data)
-        voids = terrimpi_fill_read(&f, &fill);
-    if (voids > 0) {
+    if (scan.voids > 0) {
+        terrimpi_fill_read(&f, &fill);
         terrimpi_fill_coarse(&fill);
         terrimpi_fill_fine(&f, &fill, (char *)samples);
     }
     if (filled_count != NULL)
-        *filled_count = voids;
+        *filled_count = scan.voids;
     return TERRIMP_OK;
 }
 
@@ -2808,9 +2809,7 @@ static int terrimpi_ray_clip(float start, float way, float low, float high, floa
    largest component is 1. */
 static int terrimpi_ray_aim(const float direction[3], float way[3])
 {
-    float largest = terrimpi_max(terrimpi_abs(direction[0]),
-                                 terrimpi_max(terrimpi_abs(direction[1]),
-                                              terrimpi_abs(direction[2])));
+    float largest = terrimpi_largest(direction);
     if (!(largest > 0.0f))
         return 0;
     way[0] = direction[0] / largest;
@@ -3249,6 +3248,11 @@ static int terrimpi_mip_quads_fit(uint32_t quads)
     return quads >= 4u && quads <= 128u && quads % 2u == 0;
 }
 
+static int terrimpi_mip_form_fits(uint32_t quads, int form)
+{
+    return terrimpi_mip_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
+}
+
 static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
 {
     uint32_t most = TERRIMPI_MIP_COLUMN;
@@ -3266,7 +3270,7 @@ static uint32_t terrimpi_mip_border_vertices(uint32_t quads)
 TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form)
 {
     uint32_t grid = (chunk_quads + 1u) * (chunk_quads + 1u);
-    if (!terrimpi_mip_quads_fit(chunk_quads) || form < 0 || form >= (int)TERRIMP_FORM_COUNT)
+    if (!terrimpi_mip_form_fits(chunk_quads, form))
         return 0;
     return form == TERRIMP_FORM_FITTED
                ? grid + 4u * terrimpi_mip_border_vertices(chunk_quads) : grid;
@@ -3307,8 +3311,8 @@ TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, 
 {
     uint32_t i, first = 0;
     TERRIMPI_REFUSE(!found, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(chunk_quads) || pattern >= TERRIMP_PATTERN_COUNT ||
-                    form < 0 || form >= (int)TERRIMP_FORM_COUNT, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_mip_form_fits(chunk_quads, form) || pattern >= TERRIMP_PATTERN_COUNT,
+                    TERRIMP_E_RANGE);
     for (i = 0; i < pattern; i++)
         first += terrimpi_mip_indices(chunk_quads, form, i);
     found->first_index = first;
@@ -8548,9 +8552,8 @@ static uint32_t terrimpi_strip_pattern(uint32_t quads, uint32_t width, uint32_t 
 }
 
 /* Writes the triangles of a rectangle of quads in columns of 14 quads, row by row within a column,
-   so that a vertex cache of 16 entries still holds the row above. Returns the end. */
-static uint16_t *terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p,
-                                     uint32_t row_vertices)
+   so that a vertex cache of 16 entries still holds the row above. */
+static void terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p, uint32_t row_vertices)
 {
     uint32_t column, x, z;
     for (column = p->x0; column < p->x1; column += 14u)
@@ -8564,7 +8567,6 @@ static uint16_t *terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p,
                 *out++ = (uint16_t)(b + 1u);
                 *out++ = (uint16_t)(a + 1u);
             }
-    return out;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terrain,
