@@ -759,14 +759,9 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
 
 /* ==== Simplifier ========================================================= >>simplifier */
 
-/* Largest number of samples along one side of a tile that the simplifier takes. */
-#define TERRIMP_MAX_TILE_DIM 257u
-
-/* Triangles of a coarse mesh when the desc says 0: under 1 % of the 8192 of 64 x 64 quads. */
-#define TERRIMP_TRIANGLE_BUDGET 85u
-
-/* Largest number of surface triangles of a coarse mesh; every index fits 16 bits. */
-#define TERRIMP_MAX_TRIANGLES 8192u
+#define TERRIMP_MAX_TILE_DIM 257u    /* samples along one side of a tile at most */
+#define TERRIMP_TRIANGLE_BUDGET 85u  /* of a coarse mesh if the desc says 0: 1 % of 64 x 64 quads */
+#define TERRIMP_MAX_TRIANGLES 8192u  /* of a surface at most; every index fits 16 bits */
 
 /* Inner points that terrimp_border_simplify keeps when it is told 0. At 85 triangles over 64 x 64
    quads of real terrain 4, 5, 6 and 7 of them gave max errors of 13.7, 12.7, 12.8 and 12.8 %. */
@@ -1925,6 +1920,7 @@ static size_t terrimpi_add(size_t a, size_t b, int *ok)
     return a + b;
 }
 
+#define TERRIMPI_FLOAT_MAX 3.402823466e38f
 #define TERRIMPI_ALIGN 8u /* of blocks of memory: pointers, and the simplifier's 64-bit sums */
 
 /* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
@@ -2052,8 +2048,6 @@ static void terrimpi_widen(float *low, float *high, float slope)
 
    A raw value is a sample as stored, converted to float: exact for all formats. Voids are told by
    raw values; two different raw values may well share one world height. */
-
-#define TERRIMPI_FLOAT_MAX 3.402823466e38f
 
 static float terrimpi_clamp(float value, float low, float high)
 {
@@ -4652,9 +4646,6 @@ static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwar
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
 #define TERRIMPI_STEPS 2047
 
-/* A border height that is further out than this counts as this: keeps all sums within 64 bits. */
-#define TERRIMPI_MAX_STEPS 1048576.0f
-
 /* Tenths of vertices inside the start mesh for each one inside the final mesh. More are better and
    slower: 20 gives rms 2.83 %, 30 gives 2.70 %, 40 gives 2.64 % in 1.15 times the time. */
 #define TERRIMPI_START_TENTHS 35
@@ -4667,19 +4658,11 @@ static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwar
    a worse rms, 8 a worse max. */
 #define TERRIMPI_INSERT_SHARE 6
 
-/* Rounds of flips and moves on the final mesh. */
-#define TERRIMPI_ROUNDS 4
-
-/* A move goes so many samples at most. */
-#define TERRIMPI_MOVE_LIMIT 8.0f
-
-/* Only a gain of more than rounding counts as a gain. */
-#define TERRIMPI_GAIN 0.9999f
-
-/* Most triangles round a vertex that is moved or removed. */
-#define TERRIMPI_MAX_DEGREE 16
-
-#define TERRIMPI_HUGE 3.0e38f
+#define TERRIMPI_ROUNDS 4             /* of flips and moves on the final mesh */
+#define TERRIMPI_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
+#define TERRIMPI_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
+#define TERRIMPI_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
+#define TERRIMPI_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
 typedef struct terrimpi_row_sum {
@@ -5137,7 +5120,7 @@ static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
     if (!(error > 0.0f))
         return 0;
     length = TERRIMP_SQRTF(dx * dx + dz * dz);
-    if (!(length < TERRIMPI_HUGE))
+    if (!(length < TERRIMPI_FLOAT_MAX))
         return 0;
     if (length > TERRIMPI_MOVE_LIMIT) {
         dx *= TERRIMPI_MOVE_LIMIT / length;
@@ -5308,12 +5291,12 @@ static void terrimpi_price(terrimpi_simplifier *s, int32_t v)
 {
     uint32_t known[TERRIMPI_MAX_DEGREE];
     int32_t fan[TERRIMPI_MAX_DEGREE], fans = 0, i, k;
-    float miss[TERRIMPI_MAX_DEGREE], best = TERRIMPI_HUGE;
+    float miss[TERRIMPI_MAX_DEGREE], best = TERRIMPI_FLOAT_MAX;
     terrimpi_ring ring;
     terrimpi_find_ring(s, v, &ring);
     s->stale[v] = 0;
     s->target[v] = -1;
-    s->cost[v] = TERRIMPI_HUGE;
+    s->cost[v] = TERRIMPI_FLOAT_MAX;
     memset(known, 0, sizeof known);
     for (k = 0; k < ring.count; k++) { /* sort the fans by what they miss at v itself */
         float m = terrimpi_fan_miss(s, v, &ring, k);
@@ -5974,7 +5957,7 @@ static int terrimpi_improve_border(const float *heights, terrimp_border_point *p
     for (i = 1; i + 1 < count; i++) {
         terrimp_border_point *p = points + i;
         int32_t at, best = p->at;
-        float ref = p->height, least = TERRIMPI_HUGE;
+        float ref = p->height, least = TERRIMPI_FLOAT_MAX;
         int32_t end = (p->at + p[1].at) / 2;
         for (at = (p[-1].at + p->at) / 2 + 1; at <= end; at++) {
             terrimpi_parabola error = terrimpi_point_error(heights, p, at, ref);
@@ -6388,7 +6371,7 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
             last--; /* the loop's end closes the last side itself */
         for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
             for (i = first; i <= last; i++)
-                change[i % n] = pass ? TERRIMPI_HUGE : 0.0f;
+                change[i % n] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
             for (i = first; i < last; i++)
                 terrimpi_rise_segment(desc, mesh, backwards ? (i + 1) % n : i,
                                       backwards ? i : (i + 1) % n, raise, change, pass > 0);
@@ -6471,7 +6454,7 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     terrimpi_raise_loop(desc, mesh, work, change);
     for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
         for (i = 0; i < n; i++)
-            change[i] = pass ? TERRIMPI_HUGE : 0.0f;
+            change[i] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
         for (i = 0; i < mesh->surface_index_count; i += 3)
             terrimpi_rise_triangle(desc->heights, (int32_t)desc->cols, mesh, mesh->indices + i,
                                    work, change, pass > 0);
@@ -7510,7 +7493,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count)
 {
-    const float none = 3e38f;
     terrimpi_live_search search;
     int fits;
     TERRIMPI_REFUSE(!atlas || !costs || !victims || !count, TERRIMP_E_NULL);
@@ -7525,12 +7507,12 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
     search.atlas = atlas;
     search.costs = costs;
     search.by_x = victims;
-    search.best_cost = none;
+    search.best_cost = TERRIMPI_FLOAT_MAX;
     if (fits)
         terrimpi_live_cheapest_slot(&search);
     else
         terrimpi_live_cheapest(&search, width, height);
-    TERRIMPI_REFUSE(!(search.best_cost < none), TERRIMP_E_CAPACITY);
+    TERRIMPI_REFUSE(!(search.best_cost < TERRIMPI_FLOAT_MAX), TERRIMP_E_CAPACITY);
     *count = terrimpi_live_clear(atlas, &search.best, victims);
     return TERRIMP_OK;
 }
