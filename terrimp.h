@@ -885,7 +885,8 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 /* --- skirts (Hess 4.2) --- */
 
 /* Appends the lower skirt: a wall from the border down to one height, facing outwards. It fills
-   the gap to a neighbour of another level.
+   the gap to a neighbour of another level. Each skirt has as many vertices as the loop, and two
+   triangles for each of them.
 
    mesh    in: a surface, perhaps with skirts; out: the same and the wall
    height  [wu] the bottom, as a rule the node's least height; a border vertex that lies lower
