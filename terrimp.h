@@ -913,12 +913,11 @@ typedef struct terrimp_raise_desc {
 } terrimp_raise_desc;
 
 /* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
-   surface but for rounding, except beside vertices that may not be raised. Corners stay where they
-   are, since four tiles share them; a sample whose weight
+   surface but for rounding, except beside vertices that may not be raised: a sample whose weight
    hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
-   Border vertices follow from the samples of their border alone, so that neighbours still meet.
-   Starts from every vertex raised by the largest shortfall round it and lowers them together as
-   far as the samples let it.
+   Corners stay where they are, since four tiles share them; border vertices follow from the samples
+   of their border alone, so that neighbours still meet. Starts from every vertex raised by the
+   largest shortfall round it and lowers them together as far as the samples let it.
 
    desc    how far
    mesh    in: a mesh of that tile without skirts; out: heights and errors
@@ -1830,9 +1829,11 @@ extern "C" {
 /* What most functions begin with: an error is returned when a condition holds; or is passed on. */
 #define TERRIMPI_REFUSE(condition, error) \
     do { if (condition) return (error); } while (0)
-#define TERRIMPI_TRY(call)                                                      \
-    do {                                                                        \
-        terrimp_result tried = (call); if (tried != TERRIMP_OK) return tried; \
+#define TERRIMPI_TRY(call)             \
+    do {                               \
+        terrimp_result tried = (call); \
+        if (tried != TERRIMP_OK)       \
+            return tried;              \
     } while (0)
 
 /* Descriptors say with 0 that they want the default. */
