@@ -4773,16 +4773,16 @@ typedef struct terrimpi_walk {
 
 static terrimpi_walk terrimpi_walk_edge(int32_t x0, int32_t z0, int32_t x1, int32_t z1)
 {
+    int upwards = z0 > z1;
+    int32_t rows = upwards ? z0 - z1 : z1 - z0, x = upwards ? x1 : x0;
+    int32_t run = (upwards ? x0 - x1 : x1 - x0) * (1 << 20);
     terrimpi_walk w;
-    int32_t run = (x1 - x0) * (1 << 20);
-    if (z0 > z1)
-        return terrimpi_walk_edge(x1, z1, x0, z0);
-    w.z = z0;
-    w.end = z1;
-    w.at = x0 * (1 << 20) + (1 << 20) - 1;
+    w.z = upwards ? z1 : z0;
+    w.end = w.z + rows;
+    w.at = x * (1 << 20) + (1 << 20) - 1;
     w.slope = 0;
-    if (z1 > z0)
-        w.slope = (run < 0 ? run - (z1 - z0) + 1 : run) / (z1 - z0); /* rounds down */
+    if (rows > 0)
+        w.slope = (run < 0 ? run - rows + 1 : run) / rows; /* rounds down */
     return w;
 }
 
