@@ -2677,8 +2677,7 @@ static terrimp_result terrimpi_quad_load(const terrimp_heightfield *field, uint3
     quad->z1 = terrimpi_line(field->origin_z, field->spacing_z, z + 1u);
     for (i = 0; i < 4u; ++i) {
         float raw = terrimpi_raw(field, x + (i & 1u), z + (i >> 1));
-        if (terrimpi_is_void(field, raw))
-            return TERRIMP_E_VOID;
+        TERRIMPI_REFUSE(terrimpi_is_void(field, raw), TERRIMP_E_VOID);
         quad->h[i] = terrimpi_world_height(field, raw);
         none += 0.0f * quad->h[i];
     }
@@ -2942,8 +2941,7 @@ static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const 
             }
             return TERRIMP_OK;
         }
-        if (ends || *index == (way > 0.0f ? last : 0u))
-            return TERRIMP_E_MISS;
+        TERRIMPI_REFUSE(ends || *index == (way > 0.0f ? last : 0u), TERRIMP_E_MISS);
         *index = way > 0.0f ? *index + 1u : *index - 1u;
         *across = 1.0f - *across;
         enter = leave;
@@ -6011,8 +6009,7 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
     TERRIMPI_REFUSE(count < 2 || count > TERRIMP_MAX_TILE_DIM ||
                     inner_limit > TERRIMP_MAX_TILE_DIM, TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
-        if (!terrimpi_finite(heights[i]))
-            return TERRIMP_E_NOT_FINITE;
+        TERRIMPI_REFUSE(!terrimpi_finite(heights[i]), TERRIMP_E_NOT_FINITE);
         kept[i].at = (uint16_t)i;
         kept[i].height = heights[i];
     }
@@ -6128,10 +6125,8 @@ static terrimp_result terrimpi_check_border(const terrimp_border *border, uint32
                     border->points[0].at != 0 ||
                     border->points[border->point_count - 1].at != samples - 1, TERRIMP_E_RANGE);
     for (i = 0; i < border->point_count; i++) {
-        if (!terrimpi_finite(border->points[i].height))
-            return TERRIMP_E_NOT_FINITE;
-        if (i > 0 && border->points[i].at <= border->points[i - 1].at)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(!terrimpi_finite(border->points[i].height), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(i > 0 && border->points[i].at <= border->points[i - 1].at, TERRIMP_E_RANGE);
     }
     return TERRIMP_OK;
 }
@@ -6435,8 +6430,7 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
         if (mesh->vertices[i].x >= desc->cols || mesh->vertices[i].z >= desc->rows)
             return TERRIMP_E_RANGE;
     for (i = 0; i < mesh->surface_index_count; i++)
-        if (mesh->indices[i] >= mesh->surface_vertex_count)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(mesh->indices[i] >= mesh->surface_vertex_count, TERRIMP_E_RANGE);
     return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
                                                                        : TERRIMP_E_NOT_FINITE;
 }
@@ -6686,8 +6680,7 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
     for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
         float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
         TERRIMPI_TRY(terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds));
-        if (!(seconds > 0.0f) && i == count)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(!(seconds > 0.0f) && i == count, TERRIMP_E_RANGE);
         if (i < count && to_box >= distance)
             rate += 1.0f / seconds;
     }
@@ -6753,8 +6746,7 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
     TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
     for (i = 0; i < index_count; i++)
-        if (indices[i] >= vertex_count)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
     first = TERRIMPI_FLOAT_MAX;
     last = 0.0f;
     for (i = 0; i < vertex_count; i++) {
@@ -6889,8 +6881,7 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_p
     uint32_t i, done = 0;
     TERRIMPI_REFUSE(!shelves || !shelves->items || (count && (!items || !order)), TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
-        if (items[i].rect.width < 1u || items[i].rect.height < 1u)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(items[i].rect.width < 1u || items[i].rect.height < 1u, TERRIMP_E_RANGE);
     for (i = 0; i < count; i++)
         items[i].flags =
             terrimpi_pack_reduce(shelves, &items[i].rect) ? (uint32_t)TERRIMP_PACK_SCALED : 0u;
@@ -7982,7 +7973,7 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     float line[129];
     terrimp_simplify_desc desc;
     terrimpi_squeeze squeeze;
-    int side;
+    int side, even;
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
@@ -8005,9 +7996,8 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     mesh->indices = build->indices;
     mesh->vertex_capacity = build->vertex_capacity;
     mesh->index_capacity = build->index_capacity;
-    return terrimpi_simplify(&desc,
-                             (p->span_x | p->span_z) % (1u << p->level) ? &squeeze : NULL,
-                             build->rest, build->rest_bytes, mesh);
+    even = (p->span_x | p->span_z) % (1u << p->level) == 0;
+    return terrimpi_simplify(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
@@ -8281,8 +8271,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
-        if (terrain->meshes[node].vertex_count == 0)
-            return TERRIMP_E_STATE;
+        TERRIMPI_REFUSE(terrain->meshes[node].vertex_count == 0, TERRIMP_E_STATE);
     terrimp_geomip_build_finish(tree);
     terrain->mesh_triangle_count = 0;
     for (node = 0; node < tree->node_count; node++) {
