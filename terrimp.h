@@ -7694,14 +7694,12 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
-    column = terrimpi_min_u32(column, t->desc.field.width - 1u);
-    return terrimpi_line(t->desc.field.origin_x, t->desc.field.spacing_x, column);
+    return terrimpi_mip_x(&t->tree, 0, column);
 }
 
 static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
 {
-    row = terrimpi_min_u32(row, t->desc.field.depth - 1u);
-    return terrimpi_line(t->desc.field.origin_z, t->desc.field.spacing_z, row);
+    return terrimpi_mip_z(&t->tree, 0, row);
 }
 
 /* The height that a number of steps stands for. */
