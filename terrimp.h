@@ -248,9 +248,8 @@ typedef struct terrimp_heightfield {
 } terrimp_heightfield;
 
 /* Every function below takes the descriptor as it was filled in, or as resolve wrote it. The
-   surface that the queries speak of is the full-resolution one: column x lies at
-   origin_x + x * spacing_x, row z at origin_z + z * spacing_z, both rounded to float, and each quad
-   is the two triangles of CONVENTIONS. A quad with a void at one of its four corners is a hole. */
+   surface of the queries is the full-resolution one: columns and rows rounded to float, each quad
+   the two triangles of CONVENTIONS. A quad with a void at one of its four corners is a hole. */
 
 /* Checks a descriptor and fills in its defaults.
 
@@ -359,7 +358,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield 
 TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield *field, float x,
                                                       float z, float normal[3]);
 
-/* Where a ray meets the surface. */
 typedef struct terrimp_ray_hit {
     float distance;    /* [wu] from the ray's origin */
     float position[3]; /* [wu] on the surface */
@@ -400,11 +398,8 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal.
-
-   camera     in
-   out        may be camera
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera.
+   Errors: E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
@@ -418,9 +413,7 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
    height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-
-   Errors     those of terrimp_camera_resolve
-   Source     de Boer 2000, equations 1a to 1c: K = C * tolerance */
+   Errors: those of terrimp_camera_resolve. Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
 /* The six planes of a viewing volume. A point p is inside plane i when
@@ -514,24 +507,21 @@ enum {
     TERRIMP_PATTERN_COUNT = 16 /* bit i of a pattern: side i is coarse */
 };
 
-/* How the index buffer is made. */
-typedef enum terrimp_form {
+typedef enum terrimp_form { /* of the index buffer */
     TERRIMP_FORM_LIST = 0, /* triangle lists */
     TERRIMP_FORM_STRIP,    /* each pattern is one triangle strip */
-    TERRIMP_FORM_STITCHED, /* lists for morphing: odd vertices of coarse borders are kept, on the
-                              neighbour's edge, and triangles of no area close what rounding could
-                              open. To leave a vertex out changes the triangles beside it, which
-                              shows where these have not morphed: the one pop that morphing cannot
-                              prevent otherwise. But a rasteriser was seen to leave one pixel in
-                              ten million open beside such triangles; LIST leaves none */
+    TERRIMP_FORM_STITCHED, /* lists for morphing without any pop: odd vertices of coarse borders
+                              are kept, on the neighbour's edge, and triangles of no area close what
+                              rounding could open (a rasteriser was seen to leave one pixel in ten
+                              million open beside them). LIST leaves none open, but to leave a
+                              vertex out shows where the triangles beside it have not morphed */
     TERRIMP_FORM_FITTED,   /* lists for trees with fits, morphing or not: coarse borders stand on
                               vertices of their own, at the neighbour's heights */
     TERRIMP_FORM_COUNT
 } terrimp_form;
 
-/* Where a pattern stands in the index buffer. */
 typedef struct terrimp_pattern {
-    uint32_t first_index, index_count;
+    uint32_t first_index, index_count; /* in the index buffer */
     uint32_t triangle_count; /* without those of no area */
 } terrimp_pattern;
 
@@ -586,11 +576,10 @@ typedef struct terrimp_geomip {
     uint32_t level_x[TERRIMP_GEOMIP_LEVELS], level_z[TERRIMP_GEOMIP_LEVELS];
     uint32_t scratch_count;     /* floats that building a node needs */
     terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
-    float *fits;                /* [fit_count] the caller's; NULL: vertices of all levels stand on
-                                   samples. Otherwise those above level 0 get the heights that fit
-                                   the samples best in the least-squares sense, which want
-                                   FORM_FITTED: pictures are 1 to 2 dB closer to the full mesh,
-                                   BOUND needs half the triangles */
+    float *fits;                /* [fit_count] the caller's: vertices above level 0 get the heights
+                                   that fit the samples best by least squares, which want
+                                   FORM_FITTED; pictures are 1 to 2 dB closer to the full mesh,
+                                   BOUND needs half the triangles. NULL: all stand on samples */
     uint32_t fit_count;         /* a third of the samples; 0: there is but one level */
     uint32_t fit_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* private: where a level's fits begin */
 } terrimp_geomip;
@@ -605,12 +594,12 @@ TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
 
 #ifndef TERRIMP_NO_BUILD
 
-/* Fills in the fits, if there are any; before any node is built.
+/* Fills in the fits, if there are any; before any node is built: the L2 projection on linear finite
+   elements, as in any book on these.
 
    scratch    [scratch_count]
    Errors     E_NULL
-   Cost       O(samples); about 0.35 s for 4097 x 4097
-   Source     the L2 projection on linear finite elements, as in any book on these */
+   Cost       O(samples); about 0.35 s for 4097 x 4097 */
 TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch);
 
 /* Finds heights, error and rms of one node, from samples and fits alone: different nodes may be
@@ -647,7 +636,6 @@ typedef enum terrimp_geomip_rule {
     TERRIMP_GEOMIP_RULE_COUNT
 } terrimp_geomip_rule;
 
-/* A node to draw. */
 typedef struct terrimp_geomip_draw {
     uint32_t node, level;
     uint32_t x, z;       /* column and row among the nodes of its level */
@@ -771,18 +759,12 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
 
 /* ==== Simplifier ========================================================= >>simplifier */
 
-/* Largest number of samples along one side of a tile that the simplifier takes. */
-#define TERRIMP_MAX_TILE_DIM 257u
-
-/* Triangles of a coarse mesh when the desc says 0: under 1 % of the 8192 of 64 x 64 quads. */
-#define TERRIMP_TRIANGLE_BUDGET 85u
-
-/* Largest number of surface triangles of a coarse mesh; every index fits 16 bits. */
-#define TERRIMP_MAX_TRIANGLES 8192u
+#define TERRIMP_MAX_TILE_DIM 257u    /* samples along one side of a tile at most */
+#define TERRIMP_TRIANGLE_BUDGET 85u  /* of a coarse mesh if the desc says 0: 1 % of 64 x 64 quads */
+#define TERRIMP_MAX_TRIANGLES 8192u  /* of a surface at most; every index fits 16 bits */
 
 /* Inner points that terrimp_border_simplify keeps when it is told 0. At 85 triangles over 64 x 64
-   quads of real terrain, 4, 5, 6 and 7 of them gave max errors of 13.7, 12.7, 12.8 and 12.8 %, and
-   rms 2.75, 2.71, 2.71 and 2.74 %; numbers driven by each border's own error gained nothing. */
+   quads of real terrain 4, 5, 6 and 7 of them gave max errors of 13.7, 12.7, 12.8 and 12.8 %. */
 #define TERRIMP_BORDER_POINTS 5u
 
 #ifndef TERRIMP_NO_BUILD
@@ -808,7 +790,6 @@ enum {
     TERRIMP_BORDER_COUNT
 };
 
-/* What terrimp_simplify works on. */
 typedef struct terrimp_simplify_desc {
     const float *heights; /* (required) [rows][cols] of the tile, packed, finite [wu] */
     uint32_t cols;        /* (required) samples along x [Limits: 2..TERRIMP_MAX_TILE_DIM] */
@@ -865,10 +846,8 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
                                                    terrimp_border_point *points,
                                                    uint32_t capacity, uint32_t *point_count);
 
-/* Bytes of scratch memory that terrimp_simplify needs, or 0 when a number is outside its limits.
-
-   cols, rows       samples of the tile [Limits: 2..TERRIMP_MAX_TILE_DIM]
-   triangle_budget  as in the desc; 0 -> TERRIMP_TRIANGLE_BUDGET */
+/* Bytes of scratch memory that terrimp_simplify needs for such a desc; 0 when a number is outside
+   its limits. */
 TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
                                                   uint32_t triangle_budget);
 
@@ -905,18 +884,9 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-/* What one skirt appends to a mesh whose loop has so many vertices: as many vertices again, and
-   two triangles for each of them.
-
-   border_vertex_count  as in the mesh
-   vertex_count         out
-   index_count          out
-   Errors               NULL, RANGE (3 vertices or fewer); outputs untouched */
-TERRIMP_API terrimp_result terrimp_skirt_counts(uint32_t border_vertex_count,
-                                                uint32_t *vertex_count, uint32_t *index_count);
-
 /* Appends the lower skirt: a wall from the border down to one height, facing outwards. It fills
-   the gap to a neighbour of another level.
+   the gap to a neighbour of another level. Each skirt has as many vertices as the loop, and two
+   triangles for each of them.
 
    mesh    in: a surface, perhaps with skirts; out: the same and the wall
    height  [wu] the bottom, as a rule the node's least height; a border vertex that lies lower
@@ -935,35 +905,19 @@ TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, floa
 
 /* --- standing proud (Hess 6.1) --- */
 
-/* How far a mesh is to be raised. */
 typedef struct terrimp_raise_desc {
     const float *heights; /* (required) [rows][cols] of the tile that the mesh was made from */
     uint32_t cols;        /* (required) as then */
     uint32_t rows;        /* (required) as then */
     float amount;         /* 0: not at all; 1: until no sample is above [Limits: 0..1] */
-    float corner_raise[4]; /* [wu] raise of the corners, in loop order: (0, 0), (0, last row),
-                              (last column, last row), (last column, 0); four tiles must agree on
-                              it, terrimp_border_corner_raise helps [Limits: >= 0] */
 } terrimp_raise_desc;
-
-/* How far the two ends of a border polyline must be raised so that no sample beside them asks for
-   more: the largest height of a sample above the polyline, between each end and the kept point
-   next to it. The largest of the (up to four) borders that meet in a corner is its raise.
-
-   heights      [count] as in terrimp_border_simplify
-   border       its polyline
-   end_raise    [2] out: [wu] at the first and at the last point
-   Errors       NULL, RANGE, NOT_FINITE; outputs untouched */
-TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uint32_t count,
-                                                       const terrimp_border *border,
-                                                       float end_raise[2]);
 
 /* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
    surface but for rounding, except beside vertices that may not be raised: a sample whose weight
    hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
-   Border vertices follow from the samples of their border alone, so that neighbours still meet.
-   Starts from every vertex raised by the largest shortfall round it and lowers them together as
-   far as the samples let it.
+   Corners stay where they are, since four tiles share them; border vertices follow from the samples
+   of their border alone, so that neighbours still meet. Starts from every vertex raised by the
+   largest shortfall round it and lowers them together as far as the samples let it.
 
    desc    how far
    mesh    in: a mesh of that tile without skirts; out: heights and errors
@@ -1020,11 +974,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   const terrimp_rect *slot, uint32_t atlas_width,
                                                   uint32_t atlas_height, float matrix[16]);
 
-/* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices.
-
-   xyz        [count][3] world positions
-   stq        [count][3] out; may not overlap xyz
-   Errors     E_NULL */
+/* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
+   xyz [count][3], world positions, to stq [count][3], which may not overlap it. Errors: E_NULL. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
                                                        size_t count, float *stq);
 
@@ -1128,8 +1079,7 @@ typedef struct terrimp_shelves {
 } terrimp_shelves;
 
 /* Empties an atlas. The array stays the caller's and outlives the shelves.
-
-   Errors     E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536 */
+   Errors: E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
 TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity);
@@ -1148,7 +1098,7 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
    placed     out, how many were placed; may be NULL
    Errors     E_NULL; E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all
               fit: those that did are flagged PLACED
-   Cost       O(n log n + n * shelves), no allocation
+   Cost       O(n^1.5 + n * shelves), no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
 TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_pack_item *items,
@@ -1170,11 +1120,8 @@ typedef struct terrimp_atlas_pair {
     uint32_t repacks; /* so far */
 } terrimp_atlas_pair;
 
-/* Two empty atlases.
-
-   items      [2 * capacity] the caller's
-   Errors     those of terrimp_shelves_init
-   Source     Hess 2010, section 4.3 */
+/* Two empty atlases (Hess 2010, section 4.3); items [2 * capacity] is the caller's.
+   Errors: those of terrimp_shelves_init. */
 TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t width,
                                              uint32_t height, terrimp_shelf *items,
                                              uint32_t capacity);
@@ -1383,8 +1330,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
-/* Ends the building: boxes and errors of parents hold those of their children.
-   Errors: E_NULL; E_STATE when a node has not been built. */
+/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_NULL;
+   E_STATE when a node has not been built. */
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain);
 
 /* Begins, builds all nodes, one after the other, and finishes. Errors: those of the three above. */
@@ -1464,19 +1411,16 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity);
 
-/* Fills what the ground vertices of a node move by when they morph, and the weights of the grid
-   that say with which factor each moves, the same for every node: see terrimp_geomip_vertex and
-   terrimp_geomip_weights.
+/* Fills what the ground vertices of a node move by when they morph. With which factor each moves
+   say the weights that terrimp_geomip_fill_weights gives for chunk_quads and TERRIMP_FORM_LIST.
 
-   vertices, weights   [ground_vertex_count] out
-   Errors              E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   vertices   [ground_vertex_count] out
+   capacity   of vertices
+   Errors     E_NULL; E_RANGE; E_CAPACITY; E_STATE */
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
                                                       uint32_t node,
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity);
-TERRIMP_API terrimp_result terrimp_terrain_fill_weights(const terrimp_terrain *terrain,
-                                                        terrimp_geomip_weights *weights,
-                                                        size_t capacity);
 
 /* Fills the vertices and indices of one node's coarse mesh with its skirts, to stand at node *
    stride in the host's buffers. Indices count from its base vertex; what is over is 0.
@@ -1884,6 +1828,20 @@ extern "C" {
 
 /* ==== Basics ============================================================= >>impl-basics */
 
+/* What most functions begin with: an error is returned when a condition holds; or is passed on. */
+#define TERRIMPI_REFUSE(condition, error) \
+    do { if (condition) return (error); } while (0)
+#define TERRIMPI_TRY(call)             \
+    do {                               \
+        terrimp_result tried = (call); \
+        if (tried != TERRIMP_OK)       \
+            return tried;              \
+    } while (0)
+
+/* Descriptors say with 0 that they want the default. */
+#define TERRIMPI_DEFAULT(field, value) \
+    do { if ((field) == 0) (field) = (value); } while (0)
+
 TERRIMP_API const char *terrimp_result_text(int result)
 {
     switch (result) {
@@ -1916,6 +1874,16 @@ static int terrimpi_finite(float value)
 static int terrimpi_finite3(const float value[3])
 {
     return terrimpi_finite(value[0]) && terrimpi_finite(value[1]) && terrimpi_finite(value[2]);
+}
+
+static int terrimpi_finite2(float a, float b) { return terrimpi_finite(a) && terrimpi_finite(b); }
+
+/* NaN is not within anything. */
+static int terrimpi_within(float v, float low, float high) { return v >= low && v <= high; }
+
+static int terrimpi_within_u32(uint32_t v, uint32_t low, uint32_t high)
+{
+    return v >= low && v <= high;
 }
 
 static float terrimpi_min(float a, float b) { return a < b ? a : b; }
@@ -1956,9 +1924,51 @@ static size_t terrimpi_add(size_t a, size_t b, int *ok)
     return a + b;
 }
 
+#define TERRIMPI_FLOAT_MAX 3.402823466e38f
+#define TERRIMPI_ALIGN 8u /* of blocks of memory: pointers, and the simplifier's 64-bit sums */
+
+/* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
+static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
+{
+    size_t at = *offset;
+    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
+    *offset = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
+    return at;
+}
+
+/* A block of memory that is dealt out array by array: so one list of arrays serves both for laying
+   them out and, without a base, for counting the bytes. */
+typedef struct terrimpi_arena {
+    unsigned char *base;
+    size_t bytes;
+    int ok; /* nothing has overflowed */
+} terrimpi_arena;
+
+static terrimpi_arena terrimpi_arena_at(void *base)
+{
+    terrimpi_arena arena;
+    arena.base = (unsigned char *)base;
+    arena.bytes = 0;
+    arena.ok = 1;
+    return arena;
+}
+
+static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
+{
+    size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
+    return arena->base && arena->ok ? arena->base + at : NULL;
+}
+
 static float terrimpi_dot(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void terrimpi_sub(const float a[3], const float b[3], float out[3])
+{
+    out[0] = a[0] - b[0];
+    out[1] = a[1] - b[1];
+    out[2] = a[2] - b[2];
 }
 
 static void terrimpi_cross(const float a[3], const float b[3], float out[3])
@@ -1968,16 +1978,20 @@ static void terrimpi_cross(const float a[3], const float b[3], float out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+static float terrimpi_largest(const float v[3])
+{
+    return terrimpi_max(terrimpi_abs(v[0]), terrimpi_max(terrimpi_abs(v[1]), terrimpi_abs(v[2])));
+}
+
 /* Length without overflow or underflow: the largest component is taken out first. */
 static float terrimpi_length(const float v[3])
 {
-    float x = terrimpi_abs(v[0]), y = terrimpi_abs(v[1]), z = terrimpi_abs(v[2]);
-    float largest = terrimpi_max(x, terrimpi_max(y, z));
+    float largest = terrimpi_largest(v), x, y, z;
     if (!(largest > 0.0f))
         return 0.0f;
-    x /= largest;
-    y /= largest;
-    z /= largest;
+    x = v[0] / largest;
+    y = v[1] / largest;
+    z = v[2] / largest;
     return largest * TERRIMP_SQRTF(x * x + y * y + z * z);
 }
 
@@ -2012,6 +2026,16 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
     terrimpi_cross(right, forward, up);
 }
 
+static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+    terrimp_rect rect;
+    rect.x = x;
+    rect.y = y;
+    rect.width = width;
+    rect.height = height;
+    return rect;
+}
+
 /* Moves the ends of an interval apart by what rounding can have cost: a fraction of their size and
    of 1, times the steepness of the rays that they come from. */
 static void terrimpi_widen(float *low, float *high, float slope)
@@ -2028,8 +2052,6 @@ static void terrimpi_widen(float *low, float *high, float slope)
 
    A raw value is a sample as stored, converted to float: exact for all formats. Voids are told by
    raw values; two different raw values may well share one world height. */
-
-#define TERRIMPI_FLOAT_MAX 3.402823466e38f
 
 static float terrimpi_clamp(float value, float low, float high)
 {
@@ -2055,24 +2077,19 @@ static terrimp_result terrimpi_axis_check(float origin, float spacing, uint32_t 
     float extent = (float)(count - 1u) * spacing;
     float last = terrimpi_line(origin, spacing, count - 1u);
     float reach = terrimpi_max(extent, terrimpi_max(-origin, terrimpi_max(origin, last)));
-
-    if (!terrimpi_finite(origin) || !terrimpi_finite(spacing))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(spacing > 0.0f) || !terrimpi_finite(reach) || spacing < reach * (1.0f / 8388608.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite(origin) || !terrimpi_finite(spacing), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(spacing > 0.0f) || !terrimpi_finite(reach) ||
+                    spacing < reach * (1.0f / 8388608.0f), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
 static terrimp_result terrimpi_heights_check(const terrimp_heightfield *field)
 {
-    float steps = field->format == TERRIMP_FORMAT_F32 ? 0.0f : 65535.0f;
-    float height = field->height_scale * steps;
-
-    if (!terrimpi_finite(field->height_scale) || !terrimpi_finite(field->height_offset))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(field->height_scale > 0.0f) || !terrimpi_finite(field->height_offset + height) ||
-        !terrimpi_finite(field->height_offset - height))
-        return TERRIMP_E_RANGE;
+    float scale = field->height_scale, offset = field->height_offset;
+    float height = scale * (field->format == TERRIMP_FORMAT_F32 ? 0.0f : 65535.0f);
+    TERRIMPI_REFUSE(!terrimpi_finite2(scale, offset), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(scale > 0.0f) || !terrimpi_finite2(offset + height, offset - height),
+                    TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -2081,48 +2098,37 @@ static terrimp_result terrimpi_memory_check(const terrimp_heightfield *field)
     size_t size = terrimpi_sample_bytes(field->format);
     size_t row = (size_t)field->width * size;
     int ok = 1;
-
-    if (field->row_bytes < row || field->row_bytes % size != 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(field->row_bytes < row || field->row_bytes % size != 0, TERRIMP_E_RANGE);
     (void)terrimpi_add(terrimpi_mul(field->row_bytes, field->depth - 1u, &ok), row, &ok);
-    if (!ok)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(!ok, TERRIMP_E_OVERFLOW);
     return (uintptr_t)field->samples % size != 0 ? TERRIMP_E_ALIGN : TERRIMP_OK;
+}
+
+static int terrimpi_size_ok(uint32_t width, uint32_t depth)
+{
+    return terrimpi_within_u32(width, 2u, TERRIMP_MAX_DIM) &&
+           terrimpi_within_u32(depth, 2u, TERRIMP_MAX_DIM);
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield *in,
                                                        terrimp_heightfield *out)
 {
     terrimp_heightfield field;
-    terrimp_result result;
-
-    if (in == NULL || out == NULL || in->samples == NULL)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(in == NULL || out == NULL || in->samples == NULL, TERRIMP_E_NULL);
     field = *in;
-    if (field.width < 2u || field.width > TERRIMP_MAX_DIM || field.depth < 2u ||
-        field.depth > TERRIMP_MAX_DIM || field.format < 0 || field.format >= TERRIMP_FORMAT_COUNT)
-        return TERRIMP_E_RANGE;
-    if (field.format == TERRIMP_FORMAT_DEFAULT)
-        field.format = TERRIMP_FORMAT_F32;
-    if (field.row_bytes == 0)
-        field.row_bytes = (size_t)field.width * terrimpi_sample_bytes(field.format);
-    if (field.spacing_x == 0.0f)
-        field.spacing_x = 1.0f;
-    if (field.spacing_z == 0.0f)
-        field.spacing_z = 1.0f;
-    if (field.height_scale == 0.0f)
-        field.height_scale = 1.0f;
-
-    result = terrimpi_axis_check(field.origin_x, field.spacing_x, field.width);
-    if (result == TERRIMP_OK)
-        result = terrimpi_axis_check(field.origin_z, field.spacing_z, field.depth);
-    if (result == TERRIMP_OK)
-        result = terrimpi_heights_check(&field);
-    if (result == TERRIMP_OK)
-        result = terrimpi_memory_check(&field);
-    if (result == TERRIMP_OK)
-        *out = field;
-    return result;
+    TERRIMPI_REFUSE(!terrimpi_size_ok(field.width, field.depth) || field.format < 0 ||
+                    field.format >= TERRIMP_FORMAT_COUNT, TERRIMP_E_RANGE);
+    TERRIMPI_DEFAULT(field.format, TERRIMP_FORMAT_F32);
+    TERRIMPI_DEFAULT(field.row_bytes, field.width * terrimpi_sample_bytes(field.format));
+    TERRIMPI_DEFAULT(field.spacing_x, 1.0f);
+    TERRIMPI_DEFAULT(field.spacing_z, 1.0f);
+    TERRIMPI_DEFAULT(field.height_scale, 1.0f);
+    TERRIMPI_TRY(terrimpi_axis_check(field.origin_x, field.spacing_x, field.width));
+    TERRIMPI_TRY(terrimpi_axis_check(field.origin_z, field.spacing_z, field.depth));
+    TERRIMPI_TRY(terrimpi_heights_check(&field));
+    TERRIMPI_TRY(terrimpi_memory_check(&field));
+    *out = field;
+    return TERRIMP_OK;
 }
 
 /* ---- samples of a resolved field, unchecked ---- */
@@ -2135,7 +2141,6 @@ static const void *terrimpi_row(const terrimp_heightfield *field, uint32_t z)
 static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t z)
 {
     const void *row = terrimpi_row(field, z);
-
     switch (field->format) {
     case TERRIMP_FORMAT_U8: return (float)((const uint8_t *)row)[x];
     case TERRIMP_FORMAT_U16: return (float)((const uint16_t *)row)[x];
@@ -2171,7 +2176,6 @@ static void terrimpi_raw_row(const terrimp_heightfield *field, uint32_t x, uint3
     const void *row = terrimpi_row(field, z);
     float edge;
     uint32_t c;
-
     /* Two loops, for the one of stride 1 turns into vector instructions. */
 #define TERRIMPI_COPY(type)                                \
     if (stride == 1u)                                      \
@@ -2210,7 +2214,6 @@ static void terrimpi_heightfield_tile(const terrimp_heightfield *field, uint32_t
     const float scale = field->height_scale, offset = field->height_offset;
     const uint32_t last = field->depth - 1u;
     uint32_t r, c;
-
     z = z < last ? z : last;
     for (r = 0; r < rows; ++r) {
         terrimpi_raw_row(field, x, terrimpi_step(z, last, r, stride), cols, stride, out);
@@ -2222,7 +2225,8 @@ static void terrimpi_heightfield_tile(const terrimp_heightfield *field, uint32_t
 
 /* The result of a look at every sample of a tile. */
 typedef struct terrimpi_scan {
-    int skip_voids;  /* given: voids count as nothing, and low > high if there is nothing else */
+    int skip_voids;  /* given: voids are but counted, and low > high if there is nothing else */
+    size_t voids;
     float low, high; /* raw range */
     uint32_t x, z;   /* the first bad sample, if the scan fails */
 } terrimpi_scan;
@@ -2232,9 +2236,9 @@ static terrimp_result terrimpi_scan_values(const terrimp_heightfield *field, con
                                            uint32_t count, uint32_t *bad, terrimpi_scan *scan)
 {
     uint32_t i;
-
     for (i = 0; i < count; ++i) {
         if (terrimpi_is_void(field, raw[i])) {
+            scan->voids++;
             if (scan->skip_voids)
                 continue;
             *bad = i;
@@ -2260,9 +2264,9 @@ static terrimp_result terrimpi_scan_tile(const terrimp_heightfield *field, uint3
     const uint32_t most = (last_x - x) / stride + 2u; /* the last of these is the last column */
     uint32_t r, c, at, row, count, bad = 0;
     terrimp_result result;
-
     scan->low = TERRIMPI_FLOAT_MAX;
     scan->high = -TERRIMPI_FLOAT_MAX;
+    scan->voids = 0;
     cols = cols < most ? cols : most;
     for (r = 0; r < rows; ++r) {
         row = terrimpi_step(z, last_z, r, stride);
@@ -2288,10 +2292,8 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
 {
     terrimp_heightfield f;
     terrimpi_scan scan;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
+    terrimp_result result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     scan.skip_voids = 0;
     result = terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan);
     if (result != TERRIMP_OK) {
@@ -2306,24 +2308,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
 TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, float *height)
 {
-    terrimp_heightfield f;
-    float raw, value;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (height == NULL)
-        return TERRIMP_E_NULL;
-    if (x >= f.width || z >= f.depth)
-        return TERRIMP_E_RANGE;
-    raw = terrimpi_raw(&f, x, z);
-    value = terrimpi_sample(&f, x, z);
-    if (terrimpi_is_void(&f, raw))
-        return TERRIMP_E_VOID;
-    if (!terrimpi_finite(value))
-        return TERRIMP_E_NOT_FINITE;
-    *height = value;
-    return TERRIMP_OK;
+    return terrimp_heightfield_read(field, x, z, 1, 1, 1, height);
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
@@ -2333,22 +2318,31 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
     terrimp_heightfield f;
     terrimpi_scan scan;
     int ok = 1;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (out == NULL)
-        return TERRIMP_E_NULL;
-    if (x >= f.width || z >= f.depth || cols == 0 || rows == 0 || stride == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(out == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0 ||
+                    stride == 0, TERRIMP_E_RANGE);
     (void)terrimpi_mul(terrimpi_mul(cols, rows, &ok), sizeof(float), &ok);
-    if (!ok)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(!ok, TERRIMP_E_OVERFLOW);
     scan.skip_voids = 0;
-    result = terrimpi_scan_tile(&f, x, z, cols, rows, stride, &scan);
-    if (result == TERRIMP_OK)
-        terrimpi_heightfield_tile(&f, x, z, cols, rows, stride, out);
-    return result;
+    TERRIMPI_TRY(terrimpi_scan_tile(&f, x, z, cols, rows, stride, &scan));
+    terrimpi_heightfield_tile(&f, x, z, cols, rows, stride, out);
+    return TERRIMP_OK;
+}
+
+/* The range of the world heights of a rectangle of samples, cut at the last column and row.
+   Rounding keeps the order, and the scale is positive: the raw range maps to the exact one. */
+static terrimp_result terrimpi_height_range(const terrimp_heightfield *field, terrimp_rect samples,
+                                            int skip_voids, float *low, float *high)
+{
+    terrimpi_scan scan;
+    scan.skip_voids = skip_voids;
+    TERRIMPI_TRY(terrimpi_scan_tile(field, samples.x, samples.y, samples.width, samples.height, 1,
+                                    &scan));
+    TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
+    *low = terrimpi_world_height(field, scan.low);
+    *high = terrimpi_world_height(field, scan.high);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield *field, uint32_t x,
@@ -2356,25 +2350,10 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
                                                       float *low, float *high)
 {
     terrimp_heightfield f;
-    terrimpi_scan scan;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (low == NULL || high == NULL)
-        return TERRIMP_E_NULL;
-    if (x >= f.width || z >= f.depth || cols == 0 || rows == 0)
-        return TERRIMP_E_RANGE;
-    scan.skip_voids = 1;
-    result = terrimpi_scan_tile(&f, x, z, cols, rows, 1, &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (scan.low > scan.high)
-        return TERRIMP_E_VOID;
-    /* Rounding keeps the order, and the scale is positive: the raw range maps to the exact one. */
-    *low = terrimpi_world_height(&f, scan.low);
-    *high = terrimpi_world_height(&f, scan.high);
-    return TERRIMP_OK;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(low == NULL || high == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0, TERRIMP_E_RANGE);
+    return terrimpi_height_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
 }
 
 /* ---- voids ----
@@ -2406,21 +2385,18 @@ typedef struct terrimpi_fill {
 } terrimpi_fill;
 
 /* Lays the levels out behind each other: first all values, then, in the same order, all known
-   flags. Returns the bytes; 0 if they overflow. Without fill it only counts. */
+   flags. Returns the bytes; 0 if they overflow. */
 static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch,
                                    terrimpi_fill *fill)
 {
     size_t first[TERRIMPI_FILL_LEVELS], cells = 0;
     uint32_t count = 0, rows = TERRIMPI_FILL_RING, w = width, d = depth, i;
     int ok = 1;
-
     for (;;) {
         first[count] = cells;
         cells = terrimpi_add(cells, terrimpi_mul(w, rows, &ok), &ok);
-        if (fill != NULL) {
-            fill->level[count].width = w;
-            fill->level[count].depth = d;
-        }
+        fill->level[count].width = w;
+        fill->level[count].depth = d;
         ++count;
         if (w == 1u && d == 1u)
             break;
@@ -2428,12 +2404,10 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
         d = (d + 1u) / 2u;
         rows = d;
     }
-    if (fill != NULL) {
-        fill->level_count = count;
-        for (i = 0; i < count; ++i) {
-            fill->level[i].value = (float *)scratch + first[i];
-            fill->level[i].known = (uint8_t *)((float *)scratch + cells) + first[i];
-        }
+    fill->level_count = count;
+    for (i = 0; i < count && scratch != NULL; ++i) {
+        fill->level[i].value = (float *)scratch + first[i];
+        fill->level[i].known = (uint8_t *)((float *)scratch + cells) + first[i];
     }
     cells = terrimpi_mul(cells, sizeof(float) + 1u, &ok);
     return ok ? cells : 0;
@@ -2441,9 +2415,8 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
 
 TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, uint32_t depth)
 {
-    if (width < 2u || width > TERRIMP_MAX_DIM || depth < 2u || depth > TERRIMP_MAX_DIM)
-        return 0;
-    return terrimpi_fill_layout(width, depth, NULL, NULL);
+    terrimpi_fill fill;
+    return terrimpi_size_ok(width, depth) ? terrimpi_fill_layout(width, depth, NULL, &fill) : 0;
 }
 
 /* Brings row z of the field into the ring and marks its voids. */
@@ -2454,7 +2427,6 @@ static void terrimpi_fill_load(const terrimp_heightfield *field, const terrimpi_
     float *value = fill->level[0].value + first;
     uint8_t *known = fill->level[0].known + first;
     uint32_t x;
-
     terrimpi_raw_row(field, 0, z, field->width, 1, value);
     for (x = 0; x < field->width; ++x)
         known[x] = (uint8_t)(value[x] != field->no_data && value[x] == value[x]);
@@ -2479,7 +2451,6 @@ static void terrimpi_fill_pull(const terrimpi_fill *fill, uint32_t level, uint32
     float *value = up->value + (size_t)z * up->width;
     uint8_t *known = up->known + (size_t)z * up->width;
     uint32_t x, k;
-
     for (x = 0; x < up->width; ++x) {
         size_t x0 = 2u * x, x1 = x0 + 1u < from->width ? x0 + 1u : x0, cell[4];
         float sum = 0.0f;
@@ -2507,7 +2478,6 @@ static void terrimpi_fill_push(const terrimpi_fill *fill, uint32_t level, uint32
     const float *own = up->value + terrimpi_fill_row(fill, level + 1u, z / 2u);
     const float *other = up->value + terrimpi_fill_row(fill, level + 1u, side);
     uint32_t x;
-
     for (x = 0; x < to->width; ++x) {
         uint32_t a = x / 2u, b = (x & 1u) ? (a + 1u < up->width ? a + 1u : a) : a - (a > 0);
         if (!to->known[row + x])
@@ -2529,7 +2499,6 @@ static void terrimpi_fill_relax(const terrimpi_fill *fill, uint32_t level, uint3
     const uint8_t *known = on->known + first;
     float *row = on->value + first, left, own;
     uint32_t x = 0, last = on->width - 1u;
-
     while (x <= last) {
         const void *next = memchr(known + x, 0, last - x + 1u);
         if (next == NULL)
@@ -2548,7 +2517,6 @@ static void terrimpi_fill_relax(const terrimpi_fill *fill, uint32_t level, uint3
 static void terrimpi_fill_coarse(const terrimpi_fill *fill)
 {
     uint32_t level, z, sweep, sweeps;
-
     for (level = 2; level < fill->level_count; ++level)
         for (z = 0; z < fill->level[level].depth; ++z)
             terrimpi_fill_pull(fill, level, z);
@@ -2571,7 +2539,6 @@ static float terrimpi_fill_not_void(const terrimp_heightfield *field, const terr
                                     float value)
 {
     float moved;
-
     if (value != field->no_data)
         return value;
     if (field->format != TERRIMP_FORMAT_F32)
@@ -2589,7 +2556,6 @@ static void terrimpi_fill_store(const terrimp_heightfield *field, const terrimpi
     const uint8_t *known = fill->level[0].known + first;
     void *row = samples + (size_t)z * field->row_bytes;
     uint32_t x;
-
     for (x = 0; x < field->width; ++x) {
         float v;
         if (known[x])
@@ -2613,7 +2579,6 @@ static void terrimpi_fill_fine(const terrimp_heightfield *field, const terrimpi_
                                char *samples)
 {
     uint32_t r, s;
-
     for (r = 0; r < field->depth + TERRIMPI_FILL_SWEEPS; ++r) {
         if (r < field->depth) {
             terrimpi_fill_load(field, fill, r);
@@ -2627,21 +2592,15 @@ static void terrimpi_fill_fine(const terrimp_heightfield *field, const terrimpi_
     }
 }
 
-/* Reads the field into level 1; returns the number of voids. */
-static size_t terrimpi_fill_read(const terrimp_heightfield *field, const terrimpi_fill *fill)
+/* Reads the field into level 1. */
+static void terrimpi_fill_read(const terrimp_heightfield *field, const terrimpi_fill *fill)
 {
-    size_t voids = 0;
-    uint32_t x, z;
-
+    uint32_t z;
     for (z = 0; z < field->depth; ++z) {
-        const uint8_t *known = fill->level[0].known + terrimpi_fill_row(fill, 0, z);
         terrimpi_fill_load(field, fill, z);
-        for (x = 0; x < field->width; ++x)
-            voids += !known[x];
         if ((z & 1u) || z == field->depth - 1u)
             terrimpi_fill_pull(fill, 1, z / 2u);
     }
-    return voids;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfield *field,
@@ -2652,39 +2611,27 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     terrimp_heightfield f;
     terrimpi_fill fill;
     terrimpi_scan scan;
-    size_t needed, voids = 0;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (samples == NULL || scratch == NULL)
-        return TERRIMP_E_NULL;
-    if (samples != f.samples)
-        return TERRIMP_E_RANGE;
-    if ((uintptr_t)scratch % sizeof(float) != 0)
-        return TERRIMP_E_ALIGN;
+    size_t needed;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(samples == NULL || scratch == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(samples != f.samples, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE((uintptr_t)scratch % sizeof(float) != 0, TERRIMP_E_ALIGN);
     needed = terrimpi_fill_layout(f.width, f.depth, scratch, &fill);
-    if (needed == 0)
-        return TERRIMP_E_OVERFLOW;
-    if (scratch_bytes < needed)
-        return TERRIMP_E_MEMORY;
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_REFUSE(scratch_bytes < needed, TERRIMP_E_MEMORY);
 
     scan.skip_voids = 1;
-    result = terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (scan.low > scan.high)
-        return TERRIMP_E_VOID;
+    TERRIMPI_TRY(terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
+    TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
     fill.low = scan.low;
     fill.high = scan.high;
-    if (f.has_no_data)
-        voids = terrimpi_fill_read(&f, &fill);
-    if (voids > 0) {
+    if (scan.voids > 0) {
+        terrimpi_fill_read(&f, &fill);
         terrimpi_fill_coarse(&fill);
         terrimpi_fill_fine(&f, &fill, (char *)samples);
     }
     if (filled_count != NULL)
-        *filled_count = voids;
+        *filled_count = scan.voids;
     return TERRIMP_OK;
 }
 
@@ -2692,17 +2639,17 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 
 /* One quad: heights of its corners and where it lies. */
 typedef struct terrimpi_quad {
-    float h00, h10, h01, h11; /* hxz */
+    float h[4]; /* of (0, 0), (1, 0), (0, 1), (1, 1) */
     float x0, x1, z0, z1;
 } terrimpi_quad;
 
 /* Finds the quad that holds a coordinate along one axis; 0 when it is outside. The quotient is only
    a guess where the origin is distant; the lines themselves decide. */
-static int terrimpi_locate(float origin, float spacing, uint32_t count, float at, uint32_t *quad)
+static int terrimpi_locate_along(float origin, float spacing, uint32_t count, float at,
+                                 uint32_t *quad)
 {
     float guess = (at - origin) / spacing;
     uint32_t i;
-
     if (!(at >= origin && at <= terrimpi_line(origin, spacing, count - 1u)))
         return 0;
     i = (uint32_t)terrimpi_clamp(guess, 0.0f, (float)(count - 2u));
@@ -2714,29 +2661,28 @@ static int terrimpi_locate(float origin, float spacing, uint32_t count, float at
     return 1;
 }
 
+static int terrimpi_locate(const terrimp_heightfield *f, float x, float z, uint32_t *i, uint32_t *j)
+{
+    return terrimpi_locate_along(f->origin_x, f->spacing_x, f->width, x, i) &&
+           terrimpi_locate_along(f->origin_z, f->spacing_z, f->depth, z, j);
+}
+
 /* Fills quad; on E_VOID and E_NOT_FINITE, when it is a hole, only the place of it. */
 static terrimp_result terrimpi_quad_load(const terrimp_heightfield *field, uint32_t x, uint32_t z,
                                          terrimpi_quad *quad)
 {
-    float raw[4], none;
-    int i;
-
+    float none = 0.0f;
+    uint32_t i;
     quad->x0 = terrimpi_line(field->origin_x, field->spacing_x, x);
     quad->x1 = terrimpi_line(field->origin_x, field->spacing_x, x + 1u);
     quad->z0 = terrimpi_line(field->origin_z, field->spacing_z, z);
     quad->z1 = terrimpi_line(field->origin_z, field->spacing_z, z + 1u);
-    raw[0] = terrimpi_raw(field, x, z);
-    raw[1] = terrimpi_raw(field, x + 1u, z);
-    raw[2] = terrimpi_raw(field, x, z + 1u);
-    raw[3] = terrimpi_raw(field, x + 1u, z + 1u);
-    for (i = 0; i < 4; ++i)
-        if (terrimpi_is_void(field, raw[i]))
-            return TERRIMP_E_VOID;
-    quad->h00 = terrimpi_world_height(field, raw[0]);
-    quad->h10 = terrimpi_world_height(field, raw[1]);
-    quad->h01 = terrimpi_world_height(field, raw[2]);
-    quad->h11 = terrimpi_world_height(field, raw[3]);
-    none = 0.0f * quad->h00 + 0.0f * quad->h10 + 0.0f * quad->h01 + 0.0f * quad->h11;
+    for (i = 0; i < 4u; ++i) {
+        float raw = terrimpi_raw(field, x + (i & 1u), z + (i >> 1));
+        TERRIMPI_REFUSE(terrimpi_is_void(field, raw), TERRIMP_E_VOID);
+        quad->h[i] = terrimpi_world_height(field, raw);
+        none += 0.0f * quad->h[i];
+    }
     return terrimpi_finite(none) ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
 
@@ -2757,24 +2703,24 @@ static int terrimpi_quad_side(float u, float v)
 static float terrimpi_quad_height(const terrimpi_quad *quad, int side, float u, float v)
 {
     if (side)
-        return quad->h00 * (1.0f - v) + quad->h01 * (v - u) + quad->h11 * u;
-    return quad->h00 * (1.0f - u) + quad->h10 * (u - v) + quad->h11 * v;
+        return quad->h[0] * (1.0f - v) + quad->h[2] * (v - u) + quad->h[3] * u;
+    return quad->h[0] * (1.0f - u) + quad->h[1] * (u - v) + quad->h[3] * v;
 }
 
 /* Height gained per world unit along x and along z. */
 static void terrimpi_quad_slope(const terrimpi_quad *quad, int side, float slope[2])
 {
-    float along_x = side ? quad->h11 - quad->h01 : quad->h10 - quad->h00;
-    float along_z = side ? quad->h01 - quad->h00 : quad->h11 - quad->h10;
+    float along_x = side ? quad->h[3] - quad->h[2] : quad->h[1] - quad->h[0];
+    float along_z = side ? quad->h[2] - quad->h[0] : quad->h[3] - quad->h[1];
     slope[0] = along_x / (quad->x1 - quad->x0);
     slope[1] = along_z / (quad->z1 - quad->z0);
 }
 
-/* The upward unit normal of a slope; 0 when the slope is beyond float. */
-static int terrimpi_slope_normal(const float slope[2], float normal[3])
+/* The upward unit normal of a triangle; 0 when its slope is beyond float. */
+static int terrimpi_quad_normal(const terrimpi_quad *quad, int side, float normal[3])
 {
-    float n[3];
-
+    float n[3], slope[2];
+    terrimpi_quad_slope(quad, side, slope);
     n[0] = -slope[0];
     n[1] = 1.0f;
     n[2] = -slope[1];
@@ -2790,18 +2736,10 @@ static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x
 {
     terrimp_heightfield f;
     uint32_t i, j;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite(x) || !terrimpi_finite(z))
-        return TERRIMP_E_NOT_FINITE;
-    if (!terrimpi_locate(f.origin_x, f.spacing_x, f.width, x, &i) ||
-        !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, z, &j))
-        return TERRIMP_E_MISS;
-    result = terrimpi_quad_load(&f, i, j, quad);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_locate(&f, x, z, &i, &j), TERRIMP_E_MISS);
+    TERRIMPI_TRY(terrimpi_quad_load(&f, i, j, quad));
     *u = terrimpi_fraction(x, quad->x0, quad->x1);
     *v = terrimpi_fraction(z, quad->z0, quad->z1);
     return TERRIMP_OK;
@@ -2812,30 +2750,21 @@ TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield 
 {
     terrimpi_quad quad;
     float u, v;
-    terrimp_result result;
-
-    if (height == NULL)
-        return TERRIMP_E_NULL;
-    result = terrimpi_surface(field, x, z, &quad, &u, &v);
-    if (result == TERRIMP_OK)
-        *height = terrimpi_quad_height(&quad, terrimpi_quad_side(u, v), u, v);
-    return result;
+    TERRIMPI_REFUSE(height == NULL, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
+    *height = terrimpi_quad_height(&quad, terrimpi_quad_side(u, v), u, v);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield *field, float x,
                                                       float z, float normal[3])
 {
     terrimpi_quad quad;
-    float u, v, slope[2];
-    terrimp_result result;
-
-    if (normal == NULL)
-        return TERRIMP_E_NULL;
-    result = terrimpi_surface(field, x, z, &quad, &u, &v);
-    if (result != TERRIMP_OK)
-        return result;
-    terrimpi_quad_slope(&quad, terrimpi_quad_side(u, v), slope);
-    return terrimpi_slope_normal(slope, normal) ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
+    float u, v;
+    TERRIMPI_REFUSE(normal == NULL, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
+    return terrimpi_quad_normal(&quad, terrimpi_quad_side(u, v), normal) ? TERRIMP_OK
+                                                                         : TERRIMP_E_NOT_FINITE;
 }
 
 /* ---- the ray ----
@@ -2860,15 +2789,14 @@ typedef struct terrimpi_ray {
     float length;   /* [wu] from start to the end */
 } terrimpi_ray;
 
-/* Narrows [*t0, *t1] to where origin + t * way is within [low, high]; 0 when nothing is left. */
-static int terrimpi_ray_clip(float origin, float way, float low, float high, float *t0, float *t1)
+/* Narrows [*t0, *t1] to where start + t * way is within [low, high]; 0 when nothing is left. */
+static int terrimpi_ray_clip(float start, float way, float low, float high, float *t0, float *t1)
 {
     float a, b;
-
     if (way == 0.0f)
-        return origin >= low && origin <= high;
-    a = ((way > 0.0f ? low : high) - origin) / way;
-    b = ((way > 0.0f ? high : low) - origin) / way;
+        return start >= low && start <= high;
+    a = ((way > 0.0f ? low : high) - start) / way;
+    b = ((way > 0.0f ? high : low) - start) / way;
     *t0 = terrimpi_max(*t0, a);
     *t1 = terrimpi_min(*t1, b);
     return *t0 <= *t1;
@@ -2878,10 +2806,7 @@ static int terrimpi_ray_clip(float origin, float way, float low, float high, flo
    largest component is 1. */
 static int terrimpi_ray_aim(const float direction[3], float way[3])
 {
-    float largest = terrimpi_max(terrimpi_abs(direction[0]),
-                                 terrimpi_max(terrimpi_abs(direction[1]),
-                                              terrimpi_abs(direction[2])));
-
+    float largest = terrimpi_largest(direction);
     if (!(largest > 0.0f))
         return 0;
     way[0] = direction[0] / largest;
@@ -2897,7 +2822,6 @@ static int terrimpi_ray_enter(const terrimp_heightfield *field, const float orig
     float last_x = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
     float last_z = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
     float t0 = 0.0f, t1 = max_distance;
-
     if (!terrimpi_ray_clip(origin[0], ray->way[0], field->origin_x, last_x, &t0, &t1) ||
         !terrimpi_ray_clip(origin[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
         return 0;
@@ -2934,7 +2858,6 @@ static int terrimpi_ray_meets(const terrimpi_ray *ray, const terrimpi_quad *quad
     float gap_a = a->y - terrimpi_quad_height(quad, side, a->u, a->v);
     float gap_b = b->y - terrimpi_quad_height(quad, side, b->u, b->v);
     float slope[2], closing;
-
     if ((gap_a > 0.0f && gap_b > 0.0f) || (gap_a < 0.0f && gap_b < 0.0f))
         return 0;
     terrimpi_quad_slope(quad, side, slope);
@@ -2949,12 +2872,10 @@ static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
                              float *t)
 {
     float off_a = a->v - a->u, off_b = b->v - b->u, s;
-    float low = terrimpi_min(terrimpi_min(quad->h00, quad->h10),
-                             terrimpi_min(quad->h01, quad->h11));
-    float high = terrimpi_max(terrimpi_max(quad->h00, quad->h10),
-                              terrimpi_max(quad->h01, quad->h11));
+    const float *h = quad->h;
+    float low = terrimpi_min(terrimpi_min(h[0], h[1]), terrimpi_min(h[2], h[3]));
+    float high = terrimpi_max(terrimpi_max(h[0], h[1]), terrimpi_max(h[2], h[3]));
     terrimpi_ray_point cut;
-
     if (terrimpi_min(a->y, b->y) > high || terrimpi_max(a->y, b->y) < low)
         return 0;
     *side = terrimpi_quad_side(0.0f, off_a + off_b);
@@ -2971,12 +2892,6 @@ static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
     return terrimpi_ray_meets(ray, quad, *side, &cut, b, t);
 }
 
-/* The quads along a ray: the present one, and where the ray enters it. */
-typedef struct terrimpi_ray_place {
-    uint32_t x, z;
-    terrimpi_ray_point enter;
-} terrimpi_ray_place;
-
 /* Where the ray crosses the quad's border along one axis, counted from its start. */
 static float terrimpi_ray_leave(float start, float way, float low, float high)
 {
@@ -2985,27 +2900,15 @@ static float terrimpi_ray_leave(float start, float way, float low, float high)
     return ((way > 0.0f ? high : low) - start) / way;
 }
 
-/* Moves one index a step along the way; 0 when that leaves the field. */
-static int terrimpi_ray_step(uint32_t *index, uint32_t last, float way)
-{
-    if (way > 0.0f ? *index == last : *index == 0u)
-        return 0;
-    *index = way > 0.0f ? *index + 1u : *index - 1u;
-    return 1;
-}
-
 static void terrimpi_ray_report(const terrimpi_ray *ray, const terrimpi_quad *quad, int side,
                                 float t, terrimp_ray_hit *hit)
 {
     terrimpi_ray_point point = terrimpi_ray_at(ray, quad, t);
-    float slope[2];
-
     hit->distance = ray->before + t;
     hit->position[0] = terrimpi_clamp(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
     hit->position[1] = terrimpi_quad_height(quad, side, point.u, point.v);
     hit->position[2] = terrimpi_clamp(ray->start[2] + t * ray->way[2], quad->z0, quad->z1);
-    terrimpi_quad_slope(quad, side, slope);
-    if (!terrimpi_slope_normal(slope, hit->normal)) { /* steeper than float can say */
+    if (!terrimpi_quad_normal(quad, side, hit->normal)) { /* steeper than float can say */
         hit->normal[0] = hit->normal[2] = 0.0f;
         hit->normal[1] = 1.0f;
     }
@@ -3014,47 +2917,37 @@ static void terrimpi_ray_report(const terrimpi_ray *ray, const terrimpi_quad *qu
 /* Walks from quad to quad until one is hit. Each turn takes a step along x or z and never back, so
    there are at most width + depth turns. */
 static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const terrimpi_ray *ray,
-                                        terrimpi_ray_place place, terrimp_ray_hit *hit)
+                                        uint32_t x, uint32_t z, terrimp_ray_hit *hit)
 {
     terrimpi_quad quad;
-    terrimp_result loaded = terrimpi_quad_load(field, place.x, place.z, &quad);
-
-    place.enter = terrimpi_ray_at(ray, &quad, 0.0f);
+    terrimp_result loaded = terrimpi_quad_load(field, x, z, &quad);
+    terrimpi_ray_point enter = terrimpi_ray_at(ray, &quad, 0.0f);
     for (;;) {
         float leave_x = terrimpi_ray_leave(ray->start[0], ray->way[0], quad.x0, quad.x1);
         float leave_z = terrimpi_ray_leave(ray->start[2], ray->way[2], quad.z0, quad.z1);
         float next = terrimpi_min(leave_x, leave_z), t;
         int along_x = leave_x <= leave_z, ends = !(next < ray->length), side;
+        float way = along_x ? ray->way[0] : ray->way[2];
+        uint32_t *index = along_x ? &x : &z, last = (along_x ? field->width : field->depth) - 2u;
         terrimpi_ray_point leave =
-            terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, place.enter.t, ray->length));
+            terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, enter.t, ray->length));
+        float *across = along_x ? &leave.u : &leave.v;
 
-        /* The border is crossed at exactly 0 or 1, whatever the rounding. */
-        if (!ends && along_x)
-            leave.u = ray->way[0] > 0.0f ? 1.0f : 0.0f;
-        if (!ends && !along_x)
-            leave.v = ray->way[2] > 0.0f ? 1.0f : 0.0f;
-        if (loaded == TERRIMP_OK &&
-            terrimpi_ray_quad(ray, &quad, &place.enter, &leave, &side, &t)) {
+        if (!ends) /* the border is crossed at exactly 0 or 1, whatever the rounding */
+            *across = way > 0.0f ? 1.0f : 0.0f;
+        if (loaded == TERRIMP_OK && terrimpi_ray_quad(ray, &quad, &enter, &leave, &side, &t)) {
             if (hit != NULL) {
                 terrimpi_ray_report(ray, &quad, side, t, hit);
-                hit->x = place.x;
-                hit->z = place.z;
+                hit->x = x;
+                hit->z = z;
             }
             return TERRIMP_OK;
         }
-        if (ends)
-            return TERRIMP_E_MISS;
-        if (along_x) {
-            if (!terrimpi_ray_step(&place.x, field->width - 2u, ray->way[0]))
-                return TERRIMP_E_MISS;
-            leave.u = 1.0f - leave.u;
-        } else {
-            if (!terrimpi_ray_step(&place.z, field->depth - 2u, ray->way[2]))
-                return TERRIMP_E_MISS;
-            leave.v = 1.0f - leave.v;
-        }
-        place.enter = leave;
-        loaded = terrimpi_quad_load(field, place.x, place.z, &quad);
+        TERRIMPI_REFUSE(ends || *index == (way > 0.0f ? last : 0u), TERRIMP_E_MISS);
+        *index = way > 0.0f ? *index + 1u : *index - 1u;
+        *across = 1.0f - *across;
+        enter = leave;
+        loaded = terrimpi_quad_load(field, x, z, &quad);
     }
 }
 
@@ -3065,23 +2958,16 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 {
     terrimp_heightfield f;
     terrimpi_ray ray;
-    terrimpi_ray_place place;
-    terrimp_result result = terrimp_heightfield_resolve(field, &f);
-
-    if (result != TERRIMP_OK)
-        return result;
-    if (origin == NULL || direction == NULL)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
-        !terrimpi_finite(max_distance))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(max_distance > 0.0f) || !terrimpi_ray_aim(direction, ray.way))
-        return TERRIMP_E_RANGE;
-    if (!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
-        !terrimpi_locate(f.origin_x, f.spacing_x, f.width, ray.start[0], &place.x) ||
-        !terrimpi_locate(f.origin_z, f.spacing_z, f.depth, ray.start[2], &place.z))
-        return TERRIMP_E_MISS;
-    return terrimpi_ray_walk(&f, &ray, place, hit);
+    uint32_t x, z;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_REFUSE(origin == NULL || direction == NULL, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
+                    !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) ||
+                    !terrimpi_ray_aim(direction, ray.way), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
+                    !terrimpi_locate(&f, ray.start[0], ray.start[2], &x, &z), TERRIMP_E_MISS);
+    return terrimpi_ray_walk(&f, &ray, x, z, hit);
 }
 
 /* ==== Camera ============================================================= >>impl-camera */
@@ -3091,59 +2977,21 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
 {
     terrimp_camera c;
     float right[3];
-    if (!camera || !out)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!camera || !out, TERRIMP_E_NULL);
     c = *camera;
-    if (!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) || !terrimpi_finite3(c.up) ||
-        !terrimpi_finite(c.fov_y_rad) || !terrimpi_finite(c.z_near) || !terrimpi_finite(c.z_far))
-        return TERRIMP_E_NOT_FINITE;
-    if (c.fov_y_rad == 0.0f)
-        c.fov_y_rad = 1.0471976f;
+    TERRIMPI_REFUSE(!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) ||
+                    !terrimpi_finite3(c.up) || !terrimpi_finite2(c.z_near, c.z_far) ||
+                    !terrimpi_finite(c.fov_y_rad), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_DEFAULT(c.fov_y_rad, 1.0471976f);
     if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
         c.up[1] = 1.0f;
-    if (c.fov_y_rad < 0.001f || c.fov_y_rad > 3.1f || c.width_px < 1u || c.width_px > 65536u ||
-        c.height_px < 1u || c.height_px > 65536u || c.z_near <= 0.0f || c.z_far <= c.z_near ||
-        !terrimpi_normalize(c.forward))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
+                    !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
+                    !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
+                    c.z_far <= c.z_near || !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
     terrimpi_basis(c.forward, c.up, right);
     *out = c;
     return TERRIMP_OK;
-}
-
-/* Column-major view matrix of an eye and its orthonormal axes. */
-static void terrimpi_view_matrix(const float eye[3], const float right[3], const float up[3],
-                                 const float forward[3], float m[16])
-{
-    int i;
-    for (i = 0; i < 3; i++) {
-        m[i * 4 + 0] = right[i];
-        m[i * 4 + 1] = up[i];
-        m[i * 4 + 2] = -forward[i];
-        m[i * 4 + 3] = 0.0f;
-    }
-    m[12] = -terrimpi_dot(right, eye);
-    m[13] = -terrimpi_dot(up, eye);
-    m[14] = terrimpi_dot(forward, eye);
-    m[15] = 1.0f;
-}
-
-/* Column-major perspective matrix of a frustum whose sides are tangents. */
-static void terrimpi_projection_matrix(float left, float right, float down, float up, float z_near,
-                                       float z_far, int depth_zero_to_one, float m[16])
-{
-    memset(m, 0, 16 * sizeof m[0]);
-    m[0] = 2.0f / (right - left);
-    m[5] = 2.0f / (up - down);
-    m[8] = (right + left) / (right - left);
-    m[9] = (up + down) / (up - down);
-    m[11] = -1.0f;
-    if (depth_zero_to_one) {
-        m[10] = -z_far / (z_far - z_near);
-        m[14] = -z_far * z_near / (z_far - z_near);
-    } else {
-        m[10] = -(z_far + z_near) / (z_far - z_near);
-        m[14] = -2.0f * z_far * z_near / (z_far - z_near);
-    }
 }
 
 /* Half the height and width of a resolved camera's screen at distance 1. */
@@ -3153,35 +3001,38 @@ static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x,
     *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
 }
 
+/* The frustum of a camera, as that of a capture. */
+static terrimp_result terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
+{
+    terrimp_camera c;
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    memcpy(out->eye, c.eye, sizeof c.eye);
+    memcpy(out->up, c.up, sizeof c.up);
+    memcpy(out->forward, c.forward, sizeof c.forward);
+    terrimpi_cross(c.forward, c.up, out->right);
+    out->z_near = c.z_near;
+    out->z_far = c.z_far;
+    terrimpi_camera_tangents(&c, &out->tan_right, &out->tan_up);
+    out->tan_left = -out->tan_right;
+    out->tan_down = -out->tan_up;
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16])
 {
-    terrimp_camera c;
-    terrimp_result result;
-    float right[3], tan_x, tan_y;
-    if (!view || !projection)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
-    terrimpi_cross(c.forward, c.up, right);
-    terrimpi_view_matrix(c.eye, right, c.up, c.forward, view);
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
-    terrimpi_projection_matrix(-tan_x, tan_x, -tan_y, tan_y, c.z_near, c.z_far,
-                               c.depth_zero_to_one, projection);
-    return TERRIMP_OK;
+    terrimp_capture c;
+    TERRIMPI_REFUSE(!view || !projection, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_camera_capture(camera, &c));
+    return terrimp_capture_matrices(&c, camera->depth_zero_to_one, view, projection);
 }
 
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
 {
     terrimp_camera c;
-    terrimp_result result;
     float tan_x, tan_y;
-    if (!factor)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!factor, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     terrimpi_camera_tangents(&c, &tan_x, &tan_y);
     *factor = (float)c.height_px / (2.0f * tan_y);
     return TERRIMP_OK;
@@ -3190,28 +3041,20 @@ TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *cam
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum)
 {
-    terrimp_camera c;
-    terrimp_result result;
-    float right[3], tan_x, tan_y;
+    terrimp_capture c;
     int i;
-    if (!frustum)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
-    terrimpi_cross(c.forward, c.up, right);
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
+    TERRIMPI_REFUSE(!frustum, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_camera_capture(camera, &c));
+    memset(frustum, 0, sizeof *frustum);
     for (i = 0; i < 3; i++) {
         frustum->eye[i] = c.eye[i];
-        frustum->plane[0][i] = right[i] + c.forward[i] * tan_x;
-        frustum->plane[1][i] = c.forward[i] * tan_x - right[i];
-        frustum->plane[2][i] = c.up[i] + c.forward[i] * tan_y;
-        frustum->plane[3][i] = c.forward[i] * tan_y - c.up[i];
+        frustum->plane[0][i] = c.right[i] - c.forward[i] * c.tan_left;
+        frustum->plane[1][i] = c.forward[i] * c.tan_right - c.right[i];
+        frustum->plane[2][i] = c.up[i] - c.forward[i] * c.tan_down;
+        frustum->plane[3][i] = c.forward[i] * c.tan_up - c.up[i];
         frustum->plane[4][i] = c.forward[i];
         frustum->plane[5][i] = -c.forward[i];
     }
-    for (i = 0; i < 4; i++)
-        frustum->plane[i][3] = 0.0f;
     frustum->plane[4][3] = -c.z_near;
     frustum->plane[5][3] = c.z_far;
     return TERRIMP_OK;
@@ -3268,67 +3111,64 @@ static void terrimpi_box_corner(const terrimp_box *box, int i, const float point
         corner[k] = ((i >> k) & 1 ? box->max[k] : box->min[k]) - point[k];
 }
 
-static terrimp_result terrimpi_check_box(const terrimp_box *box)
+/* Fits the sides and clip distances of a capture to points, with a hair's breadth more, so that
+   rounding leaves none outside and a flat box has a volume. Returns 0 when the cosine between
+   forward and the way to one of them is not above `least`. */
+static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t count, float least)
 {
-    int i;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max))
-        return TERRIMP_E_NOT_FINITE;
-    for (i = 0; i < 3; i++)
-        if (box->min[i] > box->max[i])
-            return TERRIMP_E_RANGE;
-    return TERRIMP_OK;
+    float slope = 1.0f; /* of the steepest ray: its length over its depth */
+    uint32_t i;
+    c->z_near = c->tan_left = c->tan_down = TERRIMPI_FLOAT_MAX;
+    c->z_far = c->tan_right = c->tan_up = -TERRIMPI_FLOAT_MAX;
+    for (i = 0; i < count; i++) {
+        float p[3], length, z, x, y;
+        terrimpi_sub(xyz + 3u * i, c->eye, p);
+        z = terrimpi_dot(c->forward, p);
+        length = terrimpi_length(p);
+        if (!(z > least * length))
+            return 0;
+        slope = terrimpi_max(slope, length / z);
+        x = terrimpi_dot(c->right, p) / z;
+        y = terrimpi_dot(c->up, p) / z;
+        c->z_near = terrimpi_min(c->z_near, z);
+        c->z_far = terrimpi_max(c->z_far, z);
+        c->tan_left = terrimpi_min(c->tan_left, x);
+        c->tan_right = terrimpi_max(c->tan_right, x);
+        c->tan_down = terrimpi_min(c->tan_down, y);
+        c->tan_up = terrimpi_max(c->tan_up, y);
+    }
+    c->z_near *= 1.0f - 1e-6f * slope;
+    c->z_far *= 1.0f + 1e-6f * slope;
+    terrimpi_widen(&c->tan_left, &c->tan_right, slope);
+    terrimpi_widen(&c->tan_down, &c->tan_up, slope);
+    return 1;
 }
 
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
+    static const float origin[3] = {0.0f, 0.0f, 0.0f};
     terrimp_capture c;
-    terrimp_result result;
-    float slope = 1.0f; /* of the steepest ray to a corner: its length over its depth */
+    float corners[8][3];
     int i;
-    if (!box || !eye || !capture)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_box(box);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
-    if (terrimp_box_distance(box, eye) <= 0.0f)
-        return TERRIMP_E_INSIDE;
+    TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
+                    !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
+                    box->min[2] > box->max[2], TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
     for (i = 0; i < 3; i++) {
         c.eye[i] = eye[i];
         c.forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
     }
-    if (!terrimpi_normalize(c.forward))
-        return TERRIMP_E_INSIDE;
+    TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_INSIDE);
     memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
     terrimpi_basis(c.forward, c.up, c.right);
-    c.z_near = c.z_far = 0.0f;
-    c.tan_left = c.tan_right = c.tan_down = c.tan_up = 0.0f;
-    for (i = 0; i < 8; i++) {
-        float p[3], length, z, x, y;
-        terrimpi_box_corner(box, i, eye, p);
-        z = terrimpi_dot(c.forward, p);
-        length = terrimpi_length(p);
-        /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-        if (!(z > 0.001f * length))
-            return TERRIMP_E_BEHIND;
-        slope = terrimpi_max(slope, length / z);
-        x = terrimpi_dot(c.right, p) / z;
-        y = terrimpi_dot(c.up, p) / z;
-        c.z_near = i ? terrimpi_min(c.z_near, z) : z;
-        c.z_far = i ? terrimpi_max(c.z_far, z) : z;
-        c.tan_left = i ? terrimpi_min(c.tan_left, x) : x;
-        c.tan_right = i ? terrimpi_max(c.tan_right, x) : x;
-        c.tan_down = i ? terrimpi_min(c.tan_down, y) : y;
-        c.tan_up = i ? terrimpi_max(c.tan_up, y) : y;
-    }
-    /* A hair's breadth, so that rounding leaves no corner outside and a flat box has a volume. */
-    c.z_near *= 1.0f - 1e-6f * slope;
-    c.z_far *= 1.0f + 1e-6f * slope;
-    terrimpi_widen(&c.tan_left, &c.tan_right, slope);
-    terrimpi_widen(&c.tan_down, &c.tan_up, slope);
+    for (i = 0; i < 8; i++)
+        terrimpi_box_corner(box, i, origin, corners[i]);
+    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
+    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, corners[0], 8, 0.001f), TERRIMP_E_BEHIND);
     *capture = c;
     return TERRIMP_OK;
 }
@@ -3336,35 +3176,14 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count)
 {
-    float low[2], high[2], slope = 1.0f; /* tangents; a ray's length over its depth */
-    uint32_t i, k;
-    if (!capture || !xyz)
-        return TERRIMP_E_NULL;
-    if (count == 0)
-        return TERRIMP_E_RANGE;
-    low[0] = low[1] = TERRIMPI_FLOAT_MAX;
-    high[0] = high[1] = -TERRIMPI_FLOAT_MAX;
-    for (i = 0; i < count; i++, xyz += 3) {
-        float p[3], depth, tangent[2];
-        for (k = 0; k < 3u; k++)
-            p[k] = xyz[k] - capture->eye[k];
-        depth = terrimpi_dot(p, capture->forward);
-        if (!(depth > 0.0f))
-            return TERRIMP_E_BEHIND;
-        tangent[0] = terrimpi_dot(p, capture->right) / depth;
-        tangent[1] = terrimpi_dot(p, capture->up) / depth;
-        slope = terrimpi_max(slope, terrimpi_length(p) / depth);
-        for (k = 0; k < 2u; k++) {
-            low[k] = terrimpi_min(low[k], tangent[k]);
-            high[k] = terrimpi_max(high[k], tangent[k]);
-        }
-    }
-    for (k = 0; k < 2u; k++)
-        terrimpi_widen(&low[k], &high[k], slope);
-    capture->tan_left = low[0];
-    capture->tan_right = high[0];
-    capture->tan_down = low[1];
-    capture->tan_up = high[1];
+    terrimp_capture c;
+    TERRIMPI_REFUSE(!capture || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
+    c = *capture;
+    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, xyz, count, 0.0f), TERRIMP_E_BEHIND);
+    c.z_near = capture->z_near;
+    c.z_far = capture->z_far;
+    *capture = c;
     return TERRIMP_OK;
 }
 
@@ -3372,12 +3191,31 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16])
 {
-    if (!capture || !view || !projection)
-        return TERRIMP_E_NULL;
-    terrimpi_view_matrix(capture->eye, capture->right, capture->up, capture->forward, view);
-    terrimpi_projection_matrix(capture->tan_left, capture->tan_right, capture->tan_down,
-                               capture->tan_up, capture->z_near, capture->z_far,
-                               depth_zero_to_one, projection);
+    const terrimp_capture *c = capture;
+    float width, height, depth;
+    int i;
+    TERRIMPI_REFUSE(!c || !view || !projection, TERRIMP_E_NULL);
+    for (i = 0; i < 3; i++) {
+        view[i * 4 + 0] = c->right[i];
+        view[i * 4 + 1] = c->up[i];
+        view[i * 4 + 2] = -c->forward[i];
+        view[i * 4 + 3] = 0.0f;
+    }
+    view[12] = -terrimpi_dot(c->right, c->eye);
+    view[13] = -terrimpi_dot(c->up, c->eye);
+    view[14] = terrimpi_dot(c->forward, c->eye);
+    view[15] = 1.0f;
+    width = c->tan_right - c->tan_left;
+    height = c->tan_up - c->tan_down;
+    depth = c->z_far - c->z_near;
+    memset(projection, 0, 16 * sizeof *projection);
+    projection[0] = 2.0f / width;
+    projection[5] = 2.0f / height;
+    projection[8] = (c->tan_right + c->tan_left) / width;
+    projection[9] = (c->tan_up + c->tan_down) / height;
+    projection[10] = -(depth_zero_to_one ? c->z_far : c->z_far + c->z_near) / depth;
+    projection[11] = -1.0f;
+    projection[14] = (depth_zero_to_one ? -c->z_far : -2.0f * c->z_far) * c->z_near / depth;
     return TERRIMP_OK;
 }
 
@@ -3395,11 +3233,20 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
+/* Whether a side of a node, or a border of a tile, runs along x: Z0 and Z1 do. Of either pair the
+   odd one is the last row or column. */
+static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
+
 /* ---- patterns ---- */
 
 static int terrimpi_mip_quads_fit(uint32_t quads)
 {
     return quads >= 4u && quads <= 128u && quads % 2u == 0;
+}
+
+static int terrimpi_mip_form_fits(uint32_t quads, int form)
+{
+    return terrimpi_mip_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
 }
 
 static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
@@ -3419,7 +3266,7 @@ static uint32_t terrimpi_mip_border_vertices(uint32_t quads)
 TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form)
 {
     uint32_t grid = (chunk_quads + 1u) * (chunk_quads + 1u);
-    if (!terrimpi_mip_quads_fit(chunk_quads) || form < 0 || form >= (int)TERRIMP_FORM_COUNT)
+    if (!terrimpi_mip_form_fits(chunk_quads, form))
         return 0;
     return form == TERRIMP_FORM_FITTED
                ? grid + 4u * terrimpi_mip_border_vertices(chunk_quads) : grid;
@@ -3459,11 +3306,9 @@ TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, 
                                                 terrimp_pattern *found)
 {
     uint32_t i, first = 0;
-    if (!found)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_mip_quads_fit(chunk_quads) || pattern >= TERRIMP_PATTERN_COUNT || form < 0 ||
-        form >= (int)TERRIMP_FORM_COUNT)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!found, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_mip_form_fits(chunk_quads, form) || pattern >= TERRIMP_PATTERN_COUNT,
+                    TERRIMP_E_RANGE);
     for (i = 0; i < pattern; i++)
         first += terrimpi_mip_indices(chunk_quads, form, i);
     found->first_index = first;
@@ -3493,42 +3338,25 @@ static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
     return (int)(w->pattern >> side & 1u);
 }
 
-/* The vertex of the coarse border on `side` that is `along` quads from its beginning, itself if it
-   is not one of those. */
-static uint16_t terrimpi_mip_border_index(const terrimpi_mip_writer *w, int side, uint32_t along,
-                                          uint32_t self)
-{
-    uint32_t border = terrimpi_mip_border_vertices(w->quads);
-    if (w->form != TERRIMP_FORM_FITTED || along == 0 || along == w->quads)
-        return (uint16_t)self;
-    along = along / 2u - 1u;
-    return (uint16_t)((w->quads + 1u) * (w->quads + 1u) + (uint32_t)side * border + along);
-}
-
 /* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
    towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
-   edge. */
+   edge. In fitted patterns coarse sides have vertices of their own between their ends. */
 static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
 {
-    uint32_t row = w->quads + 1u;
-    if (w->form == TERRIMP_FORM_STITCHED)
-        return (uint16_t)(j * row + i);
-    if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        i += i & 1u;
-    if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        i -= i & 1u;
-    if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        j += j & 1u;
-    if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        j -= j & 1u;
-    if (j == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_Z0, i, j * row + i);
-    if (j == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_Z1, i, j * row + i);
-    if (i == 0 && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_X0, j, j * row + i);
-    if (i == w->quads && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        return terrimpi_mip_border_index(w, TERRIMP_SIDE_X1, j, j * row + i);
+    uint32_t row = w->quads + 1u, border = terrimpi_mip_border_vertices(w->quads);
+    uint32_t own = row * row; /* the first of the side's own vertices */
+    int side;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++, own += border) {
+        int along_x = terrimpi_along_x(side), last = side & 1;
+        uint32_t *along = along_x ? &i : &j;
+        if (w->form == TERRIMP_FORM_STITCHED || !terrimpi_mip_coarse(w, side) ||
+            (along_x ? j : i) != (last ? w->quads : 0u))
+            continue;
+        if (*along & 1u)
+            *along = last ? *along - 1u : *along + 1u;
+        if (w->form == TERRIMP_FORM_FITTED && *along != 0 && *along != w->quads)
+            return (uint16_t)(own + *along / 2u - 1u);
+    }
     return (uint16_t)(j * row + i);
 }
 
@@ -3619,12 +3447,9 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 {
     terrimpi_mip_writer w;
     uint32_t count = terrimp_pattern_index_count(chunk_quads, form);
-    if (!indices)
-        return TERRIMP_E_NULL;
-    if (count == 0)
-        return TERRIMP_E_RANGE;
-    if (capacity < count)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(capacity < count, TERRIMP_E_CAPACITY);
     w.quads = chunk_quads;
     w.form = form;
     w.out = indices;
@@ -3639,17 +3464,12 @@ TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
                                                uint32_t chunk_quads, terrimp_geomip *tree)
 {
     terrimp_geomip t;
-    terrimp_result result;
     uint32_t x, z, level;
-    if (!field || !tree)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!field || !tree, TERRIMP_E_NULL);
     memset(&t, 0, sizeof t);
-    result = terrimp_heightfield_resolve(field, &t.field);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &t.field));
     t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
-    if (!terrimpi_mip_quads_fit(t.chunk_quads))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(t.chunk_quads), TERRIMP_E_RANGE);
     x = (t.field.width - 2u) / t.chunk_quads + 1u;
     z = (t.field.depth - 2u) / t.chunk_quads + 1u;
     for (level = 0;; level++) {
@@ -3696,6 +3516,13 @@ static terrimpi_mip_place terrimpi_mip_place_of(const terrimp_geomip *t, uint32_
     return p;
 }
 
+/* The parent of a node that is not the root. */
+static uint32_t terrimpi_mip_parent(const terrimp_geomip *t, uint32_t node)
+{
+    terrimpi_mip_place p = terrimpi_mip_place_of(t, node);
+    return terrimpi_mip_number(t, p.level + 1u, p.x / 2u, p.z / 2u);
+}
+
 /* Column and row of lattice position (i, j) of a level. */
 static uint32_t terrimpi_mip_col(const terrimp_geomip *t, uint32_t level, uint32_t i)
 {
@@ -3709,21 +3536,27 @@ static uint32_t terrimpi_mip_row(const terrimp_geomip *t, uint32_t level, uint32
     return j > (last >> level) ? last : j << level;
 }
 
+/* World x and z of lattice position (i, j) of a level. */
+static float terrimpi_mip_x(const terrimp_geomip *t, uint32_t level, uint32_t i)
+{
+    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_mip_col(t, level, i));
+}
+
+static float terrimpi_mip_z(const terrimp_geomip *t, uint32_t level, uint32_t j)
+{
+    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_mip_row(t, level, j));
+}
+
 static void terrimpi_mip_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
 {
     const terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, p.level, p.x, p.z)];
-    const terrimp_heightfield *f = &t->field;
-    uint32_t quads = t->chunk_quads;
-    box->min[0] = terrimpi_line(f->origin_x, f->spacing_x,
-                                terrimpi_mip_col(t, p.level, p.x * quads));
-    box->max[0] = terrimpi_line(f->origin_x, f->spacing_x,
-                                terrimpi_mip_col(t, p.level, (p.x + 1u) * quads));
+    uint32_t i = p.x * t->chunk_quads, j = p.z * t->chunk_quads;
+    box->min[0] = terrimpi_mip_x(t, p.level, i);
+    box->max[0] = terrimpi_mip_x(t, p.level, i + t->chunk_quads);
     box->min[1] = node->low;
     box->max[1] = node->high;
-    box->min[2] = terrimpi_line(f->origin_z, f->spacing_z,
-                                terrimpi_mip_row(t, p.level, p.z * quads));
-    box->max[2] = terrimpi_line(f->origin_z, f->spacing_z,
-                                terrimpi_mip_row(t, p.level, (p.z + 1u) * quads));
+    box->min[2] = terrimpi_mip_z(t, p.level, j);
+    box->max[2] = terrimpi_mip_z(t, p.level, j + t->chunk_quads);
 }
 
 /* The box within which a node's error holds: half a quad larger all round, for what finer
@@ -3741,10 +3574,8 @@ static void terrimpi_mip_error_box(const terrimp_geomip *t, terrimpi_mip_place p
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
                                               terrimp_box *box)
 {
-    if (!tree || !box || !tree->nodes)
-        return TERRIMP_E_NULL;
-    if (node >= tree->node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!tree || !box || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     terrimpi_mip_box(tree, terrimpi_mip_place_of(tree, node), box);
     return TERRIMP_OK;
 }
@@ -3753,10 +3584,8 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32
 static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, int side,
                                terrimpi_mip_place *beyond)
 {
-    if (side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1)
-        p.z += side == TERRIMP_SIDE_Z1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
-    else
-        p.x += side == TERRIMP_SIDE_X1 ? 1u : (uint32_t)-1;
+    uint32_t *across = terrimpi_along_x(side) ? &p.z : &p.x;
+    *across += side & 1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
     *beyond = p;
     return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
 }
@@ -3777,15 +3606,10 @@ static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, in
 
 #define TERRIMPI_MIP_SWEEPS 4u
 
-/* Size of a level's lattice without what is off it at the far edges. */
+/* Columns of a level's lattice without what is off it at the far edges. */
 static uint32_t terrimpi_mip_cols(const terrimp_geomip *t, uint32_t level)
 {
     return ((t->field.width - 1u) >> level) + 1u;
-}
-
-static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
-{
-    return ((t->field.depth - 1u) >> level) + 1u;
 }
 
 /* Height of a level's lattice at sample (x, z), which belongs to that lattice. */
@@ -3830,6 +3654,12 @@ static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32
 }
 
 #ifndef TERRIMP_NO_BUILD
+
+/* The rows, likewise. */
+static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
+{
+    return ((t->field.depth - 1u) >> level) + 1u;
+}
 
 /* Loads of level 1, where rows are the samples two rows above to two below; in units of a twelfth
    of a small triangle's area, as all loads. */
@@ -3880,14 +3710,14 @@ static void terrimpi_mip_sweep(const terrimp_geomip *t, uint32_t level, uint32_t
    row behind the one before; scratch keeps the loads of the rows that they are at. */
 static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *scratch)
 {
-    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), i, j, sweep;
+    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), j, sweep;
     float *fit = t->fits + t->fit_first[level];
     for (j = 0; j < rows + TERRIMPI_MIP_SWEEPS; j++) {
         if (j < rows) {
             memcpy(scratch + j % (TERRIMPI_MIP_SWEEPS + 1u) * cols, fit + j * cols,
                    cols * sizeof *fit);
-            for (i = 0; i < cols; i++)
-                fit[j * cols + i] = terrimpi_sample(&t->field, i << level, j << level);
+            terrimpi_heightfield_tile(&t->field, 0, j << level, cols, 1, 1u << level,
+                                      fit + j * cols);
         }
         for (sweep = 1; sweep <= TERRIMPI_MIP_SWEEPS; sweep++)
             if (j > sweep && j - sweep + 1u < rows)
@@ -3899,8 +3729,7 @@ static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *s
 TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch)
 {
     uint32_t level, j;
-    if (!tree || !scratch)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!tree || !scratch, TERRIMP_E_NULL);
     for (level = 1; tree->fits && level < tree->level_count; level++) {
         uint32_t cols = terrimpi_mip_cols(tree, level), width = terrimpi_mip_cols(tree, level - 1u);
         float *loads = tree->fits + tree->fit_first[level];
@@ -4099,15 +3928,8 @@ static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_
 {
     terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, 0, p.x, p.z)];
     uint32_t quads = t->chunk_quads;
-    terrimpi_scan scan;
-    terrimp_result result;
-    scan.skip_voids = 0;
-    result = terrimpi_scan_tile(&t->field, p.x * quads, p.z * quads, quads + 1u, quads + 1u, 1,
-                                &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    node->low = terrimpi_world_height(&t->field, scan.low);
-    node->high = terrimpi_world_height(&t->field, scan.high);
+    terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
+    TERRIMPI_TRY(terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high));
     node->error = node->rms = 0.0f;
     if (t->fits)
         terrimpi_mip_drawn_range(t, p, node);
@@ -4120,10 +3942,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
     terrimpi_mip_place p, beyond;
     terrimpi_mip_misses misses;
     int side;
-    if (!tree || !scratch || !tree->nodes)
-        return TERRIMP_E_NULL;
-    if (node >= tree->node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     p = terrimpi_mip_place_of(tree, node);
     if (p.level == 0)
         return terrimpi_mip_build_leaf(tree, p);
@@ -4146,31 +3966,24 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree,
 
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree)
 {
-    uint32_t level, x, z;
-    if (!tree || !tree->nodes)
-        return TERRIMP_E_NULL;
-    for (level = 1; level < tree->level_count; level++)
-        for (z = 0; z < tree->level_z[level - 1u]; z++)
-            for (x = 0; x < tree->level_x[level - 1u]; x++) {
-                const terrimp_geomip_node *child =
-                    &tree->nodes[terrimpi_mip_number(tree, level - 1u, x, z)];
-                terrimp_geomip_node *node =
-                    &tree->nodes[terrimpi_mip_number(tree, level, x / 2u, z / 2u)];
-                node->low = terrimpi_min(node->low, child->low);
-                node->high = terrimpi_max(node->high, child->high);
-                node->error = terrimpi_max(node->error, child->error);
-            }
+    uint32_t i;
+    TERRIMPI_REFUSE(!tree || !tree->nodes, TERRIMP_E_NULL);
+    for (i = 0; i + 1u < tree->node_count; i++) {
+        const terrimp_geomip_node *child = &tree->nodes[i];
+        terrimp_geomip_node *node = &tree->nodes[terrimpi_mip_parent(tree, i)];
+        node->low = terrimpi_min(node->low, child->low);
+        node->high = terrimpi_max(node->high, child->high);
+        node->error = terrimpi_max(node->error, child->error);
+    }
     return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch)
 {
     uint32_t node;
-    terrimp_result result = terrimp_geomip_fit(tree, scratch);
-    for (node = 0; node < (tree ? tree->node_count : 0) && result == TERRIMP_OK; node++)
-        result = terrimp_geomip_build_node(tree, node, scratch);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_geomip_fit(tree, scratch));
+    for (node = 0; node < tree->node_count; node++)
+        TERRIMPI_TRY(terrimp_geomip_build_node(tree, node, scratch));
     return terrimp_geomip_build_finish(tree);
 }
 
@@ -4203,53 +4016,36 @@ static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
 }
 
-static void terrimpi_mip_distances(const terrimp_geomip *t, int rule, float tolerance_px,
-                                   float morph_ratio, float pixel_factor, float *distances)
-{
-    uint32_t level, x, z;
-    for (level = 0; level < t->level_count; level++) {
-        for (x = t->level_first[level]; x < t->level_first[level + 1u]; x++)
-            distances[x] = terrimpi_mip_distance(t, level, x, rule, tolerance_px, pixel_factor);
-        if (level == 0)
-            continue;
-        for (z = 0; z < t->level_z[level - 1u]; z++)
-            for (x = 0; x < t->level_x[level - 1u]; x++) {
-                float least = distances[terrimpi_mip_number(t, level - 1u, x, z)];
-                float *d = &distances[terrimpi_mip_number(t, level, x / 2u, z / 2u)];
-                least = terrimpi_min(least * morph_ratio * morph_ratio, TERRIMPI_MIP_MOST);
-                *d = terrimpi_max(*d, least);
-            }
-    }
-}
-
 /* Checks the settings that selection and distances share. */
 static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
-    if (!t || !t->nodes)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(tolerance_px) || !terrimpi_finite(morph_ratio))
-        return TERRIMP_E_NOT_FINITE;
-    return rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || tolerance_px < 0.01f ||
-                   tolerance_px > 1000.0f || morph_ratio < 1.0f || morph_ratio > 4.0f
-               ? TERRIMP_E_RANGE
-               : TERRIMP_OK;
+    TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+                    !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
+                    !terrimpi_within(morph_ratio, 1.0f, 4.0f), TERRIMP_E_RANGE);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
                                                     float tolerance_px, float morph_ratio,
                                                     float pixel_factor, float *distances)
 {
-    terrimp_result result = terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!distances)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(pixel_factor))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(pixel_factor > 0.0f))
-        return TERRIMP_E_RANGE;
-    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
+    uint32_t level, node;
+    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
+    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
+    for (level = 0; level < tree->level_count; level++)
+        for (node = tree->level_first[level]; node < tree->level_first[level + 1u]; node++)
+            distances[node] =
+                terrimpi_mip_distance(tree, level, node, rule, tolerance_px, pixel_factor);
+    for (node = 0; node + 1u < tree->node_count; node++) {
+        float least = distances[node] * morph_ratio * morph_ratio;
+        float *d = &distances[terrimpi_mip_parent(tree, node)];
+        *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
+    }
     return TERRIMP_OK;
 }
 
@@ -4405,6 +4201,35 @@ typedef struct terrimpi_mip_visit {
     int mask;
 } terrimpi_mip_visit;
 
+/* Enough for a walk that goes down one child and keeps the other three. */
+#define TERRIMPI_MIP_STACK (3u * TERRIMP_GEOMIP_LEVELS + 1u)
+
+/* Begins a walk at the root; returns the depth of the stack. */
+static uint32_t terrimpi_mip_push_root(const terrimp_geomip *t, terrimpi_mip_visit *stack, int mask)
+{
+    stack->place.level = t->level_count - 1u;
+    stack->place.x = stack->place.z = 0;
+    stack->mask = mask;
+    return 1;
+}
+
+/* Pushes the children of a node, `first` (bit 0: x, bit 1: z) last, so that it is visited first. */
+static uint32_t terrimpi_mip_push_children(const terrimp_geomip *t, terrimpi_mip_visit v,
+                                           uint32_t first, terrimpi_mip_visit *stack,
+                                           uint32_t depth)
+{
+    terrimpi_mip_place p = v.place;
+    uint32_t i;
+    v.place.level--;
+    for (i = 4u; i-- > 0;) {
+        v.place.x = p.x * 2u + ((first ^ i) & 1u);
+        v.place.z = p.z * 2u + ((first ^ i) >> 1);
+        if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
+            stack[depth++] = v;
+    }
+    return depth;
+}
+
 /* Marks the nodes whose own error asks for a split, and those that are close to it. Measures never
    grow towards the leaves, so what lies below an unsplit node asks for nothing. What is out of view
    asks for nothing either, unless nodes morph: then a border would jump when one of its nodes
@@ -4412,13 +4237,10 @@ typedef struct terrimpi_mip_visit {
 static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[3u * TERRIMP_GEOMIP_LEVELS + 1u];
-    uint32_t depth = 1, i;
+    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
     float stay = 1.0f + f->view->hysteresis;
     float worth = 1.0f / (f->view->morph_ratio * f->view->morph_ratio);
-    stack[0].place.level = t->level_count - 1u;
-    stack[0].place.x = stack[0].place.z = 0;
-    stack[0].mask = worth < 1.0f ? 0 : TERRIMP_PLANES_ALL;
+    uint32_t depth = terrimpi_mip_push_root(t, stack, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
     while (depth > 0) {
         terrimpi_mip_visit v = stack[--depth];
         terrimpi_mip_place p = v.place;
@@ -4430,15 +4252,8 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
         if (measure < worth)
             continue;
         terrimpi_mip_raise(f, p.level, node, measure);
-        if (measure < 1.0f || p.level == 1u)
-            continue;
-        v.place.level--;
-        for (i = 0; i < 4u; i++) {
-            v.place.x = p.x * 2u + (i & 1u);
-            v.place.z = p.z * 2u + (i >> 1);
-            if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
-                stack[depth++] = v;
-        }
+        if (measure >= 1.0f && p.level > 1u)
+            depth = terrimpi_mip_push_children(t, v, 0, stack, depth);
     }
 }
 
@@ -4455,10 +4270,7 @@ static void terrimpi_mip_balance(terrimpi_mip_frame *f)
     int side;
     for (level = 1; level + 1u < t->level_count; level++)
         for (node = f->first[level]; node != t->node_count; node = f->view->marks[node].next) {
-            terrimpi_mip_place p, beyond;
-            p.level = level;
-            p.x = (node - t->level_first[level]) % t->level_x[level];
-            p.z = (node - t->level_first[level]) / t->level_x[level];
+            terrimpi_mip_place p = terrimpi_mip_place_of(t, node), beyond;
             for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
                 if (terrimpi_mip_beyond(t, p, side, &beyond))
                     terrimpi_mip_raise(f, level + 1u,
@@ -4535,48 +4347,30 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
 static void terrimpi_mip_collect(terrimpi_mip_frame *f)
 {
     const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1, i;
+    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
+    uint32_t depth = terrimpi_mip_push_root(t, stack, TERRIMP_PLANES_ALL);
     f->view->draws_needed = f->view->triangle_count = 0;
-    stack[0].place.level = t->level_count - 1u;
-    stack[0].place.x = stack[0].place.z = 0;
-    stack[0].mask = TERRIMP_PLANES_ALL;
     while (depth > 0) {
-        terrimpi_mip_place p;
+        terrimpi_mip_visit v = stack[--depth];
+        terrimpi_mip_place p = v.place;
         terrimp_box box;
-        uint32_t node, closest = 0;
-        top = stack[--depth];
-        p = top.place;
-        node = terrimpi_mip_number(t, p.level, p.x, p.z);
-        if (top.mask) {
+        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z), closest = 0;
+        if (v.mask) {
             terrimpi_mip_box(t, p, &box);
-            top.mask = terrimp_frustum_test(&f->frustum, &box, top.mask);
-            if (top.mask == TERRIMP_PLANES_OUTSIDE)
+            v.mask = terrimp_frustum_test(&f->frustum, &box, v.mask);
+            if (v.mask == TERRIMP_PLANES_OUTSIDE)
                 continue;
         }
         if (p.level == 0 || terrimpi_mip_marked(f, node) < 1.0f) {
             terrimpi_mip_emit(f, p, node);
             continue;
         }
-        p.level--;
-        p.x *= 2u;
-        p.z *= 2u;
-        if (f->eye[0] >= terrimpi_line(t->field.origin_x, t->field.spacing_x,
-                                       terrimpi_mip_col(t, p.level, (p.x + 1u) * t->chunk_quads)))
+        p.level--; /* the eye against where the first child ends */
+        if (f->eye[0] >= terrimpi_mip_x(t, p.level, (2u * p.x + 1u) * t->chunk_quads))
             closest |= 1u;
-        if (f->eye[2] >= terrimpi_line(t->field.origin_z, t->field.spacing_z,
-                                       terrimpi_mip_row(t, p.level, (p.z + 1u) * t->chunk_quads)))
+        if (f->eye[2] >= terrimpi_mip_z(t, p.level, (2u * p.z + 1u) * t->chunk_quads))
             closest |= 2u;
-        for (i = 4u; i-- > 0;) { /* the last one pushed is the first one visited */
-            terrimpi_mip_place child = p;
-            child.x += (closest ^ i) & 1u;
-            child.z += (closest ^ i) >> 1;
-            if (child.x >= t->level_x[p.level] || child.z >= t->level_z[p.level])
-                continue;
-            stack[depth].place = child;
-            stack[depth].mask = top.mask;
-            depth++;
-        }
+        depth = terrimpi_mip_push_children(t, v, closest, stack, depth);
     }
 }
 
@@ -4593,26 +4387,20 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
-    terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
-                           v->distances);
+    terrimp_geomip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
+                             v->distances);
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
 static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
                                                 terrimp_geomip_view *view)
 {
-    if (view->rule == TERRIMP_GEOMIP_DEFAULT)
-        view->rule = TERRIMP_GEOMIP_PICTURE;
-    if (view->tolerance_px == 0.0f)
-        view->tolerance_px = 1.0f;
-    if (view->morph_ratio == 0.0f)
-        view->morph_ratio = 1.0f;
-    if (!view->distances || !view->marks || !view->draws)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(view->hysteresis))
-        return TERRIMP_E_NOT_FINITE;
-    if (view->hysteresis < 0.0f || view->hysteresis > 1.0f)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_DEFAULT(view->rule, TERRIMP_GEOMIP_PICTURE);
+    TERRIMPI_DEFAULT(view->tolerance_px, 1.0f);
+    TERRIMPI_DEFAULT(view->morph_ratio, 1.0f);
+    TERRIMPI_REFUSE(!view->distances || !view->marks || !view->draws, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_within(view->hysteresis, 0.0f, 1.0f), TERRIMP_E_RANGE);
     return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
 }
 
@@ -4623,18 +4411,12 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
     terrimpi_mip_frame f;
     terrimp_geomip_view v;
     terrimp_camera c;
-    terrimp_result result;
     float pixel_factor;
     uint32_t level;
-    if (!tree || !view)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &c);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
-    result = terrimpi_mip_view_resolve(tree, &v);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
     terrimp_camera_frustum(&c, &f.frustum);
     terrimp_camera_pixel_factor(&c, &pixel_factor);
     f.tree = tree;
@@ -4651,10 +4433,11 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
     view->frame = v.frame;
     memcpy(view->distances_for, v.distances_for, sizeof v.distances_for);
     view->draws_needed = v.draws_needed;
-    result = v.draws_needed > v.draw_capacity ? TERRIMP_E_CAPACITY : TERRIMP_OK;
-    view->draw_count = result == TERRIMP_OK ? v.draws_needed : 0;
-    view->triangle_count = result == TERRIMP_OK ? v.triangle_count : 0;
-    return result;
+    view->draw_count = view->triangle_count = 0;
+    TERRIMPI_REFUSE(v.draws_needed > v.draw_capacity, TERRIMP_E_CAPACITY);
+    view->draw_count = v.draws_needed;
+    view->triangle_count = v.triangle_count;
+    return TERRIMP_OK;
 }
 
 /* ---- vertices and morphing ---- */
@@ -4699,14 +4482,6 @@ static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_
                                     terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
 }
 
-/* Place on the grid of the k-th vertex of a coarse border. */
-static void terrimpi_mip_border_vertex(uint32_t quads, int side, uint32_t k, uint32_t at[2])
-{
-    int along_z = side == TERRIMP_SIDE_X0 || side == TERRIMP_SIDE_X1;
-    at[along_z] = 2u * (k + 1u);
-    at[!along_z] = side == TERRIMP_SIDE_Z1 || side == TERRIMP_SIDE_X1 ? quads : 0;
-}
-
 /* Writes one position, and moves on to the next. */
 static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z,
                                   float **xyz)
@@ -4723,20 +4498,19 @@ static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint3
 static void terrimpi_mip_fill_borders(const terrimp_geomip *t, terrimpi_mip_place p, float *xyz,
                                       terrimp_geomip_vertex *vertices)
 {
-    uint32_t quads = t->chunk_quads, k, at[2];
+    uint32_t quads = t->chunk_quads, along;
     int side;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        for (k = 0; k < terrimpi_mip_border_vertices(quads); k++) {
-            uint32_t x, z;
-            terrimpi_mip_border_vertex(quads, side, k, at);
-            x = terrimpi_mip_col(t, p.level, p.x * quads + at[0]);
-            z = terrimpi_mip_row(t, p.level, p.z * quads + at[1]);
+        for (along = 2; along < quads; along += 2u) {
+            uint32_t across = side & 1 ? quads : 0u;
+            uint32_t i = p.x * quads + (terrimpi_along_x(side) ? along : across);
+            uint32_t j = p.z * quads + (terrimpi_along_x(side) ? across : along);
+            uint32_t x = terrimpi_mip_col(t, p.level, i), z = terrimpi_mip_row(t, p.level, j);
             terrimpi_mip_position(t, p.level + 1u, x, z, &xyz);
             if (!vertices)
                 continue;
             vertices->height = terrimpi_mip_stand(t, p.level + 1u, x, z);
-            vertices->move =
-                terrimpi_mip_move(t, p.level, p.x * quads + at[0], p.z * quads + at[1], 1);
+            vertices->move = terrimpi_mip_move(t, p.level, i, j, 1);
             vertices->beside[0] = vertices->beside[1] = 0.0f;
             vertices++;
         }
@@ -4748,10 +4522,8 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tr
 {
     terrimpi_mip_place p;
     uint32_t i, j, i0, j0;
-    if (!tree || (!xyz && !vertices))
-        return TERRIMP_E_NULL;
-    if (node >= tree->node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     p = terrimpi_mip_place_of(tree, node);
     i0 = p.x * tree->chunk_quads;
     j0 = p.z * tree->chunk_quads;
@@ -4767,55 +4539,40 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tr
     return TERRIMP_OK;
 }
 
-/* With fits every vertex moves to the parent's shape, without them only odd ones do. */
-static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t i, uint32_t j,
-                                 terrimp_geomip_weights *w)
+/* The weights of vertex k, of the grid or of a coarse border. With fits every vertex moves to the
+   parent's shape, without them only odd ones do. */
+static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
 {
-    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED, corner;
-    uint8_t on[TERRIMP_SIDE_COUNT];
-    int side;
+    uint32_t row = quads + 1u, i = k % row, j = k / row, from[TERRIMP_SIDE_COUNT], side;
+    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED;
+    int corner = (i == 0 || i == quads) && (j == 0 || j == quads);
     memset(w, 0, sizeof *w);
-    on[TERRIMP_SIDE_Z0] = j == 0;
-    on[TERRIMP_SIDE_Z1] = j == quads;
-    on[TERRIMP_SIDE_X0] = i == 0;
-    on[TERRIMP_SIDE_X1] = i == quads;
-    corner = (j == 0 || j == quads) && (i == 0 || i == quads);
-    w->self = odd != 0 || fitted;
-    w->beside[TERRIMP_SIDE_Z0] = j == 1u;
-    w->beside[TERRIMP_SIDE_Z1] = j == quads - 1u;
-    w->beside[TERRIMP_SIDE_X0] = i == 1u;
-    w->beside[TERRIMP_SIDE_X1] = i == quads - 1u;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        if (!on[side])
-            continue;
-        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
-        w->beside[side] = odd != 0;
-        w->self = 0;
-    }
-}
-
-/* The weights of vertex k, of the grid or of a coarse border. */
-static void terrimpi_mip_weights_of(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
-{
-    uint32_t grid = (quads + 1u) * (quads + 1u);
-    if (k < grid) {
-        terrimpi_mip_weights(quads, form, k % (quads + 1u), k / (quads + 1u), w);
+    if (k >= row * row) {
+        w->even[(k - row * row) / terrimpi_mip_border_vertices(quads)] = 1;
         return;
     }
-    memset(w, 0, sizeof *w);
-    w->even[(k - grid) / terrimpi_mip_border_vertices(quads)] = 1;
+    from[TERRIMP_SIDE_Z0] = j;
+    from[TERRIMP_SIDE_Z1] = quads - j;
+    from[TERRIMP_SIDE_X0] = i;
+    from[TERRIMP_SIDE_X1] = quads - i;
+    w->self = odd || fitted;
+    for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
+        w->beside[side] = from[side] == 1u || (from[side] == 0 && odd);
+        if (from[side] > 0)
+            continue;
+        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
+        w->self = 0;
+    }
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
                                                        terrimp_geomip_weights *weights)
 {
     uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
-    if (!weights)
-        return TERRIMP_E_NULL;
-    if (count == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!weights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
     for (k = 0; k < count; k++)
-        terrimpi_mip_weights_of(chunk_quads, form, k, &weights[k]);
+        terrimpi_mip_weights(chunk_quads, form, k, &weights[k]);
     return TERRIMP_OK;
 }
 
@@ -4831,15 +4588,13 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
                                                 float *heights, size_t stride)
 {
     uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
-    if (!draw || !vertices || !heights)
-        return TERRIMP_E_NULL;
-    if (count == 0 || stride == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!draw || !vertices || !heights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count == 0 || stride == 0, TERRIMP_E_RANGE);
     for (k = 0; k < count; k++, vertices++, heights += stride) {
         const float *coarse = draw->side_coarse;
         terrimp_geomip_weights w;
         float factor, along_z, along_x;
-        terrimpi_mip_weights_of(chunk_quads, form, k, &w);
+        terrimpi_mip_weights(chunk_quads, form, k, &w);
         factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
                  terrimpi_mip_dot4(w.even, coarse);
         along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
@@ -4871,22 +4626,19 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
 /* Writes the triangles of a wall along a loop of n vertices, whose rim is the vertices from
-   `rim` on. */
+   `rim` on. Facing outwards with the rim below, or inwards with the rim above. */
 static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwards)
 {
     uint32_t i;
-    for (i = 0; i < n; i++, t += 6) {
+    for (i = 0; i < n; i++) {
         uint16_t p = (uint16_t)i, q = (uint16_t)((i + 1) % n);
-        uint16_t p_rim = (uint16_t)(rim + p);
-        uint16_t q_rim = (uint16_t)(rim + q);
-        /* outwards, rim below: seen from outside the loop runs from left to right; inwards, rim
-           above: seen from inside it runs from right to left. The same order serves both. */
-        t[0] = inwards ? q : p;
-        t[1] = inwards ? p : p_rim;
-        t[2] = inwards ? p_rim : q_rim;
-        t[3] = inwards ? q : p;
-        t[4] = inwards ? p_rim : q_rim;
-        t[5] = inwards ? q_rim : q;
+        uint16_t p_rim = (uint16_t)(rim + p), q_rim = (uint16_t)(rim + q);
+        *t++ = inwards ? q : p;
+        *t++ = inwards ? p : p_rim;
+        *t++ = inwards ? p_rim : q_rim;
+        *t++ = inwards ? q : p;
+        *t++ = inwards ? p_rim : q_rim;
+        *t++ = inwards ? q_rim : q;
     }
 }
 
@@ -4895,9 +4647,6 @@ static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwar
 /* Heights are worked with in steps, -TERRIMPI_STEPS to +TERRIMPI_STEPS over the tile's range: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
 #define TERRIMPI_STEPS 2047
-
-/* A border height that is further out than this counts as this: keeps all sums within 64 bits. */
-#define TERRIMPI_MAX_STEPS 1048576.0f
 
 /* Tenths of vertices inside the start mesh for each one inside the final mesh. More are better and
    slower: 20 gives rms 2.83 %, 30 gives 2.70 %, 40 gives 2.64 % in 1.15 times the time. */
@@ -4911,19 +4660,11 @@ static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwar
    a worse rms, 8 a worse max. */
 #define TERRIMPI_INSERT_SHARE 6
 
-/* Rounds of flips and moves on the final mesh. */
-#define TERRIMPI_ROUNDS 4
-
-/* A move goes so many samples at most. */
-#define TERRIMPI_MOVE_LIMIT 8.0f
-
-/* Only a gain of more than rounding counts as a gain. */
-#define TERRIMPI_GAIN 0.9999f
-
-/* Most triangles round a vertex that is moved or removed. */
-#define TERRIMPI_MAX_DEGREE 16
-
-#define TERRIMPI_HUGE 3.0e38f
+#define TERRIMPI_ROUNDS 4             /* of flips and moves on the final mesh */
+#define TERRIMPI_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
+#define TERRIMPI_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
+#define TERRIMPI_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
+#define TERRIMPI_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
 typedef struct terrimpi_row_sum {
@@ -5032,25 +4773,38 @@ typedef struct terrimpi_walk {
 
 static terrimpi_walk terrimpi_walk_edge(int32_t x0, int32_t z0, int32_t x1, int32_t z1)
 {
+    int upwards = z0 > z1;
+    int32_t rows = upwards ? z0 - z1 : z1 - z0, x = upwards ? x1 : x0;
+    int32_t run = (upwards ? x0 - x1 : x1 - x0) * (1 << 20);
     terrimpi_walk w;
-    int32_t run;
-    if (z0 > z1) {
-        int32_t t = x0;
-        x0 = x1;
-        x1 = t;
-        t = z0;
-        z0 = z1;
-        z1 = t;
-    }
-    w.z = z0;
-    w.end = z1;
-    w.at = x0 * (1 << 20) + (1 << 20) - 1;
+    w.z = upwards ? z1 : z0;
+    w.end = w.z + rows;
+    w.at = x * (1 << 20) + (1 << 20) - 1;
     w.slope = 0;
-    if (z1 > z0) {
-        run = (x1 - x0) * (1 << 20);
-        w.slope = (run < 0 ? run - (z1 - z0) + 1 : run) / (z1 - z0); /* rounds down */
-    }
+    if (rows > 0)
+        w.slope = (run < 0 ? run - rows + 1 : run) / rows; /* rounds down */
     return w;
+}
+
+/* Columns [left, right) of each row of [low, high) that belong to a triangle. */
+typedef struct terrimpi_span {
+    int32_t low, high;
+    int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
+} terrimpi_span;
+
+static void terrimpi_find_span(const terrimp_mesh_vertex corner[3], terrimpi_span *span)
+{
+    int32_t k;
+    span->low = span->high = corner[0].z;
+    for (k = 0; k < 3; k++) {
+        const terrimp_mesh_vertex *p = corner + k, *q = corner + (k + 1) % 3;
+        int16_t *side = p->z < q->z ? span->left : span->right;
+        terrimpi_walk w = terrimpi_walk_edge(p->x, p->z, q->x, q->z);
+        span->low = w.z < span->low ? w.z : span->low;
+        span->high = w.end > span->high ? w.end : span->high;
+        for (; w.z < w.end; w.z++, w.at += w.slope)
+            side[w.z] = (int16_t)(w.at >> 20);
+    }
 }
 
 /* Sums over the samples left of the edge between (x, z) and vertex b. */
@@ -5229,19 +4983,19 @@ static void terrimpi_forget(terrimpi_simplifier *s, const terrimpi_ring *ring)
         s->square[ring->spoke[i] >> 2] = -1.0f;
 }
 
-/* Squared error round v as a function of its height. */
+/* Squared error round v as a function of its height, and what it is made of, by triangle. */
 static terrimpi_parabola terrimpi_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                             const terrimpi_ring *ring, int32_t ref)
+                                             const terrimpi_ring *ring, int32_t ref,
+                                             terrimpi_local part[TERRIMPI_MAX_DEGREE])
 {
     terrimpi_parabola p = {0.0f, 0.0f, 0.0f};
     int32_t i;
     for (i = 0; i < ring->count; i++) {
         int32_t j = terrimpi_ring_next(ring, i);
         terrimpi_sums sums;
-        terrimpi_local l;
         terrimpi_sum_triangle(s, ring->spoke[i], &sums);
-        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, &l);
-        terrimpi_add_triangle(&l, &p);
+        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, part + i);
+        terrimpi_add_triangle(part + i, &p);
     }
     return p;
 }
@@ -5250,10 +5004,11 @@ static terrimpi_parabola terrimpi_ring_error(const terrimpi_simplifier *s, int32
 static void terrimpi_fit_height(terrimpi_simplifier *s, int32_t v)
 {
     int32_t ref = terrimpi_round(s->height[v]);
+    terrimpi_local part[TERRIMPI_MAX_DEGREE];
     terrimpi_parabola p;
     terrimpi_ring ring;
     terrimpi_find_ring(s, v, &ring);
-    p = terrimpi_ring_error(s, v, &ring, ref);
+    p = terrimpi_ring_error(s, v, &ring, ref, part);
     if (p.a > 0.0f)
         s->height[v] = (float)ref + p.b / p.a;
     terrimpi_forget(s, &ring);
@@ -5321,33 +5076,24 @@ static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring
                           float *dz)
 {
     int32_t ref = terrimpi_round(s->height[v]), i;
-    terrimpi_parabola p = {0.0f, 0.0f, 0.0f}, part[TERRIMPI_MAX_DEGREE];
-    terrimpi_local l[TERRIMPI_MAX_DEGREE];
+    terrimpi_local part[TERRIMPI_MAX_DEGREE];
+    terrimpi_parabola p = terrimpi_ring_error(s, v, ring, ref, part);
     float xx = 0.0f, xz = 0.0f, zz = 0.0f, xh = 0.0f, zh = 0.0f, rx = 0.0f, rz = 0.0f, d, det;
-    for (i = 0; i < ring->count; i++) {
-        int32_t j = terrimpi_ring_next(ring, i);
-        terrimpi_sums sums;
-        terrimpi_sum_triangle(s, ring->spoke[i], &sums);
-        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, l + i);
-        part[i].a = part[i].b = part[i].c = 0.0f;
-        terrimpi_add_triangle(l + i, part + i);
-        p.a += part[i].a;
-        p.b += part[i].b;
-        p.c += part[i].c;
-    }
     if (!(p.a > 0.0f))
         return -1.0f;
     d = p.b / p.a;
     s->height[v] = (float)ref + d;
     terrimpi_forget(s, ring);
     for (i = 0; i < ring->count; i++) {
-        float gx = l[i].gx + d * l[i].wx, gz = l[i].gz + d * l[i].wz;
-        float residual = part[i].b - d * part[i].a;
-        xx += part[i].a * gx * gx;
-        xz += part[i].a * gx * gz;
-        zz += part[i].a * gz * gz;
-        xh += part[i].a * gx;
-        zh += part[i].a * gz;
+        float gx = part[i].gx + d * part[i].wx, gz = part[i].gz + d * part[i].wz, residual;
+        terrimpi_parabola own = {0.0f, 0.0f, 0.0f};
+        terrimpi_add_triangle(part + i, &own);
+        residual = own.b - d * own.a;
+        xx += own.a * gx * gx;
+        xz += own.a * gx * gz;
+        zz += own.a * gz * gz;
+        xh += own.a * gx;
+        zh += own.a * gz;
         rx -= residual * gx;
         rz -= residual * gz;
     }
@@ -5376,7 +5122,7 @@ static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
     if (!(error > 0.0f))
         return 0;
     length = TERRIMP_SQRTF(dx * dx + dz * dz);
-    if (!(length < TERRIMPI_HUGE))
+    if (!(length < TERRIMPI_FLOAT_MAX))
         return 0;
     if (length > TERRIMPI_MOVE_LIMIT) {
         dx *= TERRIMPI_MOVE_LIMIT / length;
@@ -5404,17 +5150,18 @@ static void terrimpi_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32
     }
 }
 
-/* Would the two triangles beside half-edge e still face up with the other diagonal? */
-static int terrimpi_can_flip(const terrimpi_simplifier *s, int32_t e)
+/* Finds the corners a, b, c, d of the triangles abc and bad beside half-edge e = ab. Returns
+   whether adc and bcd, which have the other diagonal, would face up. */
+static int terrimpi_can_flip(const terrimpi_simplifier *s, int32_t e, int32_t v[4])
 {
-    int32_t f = s->twin[e], a, b, c, d;
+    int32_t f = s->twin[e];
     if (f < 0)
         return 0;
-    a = s->origin[e];
-    b = s->origin[f];
-    c = s->origin[terrimpi_prev(e)];
-    d = s->origin[terrimpi_prev(f)];
-    return terrimpi_faces_up(s, a, d, c) && terrimpi_faces_up(s, d, b, c);
+    v[0] = s->origin[e];
+    v[1] = s->origin[f];
+    v[2] = s->origin[terrimpi_prev(e)];
+    v[3] = s->origin[terrimpi_prev(f)];
+    return terrimpi_faces_up(s, v[0], v[3], v[2]) && terrimpi_faces_up(s, v[3], v[1], v[2]);
 }
 
 /* Triangles abc (half-edge e = ab) and bad become adc and bcd; `sums` are those of edge cd. */
@@ -5438,26 +5185,24 @@ static void terrimpi_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_sums
 /* Flips the edge of e if that lowers the squared error. */
 static void terrimpi_try_flip(terrimpi_simplifier *s, int32_t e)
 {
-    int32_t f = s->twin[e], a, b, c, d;
+    int32_t f = s->twin[e], v[4], az, bz, cz, dz;
     terrimpi_sums sums, fresh;
     float before, after;
     const terrimpi_sums *edge_sums = s->sums;
-    if (!terrimpi_can_flip(s, e))
+    if (!terrimpi_can_flip(s, e, v))
         return;
-    a = s->origin[e];
-    b = s->origin[f];
-    c = s->origin[terrimpi_prev(e)];
-    d = s->origin[terrimpi_prev(f)];
+    az = s->z[v[0]];
+    bz = s->z[v[1]];
+    cz = s->z[v[2]];
+    dz = s->z[v[3]];
     before = terrimpi_triangle_error(s, e) + terrimpi_triangle_error(s, f);
-    terrimpi_sum_edge(s, s->x[c], s->z[c], d, &fresh);
-    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_next(f)], s->z[d] - s->z[a], &fresh,
-                       s->z[c] - s->z[d], edge_sums + s->edge[terrimpi_prev(e)],
-                       s->z[a] - s->z[c], &sums);
-    after = terrimpi_square_error(s, &sums, a, d, c);
-    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_prev(f)], s->z[b] - s->z[d],
-                       edge_sums + s->edge[terrimpi_next(e)], s->z[c] - s->z[b], &fresh,
-                       s->z[d] - s->z[c], &sums);
-    after += terrimpi_square_error(s, &sums, d, b, c);
+    terrimpi_sum_edge(s, s->x[v[2]], cz, v[3], &fresh);
+    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_next(f)], dz - az, &fresh, cz - dz,
+                       edge_sums + s->edge[terrimpi_prev(e)], az - cz, &sums);
+    after = terrimpi_square_error(s, &sums, v[0], v[3], v[2]);
+    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_prev(f)], bz - dz,
+                       edge_sums + s->edge[terrimpi_next(e)], cz - bz, &fresh, dz - cz, &sums);
+    after += terrimpi_square_error(s, &sums, v[3], v[1], v[2]);
     if (after < TERRIMPI_GAIN * before)
         terrimpi_flip(s, e, &fresh);
 }
@@ -5548,12 +5293,12 @@ static void terrimpi_price(terrimpi_simplifier *s, int32_t v)
 {
     uint32_t known[TERRIMPI_MAX_DEGREE];
     int32_t fan[TERRIMPI_MAX_DEGREE], fans = 0, i, k;
-    float miss[TERRIMPI_MAX_DEGREE], best = TERRIMPI_HUGE;
+    float miss[TERRIMPI_MAX_DEGREE], best = TERRIMPI_FLOAT_MAX;
     terrimpi_ring ring;
     terrimpi_find_ring(s, v, &ring);
     s->stale[v] = 0;
     s->target[v] = -1;
-    s->cost[v] = TERRIMPI_HUGE;
+    s->cost[v] = TERRIMPI_FLOAT_MAX;
     memset(known, 0, sizeof known);
     for (k = 0; k < ring.count; k++) { /* sort the fans by what they miss at v itself */
         float m = terrimpi_fan_miss(s, v, &ring, k);
@@ -5633,11 +5378,11 @@ static int32_t terrimpi_force(terrimpi_simplifier *s)
             if (s->target[v] >= 0)
                 return v;
             do {
-                turned = terrimpi_can_flip(s, e);
+                int32_t corner[4];
+                turned = terrimpi_can_flip(s, e, corner);
                 if (turned) {
                     terrimpi_sums sums;
-                    int32_t c = s->origin[terrimpi_prev(e)];
-                    int32_t d = s->origin[terrimpi_prev(s->twin[e])];
+                    int32_t c = corner[2], d = corner[3];
                     terrimpi_sum_edge(s, s->x[c], s->z[c], d, &sums);
                     terrimpi_flip(s, e, &sums);
                     s->stale[c] = s->stale[d] = 1;
@@ -5691,58 +5436,39 @@ typedef struct terrimpi_spot {
     float score;
 } terrimpi_spot;
 
-static int terrimpi_is_corner(const terrimpi_simplifier *s, const int32_t v[3], int32_t x,
-                              int32_t z)
-{
-    return (s->x[v[0]] == x && s->z[v[0]] == z) || (s->x[v[1]] == x && s->z[v[1]] == z) ||
-           (s->x[v[2]] == x && s->z[v[2]] == z);
-}
-
-/* Whether a corner lies on a last column or row that is squeezed: then a sample within the triangle
-   on the grid may lie outside of the true one. */
-static int terrimpi_is_squeezed(const terrimpi_simplifier *s, const int32_t v[3])
-{
-    int k;
-    for (k = 0; s->squeeze && k < 3; k++)
-        if (s->x[v[k]] == s->cols - 1 || s->z[v[k]] == s->rows - 1)
-            return 1;
-    return 0;
-}
-
-/* Looks for the worst sample strictly inside the tile among those of e's triangle. */
+/* Looks for the worst sample strictly inside the tile among those of e's triangle. Not where a
+   corner lies on a last column or row that is squeezed: there a sample within the triangle on the
+   grid may lie outside of the true one. */
 static void terrimpi_scan_triangle(const terrimpi_simplifier *s, int32_t e, terrimpi_spot *best)
 {
-    int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
-    int32_t v[3], k, x, z, low = s->rows, high = 0, ox, oz;
+    const int32_t *corner = s->origin + e;
+    terrimp_mesh_vertex v[3];
+    terrimpi_span span;
+    int32_t k, x, z;
     float limit = best->score / s->square[e >> 2], h0, gx, gz;
     terrimpi_sums none;
     terrimpi_local l;
-    memset(&none, 0, sizeof none);
-    for (k = 0; k < 3; k++)
-        v[k] = s->origin[e + k];
-    if (terrimpi_is_squeezed(s, v))
-        return;
     for (k = 0; k < 3; k++) {
-        int32_t p = v[k], q = v[k == 2 ? 0 : k + 1];
-        int16_t *side = s->z[p] < s->z[q] ? left : right;
-        terrimpi_walk w = terrimpi_walk_edge(s->x[p], s->z[p], s->x[q], s->z[q]);
-        low = w.z < low ? w.z : low;
-        high = w.end > high ? w.end : high;
-        for (; w.z < w.end; w.z++, w.at += w.slope)
-            side[w.z] = (int16_t)(w.at >> 20);
+        v[k].x = (uint16_t)s->x[corner[k]];
+        v[k].z = (uint16_t)s->z[corner[k]];
+        if (s->squeeze && (v[k].x == s->cols - 1 || v[k].z == s->rows - 1))
+            return;
     }
-    ox = s->x[v[0]];
-    oz = s->z[v[0]];
-    terrimpi_localise(s, &none, v[0], v[1], v[2], 0, &l);
-    h0 = s->height[v[0]];
+    terrimpi_find_span(v, &span);
+    memset(&none, 0, sizeof none);
+    terrimpi_localise(s, &none, corner[0], corner[1], corner[2], 0, &l);
+    h0 = s->height[corner[0]];
     gx = l.gx + h0 * l.wx;
     gz = l.gz + h0 * l.wz;
-    for (z = low > 0 ? low : 1; z < high; z++) {
+    for (z = span.low > 0 ? span.low : 1; z < span.high; z++) {
         const terrimpi_row_sum *row = s->row_sums + z * s->cols;
-        float base = h0 + (float)(z - oz) * gz;
-        for (x = left[z] > 0 ? left[z] : 1; x < right[z]; x++) {
-            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - ox) * gx);
-            if (r * r > limit && !terrimpi_is_corner(s, v, x, z)) {
+        float base = h0 + (float)(z - v[0].z) * gz;
+        for (x = span.left[z] > 0 ? span.left[z] : 1; x < span.right[z]; x++) {
+            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - v[0].x) * gx);
+            for (k = 0; r * r > limit && k < 3; k++)
+                if (v[k].x == x && v[k].z == z)
+                    r = 0.0f; /* a corner */
+            if (r * r > limit) {
                 limit = r * r;
                 best->e = e;
                 best->x = x;
@@ -6121,35 +5847,15 @@ static void terrimpi_add_error(terrimpi_error *error, float difference)
     error->squares += difference * difference;
 }
 
-/* Columns [left, right) of each row that belong to a triangle of a mesh, and its plane. */
-typedef struct terrimpi_span {
-    int32_t low, high; /* rows [low, high) */
-    float gx, gz;
-    int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
-} terrimpi_span;
-
-static void terrimpi_find_span(const terrimp_mesh_vertex *a, const terrimp_mesh_vertex *b,
-                               const terrimp_mesh_vertex *c, terrimpi_span *span)
+/* The slopes of the plane through three vertices. */
+static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
 {
-    const terrimp_mesh_vertex *corner[4];
-    int32_t bx = b->x - a->x, bz = b->z - a->z, cx = c->x - a->x, cz = c->z - a->z, k;
+    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
+    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
     float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = b->height - a->height, hc = c->height - a->height;
-    span->gx = ((float)bz * hc - (float)cz * hb) * inverse;
-    span->gz = ((float)cx * hb - (float)bx * hc) * inverse;
-    span->low = span->high = a->z;
-    corner[0] = corner[3] = a;
-    corner[1] = b;
-    corner[2] = c;
-    for (k = 0; k < 3; k++) {
-        const terrimp_mesh_vertex *p = corner[k], *q = corner[k + 1];
-        int16_t *side = p->z < q->z ? span->left : span->right;
-        terrimpi_walk w = terrimpi_walk_edge(p->x, p->z, q->x, q->z);
-        span->low = w.z < span->low ? w.z : span->low;
-        span->high = w.end > span->high ? w.end : span->high;
-        for (; w.z < w.end; w.z++, w.at += w.slope)
-            side[w.z] = (int16_t)(w.at >> 20);
-    }
+    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
+    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
 }
 
 /* Errors of the samples of a border between two points of its polyline, without the last one. */
@@ -6168,19 +5874,22 @@ static void terrimpi_measure(const float *heights, int32_t cols, int32_t rows, t
 {
     const terrimp_mesh_vertex *v = mesh->vertices;
     terrimpi_error all = {0.0f, 0.0f, 0.0f};
-    float squares = 0.0f;
-    uint32_t i;
+    float squares = 0.0f, gx, gz;
+    uint32_t i, k;
     int32_t x, z;
     for (i = 0; i < mesh->surface_index_count; i += 3) {
-        const terrimp_mesh_vertex *a = v + mesh->indices[i];
+        terrimp_mesh_vertex a[3];
         terrimpi_span span;
-        terrimpi_find_span(a, v + mesh->indices[i + 1], v + mesh->indices[i + 2], &span);
+        for (k = 0; k < 3u; k++)
+            a[k] = v[mesh->indices[i + k]];
+        terrimpi_find_span(a, &span);
+        terrimpi_find_plane(a, &gx, &gz);
         all.squares = 0.0f; /* summed by triangle, as small sums round less */
         for (z = span.low; z < span.high; z++) {
             const float *row = heights + z * cols;
-            float base = a->height + (float)(z - a->z) * span.gz;
+            float base = a->height + (float)(z - a->z) * gz;
             for (x = span.left[z]; x < span.right[z]; x++)
-                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * span.gx));
+                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * gx));
         }
         squares += all.squares;
     }
@@ -6250,7 +5959,7 @@ static int terrimpi_improve_border(const float *heights, terrimp_border_point *p
     for (i = 1; i + 1 < count; i++) {
         terrimp_border_point *p = points + i;
         int32_t at, best = p->at;
-        float ref = p->height, least = TERRIMPI_HUGE;
+        float ref = p->height, least = TERRIMPI_FLOAT_MAX;
         int32_t end = (p->at + p[1].at) / 2;
         for (at = (p[-1].at + p->at) / 2 + 1; at <= end; at++) {
             terrimpi_parabola error = terrimpi_point_error(heights, p, at, ref);
@@ -6298,27 +6007,23 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
     terrimp_border_point kept[TERRIMP_MAX_TILE_DIM];
     uint32_t i, wanted;
     int round;
-    if (!heights || !points || !point_count)
-        return TERRIMP_E_NULL;
-    if (count < 2 || count > TERRIMP_MAX_TILE_DIM || inner_limit > TERRIMP_MAX_TILE_DIM)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!heights || !points || !point_count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(count < 2 || count > TERRIMP_MAX_TILE_DIM ||
+                    inner_limit > TERRIMP_MAX_TILE_DIM, TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
-        if (!terrimpi_finite(heights[i]))
-            return TERRIMP_E_NOT_FINITE;
+        TERRIMPI_REFUSE(!terrimpi_finite(heights[i]), TERRIMP_E_NOT_FINITE);
         kept[i].at = (uint16_t)i;
         kept[i].height = heights[i];
     }
     wanted = (inner_limit ? inner_limit : TERRIMP_BORDER_POINTS) + 2;
     wanted = wanted < count ? wanted : count;
-    if (capacity < wanted)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(capacity < wanted, TERRIMP_E_CAPACITY);
     if (wanted < count) {
         terrimpi_thin_border(heights, kept, count, wanted);
         for (round = 0; round < 8 && terrimpi_improve_border(heights, kept, wanted); round++) {
         }
     }
-    for (i = 0; i < wanted; i++)
-        points[i] = kept[i];
+    memcpy(points, kept, wanted * sizeof *points);
     *point_count = wanted;
     return TERRIMP_OK;
 }
@@ -6349,70 +6054,55 @@ static terrimpi_plan terrimpi_make_plan(uint32_t cols, uint32_t rows, uint32_t b
     return plan;
 }
 
-static size_t terrimpi_take(size_t *bytes, size_t count, size_t size)
+/* Lays the arrays out at `base`, or only counts their bytes when that is null. Every count is at
+   most a few times 65537, so nothing can overflow. */
+static size_t terrimpi_lay_out(terrimpi_simplifier *s, const terrimpi_plan *plan, void *base)
 {
-    size_t at = *bytes;
-    *bytes += (count * size + 7) & ~(size_t)7;
-    return at;
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t vertices = plan->lattice + plan->border, samples = (size_t)plan->cols * plan->rows;
+    size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_MAX_DEGREE;
+    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
+    s->sums = (terrimpi_sums *)terrimpi_take(&b, edges, sizeof *s->sums);
+    s->spare = (terrimpi_sums *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
+    s->row_sums = (terrimpi_row_sum *)terrimpi_take(&b, samples, sizeof *s->row_sums);
+    s->x = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->x);
+    s->z = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->z);
+    s->height = (float *)terrimpi_take(&b, vertices, sizeof *s->height);
+    s->out_edge = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->out_edge);
+    s->cost = (float *)terrimpi_take(&b, vertices, sizeof *s->cost);
+    s->target = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->target);
+    s->stale = (uint8_t *)terrimpi_take(&b, vertices, sizeof *s->stale);
+    s->origin = (int32_t *)terrimpi_take(&b, 4 * triangles, sizeof *s->origin);
+    s->twin = (int32_t *)terrimpi_take(&b, 4 * triangles, sizeof *s->twin);
+    s->edge = (int32_t *)terrimpi_take(&b, 4 * triangles, sizeof *s->edge);
+    s->square = (float *)terrimpi_take(&b, triangles, sizeof *s->square);
+    return b.bytes;
 }
 
-/* Lays the arrays out in `block`, or only counts their bytes when that is null. Every count is at
-   most a few times 65537, so nothing can overflow. */
-static size_t terrimpi_lay_out(terrimpi_simplifier *s, const terrimpi_plan *plan, void *block)
+static int terrimpi_all_finite(const float *values, uint32_t count)
 {
-    size_t vertices = plan->lattice + plan->border, bytes = 0;
-    size_t triangles = 2 * plan->lattice + plan->border;
-    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
-    size_t sums = terrimpi_take(&bytes, edges, sizeof *s->sums);
-    size_t spare = terrimpi_take(&bytes, TERRIMPI_MAX_DEGREE * TERRIMPI_MAX_DEGREE,
-                                 sizeof *s->spare);
-    size_t row_sums = terrimpi_take(&bytes, (size_t)plan->cols * plan->rows, sizeof *s->row_sums);
-    size_t x = terrimpi_take(&bytes, vertices, sizeof *s->x);
-    size_t z = terrimpi_take(&bytes, vertices, sizeof *s->z);
-    size_t height = terrimpi_take(&bytes, vertices, sizeof *s->height);
-    size_t out_edge = terrimpi_take(&bytes, vertices, sizeof *s->out_edge);
-    size_t cost = terrimpi_take(&bytes, vertices, sizeof *s->cost);
-    size_t target = terrimpi_take(&bytes, vertices, sizeof *s->target);
-    size_t stale = terrimpi_take(&bytes, vertices, sizeof *s->stale);
-    size_t origin = terrimpi_take(&bytes, 4 * triangles, sizeof *s->origin);
-    size_t twin = terrimpi_take(&bytes, 4 * triangles, sizeof *s->twin);
-    size_t edge = terrimpi_take(&bytes, 4 * triangles, sizeof *s->edge);
-    size_t square = terrimpi_take(&bytes, triangles, sizeof *s->square);
-    if (block) {
-        char *base = (char *)block;
-        s->sums = (terrimpi_sums *)(void *)(base + sums);
-        s->spare = (terrimpi_sums *)(void *)(base + spare);
-        s->row_sums = (terrimpi_row_sum *)(void *)(base + row_sums);
-        s->x = (int32_t *)(void *)(base + x);
-        s->z = (int32_t *)(void *)(base + z);
-        s->height = (float *)(void *)(base + height);
-        s->out_edge = (int32_t *)(void *)(base + out_edge);
-        s->cost = (float *)(void *)(base + cost);
-        s->target = (int32_t *)(void *)(base + target);
-        s->stale = (uint8_t *)(base + stale);
-        s->origin = (int32_t *)(void *)(base + origin);
-        s->twin = (int32_t *)(void *)(base + twin);
-        s->edge = (int32_t *)(void *)(base + edge);
-        s->square = (float *)(void *)(base + square);
-    }
-    return bytes;
+    while (count > 0 && terrimpi_finite(values[count - 1]))
+        count--;
+    return count == 0;
 }
 
 static int terrimpi_tile_size_ok(uint32_t cols, uint32_t rows)
 {
-    return cols >= 2 && rows >= 2 && cols <= TERRIMP_MAX_TILE_DIM && rows <= TERRIMP_MAX_TILE_DIM;
+    return terrimpi_within_u32(cols, 2, TERRIMP_MAX_TILE_DIM) &&
+           terrimpi_within_u32(rows, 2, TERRIMP_MAX_TILE_DIM);
 }
 
 TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
                                                   uint32_t triangle_budget)
 {
+    terrimpi_simplifier s;
     terrimpi_plan plan;
     if (!terrimpi_tile_size_ok(cols, rows) || triangle_budget == 1 ||
         triangle_budget > TERRIMP_MAX_TRIANGLES)
         return 0;
     plan = terrimpi_make_plan(cols, rows, triangle_budget, 4);
     plan.border = plan.budget + 2; /* whatever border comes, the arrays are large enough */
-    return terrimpi_lay_out(0, &plan, 0);
+    return terrimpi_lay_out(&s, &plan, NULL);
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
@@ -6420,10 +6110,8 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                                                  uint32_t *index_capacity)
 {
     uint32_t budget = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    if (!vertex_capacity || !index_capacity)
-        return TERRIMP_E_NULL;
-    if (budget < 2 || budget > TERRIMP_MAX_TRIANGLES)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!vertex_capacity || !index_capacity, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(budget < 2 || budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
     /* budget + 2 vertices when all of them are on the border, and each skirt as many again */
     *vertex_capacity = 3 * (budget + 2);
     *index_capacity = 3 * budget + 2 * 6 * (budget + 2);
@@ -6434,64 +6122,40 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
 static terrimp_result terrimpi_check_border(const terrimp_border *border, uint32_t samples)
 {
     uint32_t i;
-    if (!border->points)
-        return TERRIMP_E_NULL;
-    if (border->point_count < 2 || border->point_count > samples || border->points[0].at != 0 ||
-        border->points[border->point_count - 1].at != samples - 1)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!border->points, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(border->point_count < 2 || border->point_count > samples ||
+                    border->points[0].at != 0 ||
+                    border->points[border->point_count - 1].at != samples - 1, TERRIMP_E_RANGE);
     for (i = 0; i < border->point_count; i++) {
-        if (!terrimpi_finite(border->points[i].height))
-            return TERRIMP_E_NOT_FINITE;
-        if (i > 0 && border->points[i].at <= border->points[i - 1].at)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(!terrimpi_finite(border->points[i].height), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(i > 0 && border->points[i].at <= border->points[i - 1].at, TERRIMP_E_RANGE);
     }
     return TERRIMP_OK;
-}
-
-/* Do two borders have the same height in the corner they share? */
-static int terrimpi_corner_agrees(const terrimp_border *along_x, const terrimp_border *along_z,
-                                  int x_end, int z_end)
-{
-    const terrimp_border_point *p = along_x->points + (x_end ? along_x->point_count - 1 : 0);
-    const terrimp_border_point *q = along_z->points + (z_end ? along_z->point_count - 1 : 0);
-    return p->height <= q->height && p->height >= q->height;
 }
 
 static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
 {
     const terrimp_border *b = desc->borders;
     uint32_t i;
-    if (!desc->heights)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
-        desc->triangle_budget > TERRIMP_MAX_TRIANGLES)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
+                    desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
     for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
-        int along_x = i == TERRIMP_BORDER_Z0 || i == TERRIMP_BORDER_Z1;
-        terrimp_result r = terrimpi_check_border(b + i, along_x ? desc->cols : desc->rows);
+        terrimp_result r = terrimpi_check_border(
+            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
         if (r != TERRIMP_OK)
             return r;
     }
-    if (!terrimpi_corner_agrees(b + TERRIMP_BORDER_Z0, b + TERRIMP_BORDER_X0, 0, 0) ||
-        !terrimpi_corner_agrees(b + TERRIMP_BORDER_Z0, b + TERRIMP_BORDER_X1, 1, 0) ||
-        !terrimpi_corner_agrees(b + TERRIMP_BORDER_Z1, b + TERRIMP_BORDER_X0, 0, 1) ||
-        !terrimpi_corner_agrees(b + TERRIMP_BORDER_Z1, b + TERRIMP_BORDER_X1, 1, 1))
-        return TERRIMP_E_RANGE;
-    for (i = 0; i < desc->cols * desc->rows; i++)
-        if (!terrimpi_finite(desc->heights[i]))
-            return TERRIMP_E_NOT_FINITE;
-    return TERRIMP_OK;
-}
-
-static terrimp_result terrimpi_check_mesh_arrays(const terrimp_mesh *mesh,
-                                                 const terrimpi_plan *plan)
-{
-    if (!mesh->vertices || !mesh->indices)
-        return TERRIMP_E_NULL;
-    if (mesh->vertex_capacity < plan->border + plan->inner ||
-        mesh->index_capacity < 3 * (plan->border - 2 + 2 * plan->inner))
-        return TERRIMP_E_CAPACITY;
-    return TERRIMP_OK;
+    for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
+        uint32_t x_end = i & 1u, z_end = i >> 1;
+        const terrimp_border *p = b + (z_end ? TERRIMP_BORDER_Z1 : TERRIMP_BORDER_Z0);
+        const terrimp_border *q = b + (x_end ? TERRIMP_BORDER_X1 : TERRIMP_BORDER_X0);
+        if (p->points[x_end ? p->point_count - 1 : 0].height !=
+            q->points[z_end ? q->point_count - 1 : 0].height)
+            return TERRIMP_E_RANGE;
+    }
+    return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
+                                                                       : TERRIMP_E_NOT_FINITE;
 }
 
 /* Writes the inner vertices and the triangles; the border's vertices are in place. */
@@ -6542,27 +6206,21 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
 {
     terrimpi_simplifier s;
     terrimpi_plan plan;
-    terrimp_result result;
     uint32_t budget, border = 0;
     int whole, i;
-    if (!desc || !scratch || !mesh)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_desc(desc);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!desc || !scratch || !mesh, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_desc(desc));
     budget = desc->triangle_budget ? desc->triangle_budget : TERRIMP_TRIANGLE_BUDGET;
     for (i = 0; i < TERRIMP_BORDER_COUNT; i++)
         border += desc->borders[i].point_count - 1;
-    if (border > budget + 2)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
     plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
-    result = terrimpi_check_mesh_arrays(mesh, &plan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (scratch_bytes < terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget))
-        return TERRIMP_E_MEMORY;
-    if ((uintptr_t)scratch % sizeof(int64_t) != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_REFUSE(!mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(mesh->vertex_capacity < border + plan.inner ||
+                    mesh->index_capacity < 3 * (border - 2 + 2 * plan.inner), TERRIMP_E_CAPACITY);
+    TERRIMPI_REFUSE(scratch_bytes < terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget),
+                    TERRIMP_E_MEMORY);
+    TERRIMPI_REFUSE((uintptr_t)scratch % sizeof(int64_t) != 0, TERRIMP_E_ALIGN);
     terrimpi_lay_out(&s, &plan, scratch);
     s.cols = (int32_t)desc->cols;
     s.rows = (int32_t)desc->rows;
@@ -6585,84 +6243,47 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-TERRIMP_API terrimp_result terrimp_skirt_counts(uint32_t border_vertex_count,
-                                                uint32_t *vertex_count, uint32_t *index_count)
-{
-    if (!vertex_count || !index_count)
-        return TERRIMP_E_NULL;
-    if (border_vertex_count < 4 || border_vertex_count > TERRIMP_MAX_TRIANGLES + 2)
-        return TERRIMP_E_RANGE;
-    *vertex_count = border_vertex_count;
-    *index_count = 6 * border_vertex_count;
-    return TERRIMP_OK;
-}
-
 static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
 {
-    if (!mesh || !mesh->vertices || !mesh->indices)
-        return TERRIMP_E_NULL;
-    if (mesh->border_vertex_count < 4 || mesh->surface_index_count < 6 ||
-        mesh->surface_vertex_count < mesh->border_vertex_count ||
-        mesh->vertex_count < mesh->surface_vertex_count ||
-        mesh->index_count < mesh->surface_index_count ||
-        mesh->vertex_capacity < mesh->vertex_count || mesh->index_capacity < mesh->index_count)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!mesh || !mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(mesh->border_vertex_count < 4 || mesh->surface_index_count < 6 ||
+                    mesh->surface_vertex_count < mesh->border_vertex_count ||
+                    mesh->vertex_count < mesh->surface_vertex_count ||
+                    mesh->index_count < mesh->surface_index_count ||
+                    mesh->vertex_capacity < mesh->vertex_count ||
+                    mesh->index_capacity < mesh->index_count, TERRIMP_E_STATE);
     return TERRIMP_OK;
 }
 
-/* Appends a wall along the loop. Its free rim is a loop of new vertices, which are in place. */
-static void terrimpi_add_wall(terrimp_mesh *mesh, int inwards)
+/* Appends a wall along the loop: down to a height, or up by a rise. */
+static terrimp_result terrimpi_add_skirt(terrimp_mesh *mesh, float value, int upper)
 {
-    uint32_t n = mesh->border_vertex_count;
-    terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, inwards);
+    uint32_t i, n;
+    TERRIMPI_TRY(terrimpi_check_surface(mesh));
+    n = mesh->border_vertex_count;
+    TERRIMPI_REFUSE(mesh->vertex_capacity - mesh->vertex_count < n ||
+                    mesh->index_capacity - mesh->index_count < 6 * n, TERRIMP_E_CAPACITY);
+    TERRIMPI_REFUSE(!terrimpi_finite(value), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(upper && value < 0.0f, TERRIMP_E_RANGE);
+    for (i = 0; i < n; i++) {
+        terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
+        *rim = mesh->vertices[i];
+        rim->height = upper ? rim->height + value : terrimpi_min(rim->height, value);
+    }
+    terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
     mesh->vertex_count += n;
     mesh->index_count += 6 * n;
-}
-
-static terrimp_result terrimpi_check_wall(const terrimp_mesh *mesh)
-{
-    terrimp_result result = terrimpi_check_surface(mesh);
-    if (result == TERRIMP_OK &&
-        (mesh->vertex_capacity - mesh->vertex_count < mesh->border_vertex_count ||
-         mesh->index_capacity - mesh->index_count < 6 * mesh->border_vertex_count))
-        result = TERRIMP_E_CAPACITY;
-    return result;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height)
 {
-    terrimp_result result = terrimpi_check_wall(mesh);
-    uint32_t i;
-    if (result == TERRIMP_OK && !terrimpi_finite(height))
-        result = TERRIMP_E_NOT_FINITE;
-    if (result != TERRIMP_OK)
-        return result;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
-        *rim = mesh->vertices[i];
-        rim->height = terrimpi_min(rim->height, height);
-    }
-    terrimpi_add_wall(mesh, 0);
-    return TERRIMP_OK;
+    return terrimpi_add_skirt(mesh, height, 0);
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise)
 {
-    terrimp_result result = terrimpi_check_wall(mesh);
-    uint32_t i;
-    if (result == TERRIMP_OK && !terrimpi_finite(rise))
-        result = TERRIMP_E_NOT_FINITE;
-    if (result == TERRIMP_OK && rise < 0.0f)
-        result = TERRIMP_E_RANGE;
-    if (result != TERRIMP_OK)
-        return result;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
-        *rim = mesh->vertices[i];
-        rim->height += rise;
-    }
-    terrimpi_add_wall(mesh, 1);
-    return TERRIMP_OK;
+    return terrimpi_add_skirt(mesh, rise, 1);
 }
 
 /* --- standing proud (Hess 6.1) --- */
@@ -6685,150 +6306,115 @@ static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
     return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
 }
 
-/* The polyline of one border while it is raised, in rising order whichever way the loop runs: both
-   neighbours compute the same bits. */
-typedef struct terrimpi_rise {
-    uint32_t count;
-    uint16_t vertex[TERRIMP_MAX_TILE_DIM]; /* of the mesh */
-    float raise[TERRIMP_MAX_TILE_DIM];
-    float change[TERRIMP_MAX_TILE_DIM];
-} terrimpi_rise;
-
-/* Goes once over the samples between points i and i + 1 of a border. Raising: change becomes the
-   raise that each end must have at least. Lowering: change becomes what each end may lose. */
-static void terrimpi_rise_segment(const float *samples, int32_t stride, float h0, float h1,
-                                  int32_t count, terrimpi_rise *rise, uint32_t i, int lowering)
+/* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
+   rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
+static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
+                                 float over, int lowering)
 {
-    int free0 = i > 0, free1 = i + 2 < rise->count;
-    int32_t k;
-    for (k = 0; k <= count; k++) {
-        float w1 = (float)k / (float)count, w0 = 1.0f - w1, surface, hold;
-        float *c0 = rise->change + i, *c1 = c0 + 1;
-        surface = w0 * (h0 + rise->raise[i]) + w1 * (h1 + rise->raise[i + 1]);
-        if (lowering) {
-            float slack = terrimpi_max(0.0f, surface - samples[k * stride]);
-            if (w0 > 0.0f)
-                *c0 = terrimpi_min(*c0, slack / (2.0f * w0));
-            if (w1 > 0.0f)
-                *c1 = terrimpi_min(*c1, slack / (2.0f * w1));
-        } else {
-            float short_of = samples[k * stride];
-            hold = (free0 ? w0 : 0.0f) + (free1 ? w1 : 0.0f);
-            surface = terrimpi_wanted_raise(short_of - surface, short_of - (w0 * h0 + w1 * h1),
-                                            hold);
-            if (free0 && w0 > 0.0f)
-                *c0 = terrimpi_max(*c0, surface);
-            if (free1 && w1 > 0.0f)
-                *c1 = terrimpi_max(*c1, surface);
-        }
+    int k;
+    for (k = 0; k < n; k++) {
+        if (!(w[k] > 1e-6f))
+            continue;
+        if (lowering)
+            *change[k] = terrimpi_min(*change[k], terrimpi_max(0.0f, over) / ((float)n * w[k]));
+        else
+            *change[k] = terrimpi_max(*change[k], wanted);
     }
 }
 
-/* Raises the inner points of one border: `raise` of both ends is given. */
-static void terrimpi_raise_border(const float *samples, int32_t stride, int along_x,
-                                  const terrimp_mesh_vertex *vertices, terrimpi_rise *rise)
+static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
 {
-    int pass;
-    uint32_t i;
-    for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
-        for (i = 0; i < rise->count; i++)
-            rise->change[i] = pass ? TERRIMPI_HUGE : 0.0f;
-        for (i = 0; i + 1 < rise->count; i++) {
-            const terrimp_mesh_vertex *p = vertices + rise->vertex[i];
-            const terrimp_mesh_vertex *q = vertices + rise->vertex[i + 1];
-            int32_t at = along_x ? p->x : p->z, end = along_x ? q->x : q->z;
-            terrimpi_rise_segment(samples + at * stride, stride, p->height, q->height, end - at,
-                                  rise, i, pass > 0);
-        }
-        for (i = 1; i + 1 < rise->count; i++)
-            rise->raise[i] = pass ? terrimpi_max(0.0f, rise->raise[i] - rise->change[i])
-                                  : rise->change[i];
+    return (v->x == 0 || v->x == desc->cols - 1) && (v->z == 0 || v->z == desc->rows - 1);
+}
+
+/* Goes once over the samples of a border between vertices a and b, which are in rising order
+   whichever way the loop runs: both neighbours compute the same bits. */
+static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
+                                  uint32_t a, uint32_t b, const float *raise, float *change,
+                                  int lowering)
+{
+    const terrimp_mesh_vertex *p = mesh->vertices + a, *q = mesh->vertices + b;
+    uint32_t cols = desc->cols, stride = p->z == q->z ? 1 : cols;
+    const float *samples = desc->heights + p->z * cols + p->x;
+    int32_t k, count = p->z == q->z ? q->x - p->x : q->z - p->z;
+    float *to[2], w[2], is_free[2];
+    to[0] = change + a;
+    to[1] = change + b;
+    is_free[0] = terrimpi_is_corner(desc, p) ? 0.0f : 1.0f;
+    is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
+    for (k = 0; k <= count; k++, samples += stride) {
+        float surface, wanted;
+        w[1] = (float)k / (float)count;
+        w[0] = 1.0f - w[1];
+        surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
+        wanted = terrimpi_wanted_raise(*samples - surface,
+                                       *samples - (w[0] * p->height + w[1] * q->height),
+                                       w[0] * is_free[0] + w[1] * is_free[1]);
+        terrimpi_rise_sample(w, to, 2, wanted, surface - *samples, lowering);
     }
 }
 
-/* Raises the loop's vertices, border by border. */
+/* Raises the loop's vertices, border by border, but for the corners. */
 static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                float *raise)
+                                float *raise, float *change)
 {
-    int32_t cols = (int32_t)desc->cols, rows = (int32_t)desc->rows, side;
+    const terrimp_mesh_vertex *v = mesh->vertices;
     uint32_t n = mesh->border_vertex_count, first = 0, last, i;
-    for (side = 0; side < 4; side++) {
+    int side, pass;
+    for (side = 0; side < 4; side++, first = last) {
         int along_x = side & 1, backwards = side >= 2;
-        int32_t offset = side == 1 ? (rows - 1) * cols : side == 2 ? cols - 1 : 0;
-        const terrimp_mesh_vertex *v = mesh->vertices;
-        terrimpi_rise rise;
         for (last = first + 1; last < n && (along_x ? v[last].z == v[first].z
                                                     : v[last].x == v[first].x); last++) {
         }
         if (side < 3)
             last--; /* the loop's end closes the last side itself */
-        rise.count = last - first + 1;
-        for (i = 0; i < rise.count; i++) {
-            rise.vertex[i] = (uint16_t)((backwards ? last - i : first + i) % n);
-            rise.raise[i] = 0.0f;
+        for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
+            for (i = first; i <= last; i++)
+                change[i % n] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
+            for (i = first; i < last; i++)
+                terrimpi_rise_segment(desc, mesh, backwards ? (i + 1) % n : i,
+                                      backwards ? i : (i + 1) % n, raise, change, pass > 0);
+            for (i = first + 1; i < last; i++)
+                raise[i] = pass ? terrimpi_max(0.0f, raise[i] - change[i]) : change[i];
         }
-        rise.raise[0] = desc->corner_raise[backwards ? (side + 1) & 3 : side];
-        rise.raise[rise.count - 1] = desc->corner_raise[backwards ? side : side + 1];
-        terrimpi_raise_border(desc->heights + offset, along_x ? 1 : cols, along_x, v, &rise);
-        for (i = 0; i < rise.count; i++)
-            raise[rise.vertex[i]] = rise.raise[i];
-        first = last;
     }
 }
 
-/* Passes one sample of a triangle, short_by above the raised surface, to the three corners, which
-   have the weights w in it. */
-static void terrimpi_rise_sample(const uint16_t *t, const float w[3], float hold, float short_by,
-                                 const float *raise, float *change, int lowering)
-{
-    float raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-    float wanted = terrimpi_wanted_raise(short_by, short_by + raised, hold);
-    int k;
-    for (k = 0; k < 3; k++) {
-        float *c = change + t[k];
-        if (!(w[k] > 1e-6f))
-            continue;
-        if (lowering)
-            *c = terrimpi_min(*c, terrimpi_max(0.0f, -short_by) / (3.0f * w[k]));
-        else
-            *c = terrimpi_max(*c, wanted);
-    }
-}
-
-/* Goes once over the samples of a triangle, as terrimpi_rise_segment does over a segment. */
+/* Goes once over the samples of a triangle. */
 static void terrimpi_rise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
                                    const uint16_t *t, const float *raise, float *change,
                                    int lowering)
 {
     terrimp_mesh_vertex v[3];
     terrimpi_span span;
-    float slope_x[3], slope_z[3], free_share[3]; /* of the weights; 1 for an inner vertex */
+    float slope_x[3], slope_z[3], gx, gz, *to[3];
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
-        free_share[k] = t[k] >= mesh->border_vertex_count ? 1.0f : 0.0f;
+        to[k] = change + t[k];
         v[k] = mesh->vertices[t[k]];
         v[k].height = 0.0f;
     }
-    for (k = 0; k < 3; k++) {
+    for (k = 0; k < 3; k++) { /* slopes of the weights */
         v[k].height = 1.0f;
-        terrimpi_find_span(v, v + 1, v + 2, &span);
-        slope_x[k] = span.gx;
-        slope_z[k] = span.gz;
+        terrimpi_find_plane(v, &slope_x[k], &slope_z[k]);
         v[k].height = 0.0f;
     }
     for (k = 0; k < 3; k++)
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
-    terrimpi_find_span(v, v + 1, v + 2, &span);
+    terrimpi_find_span(v, &span);
+    terrimpi_find_plane(v, &gx, &gz);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
             float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f;
-            float surface = v[0].height + dx * span.gx + dz * span.gz;
+            float short_by = heights[z * cols + x] - (v[0].height + dx * gx + dz * gz), raised;
             for (k = 0; k < 3; k++) {
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
-                hold += w[k] * free_share[k];
+                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
             }
-            terrimpi_rise_sample(t, w, hold, heights[z * cols + x] - surface, raise, change,
-                                 lowering);
+            raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
+            terrimpi_rise_sample(w, to, 3,
+                                 terrimpi_wanted_raise(short_by, short_by + raised, hold),
+                                 -short_by, lowering);
         }
 }
 
@@ -6836,57 +6422,37 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
                                            const terrimp_mesh *mesh)
 {
     uint32_t i;
-    terrimp_result result = terrimpi_check_surface(mesh);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!desc->heights)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_tile_size_ok(desc->cols, desc->rows))
-        return TERRIMP_E_RANGE;
-    if (!terrimpi_finite(desc->amount))
-        return TERRIMP_E_NOT_FINITE;
-    if (desc->amount < 0.0f || desc->amount > 1.0f)
-        return TERRIMP_E_RANGE;
-    for (i = 0; i < 4; i++) {
-        if (!terrimpi_finite(desc->corner_raise[i]))
-            return TERRIMP_E_NOT_FINITE;
-        if (desc->corner_raise[i] < 0.0f)
-            return TERRIMP_E_RANGE;
-    }
-    if (mesh->vertex_count != mesh->surface_vertex_count)
-        return TERRIMP_E_STATE;
+    TERRIMPI_TRY(terrimpi_check_surface(mesh));
+    TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_finite(desc->amount), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(desc->amount < 0.0f || desc->amount > 1.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(mesh->vertex_count != mesh->surface_vertex_count, TERRIMP_E_STATE);
     for (i = 0; i < mesh->surface_vertex_count; i++)
         if (mesh->vertices[i].x >= desc->cols || mesh->vertices[i].z >= desc->rows)
             return TERRIMP_E_RANGE;
     for (i = 0; i < mesh->surface_index_count; i++)
-        if (mesh->indices[i] >= mesh->surface_vertex_count)
-            return TERRIMP_E_RANGE;
-    for (i = 0; i < desc->cols * desc->rows; i++)
-        if (!terrimpi_finite(desc->heights[i]))
-            return TERRIMP_E_NOT_FINITE;
-    return TERRIMP_OK;
+        TERRIMPI_REFUSE(mesh->indices[i] >= mesh->surface_vertex_count, TERRIMP_E_RANGE);
+    return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
+                                                                       : TERRIMP_E_NOT_FINITE;
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
                                               float *work)
 {
-    terrimp_result result;
     uint32_t n, i;
     float *change;
     int pass;
-    if (!desc || !mesh || !work)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_raise(desc, mesh);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!desc || !mesh || !work, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_raise(desc, mesh));
     n = mesh->surface_vertex_count;
     change = work + n;
     for (i = 0; i < n; i++)
         work[i] = 0.0f;
-    terrimpi_raise_loop(desc, mesh, work);
+    terrimpi_raise_loop(desc, mesh, work, change);
     for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
         for (i = 0; i < n; i++)
-            change[i] = pass ? TERRIMPI_HUGE : 0.0f;
+            change[i] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
         for (i = 0; i < mesh->surface_index_count; i += 3)
             terrimpi_rise_triangle(desc->heights, (int32_t)desc->cols, mesh, mesh->indices + i,
                                    work, change, pass > 0);
@@ -6896,35 +6462,6 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     for (i = 0; i < n; i++)
         mesh->vertices[i].height += desc->amount * work[i];
     terrimpi_measure(desc->heights, (int32_t)desc->cols, (int32_t)desc->rows, mesh);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_border_corner_raise(const float *heights, uint32_t count,
-                                                       const terrimp_border *border,
-                                                       float end_raise[2])
-{
-    terrimp_result result;
-    float raise[2] = {0.0f, 0.0f};
-    uint32_t i, end, k;
-    if (!heights || !border || !end_raise)
-        return TERRIMP_E_NULL;
-    if (count < 2 || count > TERRIMP_MAX_TILE_DIM)
-        return TERRIMP_E_RANGE;
-    result = terrimpi_check_border(border, count);
-    if (result != TERRIMP_OK)
-        return result;
-    for (i = 0; i < count; i++)
-        if (!terrimpi_finite(heights[i]))
-            return TERRIMP_E_NOT_FINITE;
-    for (end = 0; end < 2; end++) {
-        const terrimp_border_point *p = border->points + (end ? border->point_count - 2 : 0);
-        float slope = (p[1].height - p[0].height) / (float)(p[1].at - p[0].at);
-        for (k = p[0].at; k <= p[1].at; k++)
-            raise[end] = terrimpi_max(raise[end],
-                                      heights[k] - (p[0].height + slope * (float)(k - p[0].at)));
-    }
-    end_raise[0] = raise[0];
-    end_raise[1] = raise[1];
     return TERRIMP_OK;
 }
 
@@ -6940,16 +6477,14 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
                                                  uint32_t largest, uint32_t size[2], float *scale)
 {
     float density, width, height, longest, reduce = 1.0f;
-    if (!capture || !size)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!capture || !size, TERRIMP_E_NULL);
     density = pixel_factor * texels_per_px;
     width = (capture->tan_right - capture->tan_left) * density;
     height = (capture->tan_up - capture->tan_down) * density;
-    if (!terrimpi_finite(width) || !terrimpi_finite(height))
-        return TERRIMP_E_NOT_FINITE;
-    if (!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) || !(height > 0.0f) ||
-        largest < 1u || largest > 65536u || smallest > largest)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite2(width, height), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) ||
+                    !(height > 0.0f) || largest < 1u || largest > 65536u ||
+                    smallest > largest, TERRIMP_E_RANGE);
     longest = terrimpi_max(width, height);
     if (longest > (float)largest)
         reduce = (float)largest / longest;
@@ -6971,10 +6506,9 @@ static void terrimpi_pad(float *low, float *high, uint32_t inner, uint32_t margi
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin)
 {
-    if (!capture || !slot)
-        return TERRIMP_E_NULL;
-    if (margin > 65536u || slot[0] <= 2u * margin || slot[1] <= 2u * margin)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(margin > 65536u || slot[0] <= 2u * margin ||
+                    slot[1] <= 2u * margin, TERRIMP_E_RANGE);
     terrimpi_pad(&capture->tan_left, &capture->tan_right, slot[0] - 2u * margin, margin);
     terrimpi_pad(&capture->tan_down, &capture->tan_up, slot[1] - 2u * margin, margin);
     return TERRIMP_OK;
@@ -6987,12 +6521,11 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
     float view[16], projection[16];
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
-    if (!capture || !slot || !matrix)
-        return TERRIMP_E_NULL;
-    if (slot->width < 1u || slot->height < 1u || atlas_width < 1u || atlas_height < 1u ||
-        slot->x > atlas_width || slot->width > atlas_width - slot->x || slot->y > atlas_height ||
-        slot->height > atlas_height - slot->y)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
+                    atlas_height < 1u || slot->x > atlas_width ||
+                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
+                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
     terrimp_capture_matrices(capture, 0, view, projection);
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
@@ -7021,8 +6554,7 @@ TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], c
     static const int rows[3] = {0, 1, 3};
     size_t i;
     int k;
-    if (!matrix || (count && (!xyz || !stq)))
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!matrix || (count && (!xyz || !stq)), TERRIMP_E_NULL);
     for (i = 0; i < count; i++, xyz += 3, stq += 3)
         for (k = 0; k < 3; k++) {
             const float *m = matrix + rows[k];
@@ -7031,16 +6563,22 @@ TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], c
     return TERRIMP_OK;
 }
 
+static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float captured_eye[3],
+                                          const float eye[3], const float *out)
+{
+    TERRIMPI_REFUSE(!box || !captured_eye || !eye || !out, TERRIMP_E_NULL);
+    return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
+                   terrimpi_finite3(captured_eye) && terrimpi_finite3(eye)
+               ? TERRIMP_OK
+               : TERRIMP_E_NOT_FINITE;
+}
+
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
                                               const float eye[3], float *angle_rad)
 {
     float worst = 0.0f; /* grows with the angle: its sine up to 60 degrees, then 2 - its cosine */
     int i;
-    if (!box || !captured_eye || !eye || !angle_rad)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-        !terrimpi_finite3(captured_eye) || !terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
     for (i = 0; i < 8; i++) {
         float a[3], b[3], across[3], cosine;
         terrimpi_box_corner(box, i, captured_eye, a);
@@ -7096,17 +6634,10 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
                                                   float pixel_factor, float *error_px)
 {
     float move[3], move_length, distance, sine;
-    int i;
-    if (!box || !captured_eye || !eye || !error_px)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-        !terrimpi_finite3(captured_eye) || !terrimpi_finite3(eye) || !terrimpi_finite(error) ||
-        !terrimpi_finite(pixel_factor))
-        return TERRIMP_E_NOT_FINITE;
-    if (error < 0.0f || !(pixel_factor > 0.0f))
-        return TERRIMP_E_RANGE;
-    for (i = 0; i < 3; i++)
-        move[i] = eye[i] - captured_eye[i];
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
+    TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
+    terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
     *error_px = 0.0f;
     if (!(move_length > 0.0f) || !(error > 0.0f))
@@ -7128,12 +6659,11 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
                                                      float speed, float *seconds)
 {
     float sine;
-    if (!seconds)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite(distance) || !terrimpi_finite(max_angle_rad) || !terrimpi_finite(speed))
-        return TERRIMP_E_NOT_FINITE;
-    if (distance < 0.0f || max_angle_rad < 0.0f || max_angle_rad > 3.1415928f || !(speed > 0.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!seconds, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(distance, max_angle_rad) || !terrimpi_finite(speed),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(distance < 0.0f || !terrimpi_within(max_angle_rad, 0.0f, 3.1415928f) ||
+                    !(speed > 0.0f), TERRIMP_E_RANGE);
     sine = max_angle_rad < 1.5707963f ? TERRIMP_SINF(max_angle_rad) : 1.0f;
     *seconds = distance * sine / speed;
     return TERRIMP_OK;
@@ -7146,19 +6676,13 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
 {
     float rate = 0.0f, seconds;
     size_t i;
-    if ((count && !boxes) || !eye || !captures_per_s)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_finite3(eye))
-        return TERRIMP_E_NOT_FINITE;
-    if (terrimpi_finite(distance) && !(distance > 0.0f))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE((count && !boxes) || !eye || !captures_per_s, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(terrimpi_finite(distance) && !(distance > 0.0f), TERRIMP_E_RANGE);
     for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
         float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
-        terrimp_result result = terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds);
-        if (result != TERRIMP_OK)
-            return result;
-        if (!(seconds > 0.0f) && i == count)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_TRY(terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds));
+        TERRIMPI_REFUSE(!(seconds > 0.0f) && i == count, TERRIMP_E_RANGE);
         if (i < count && to_box >= distance)
             rate += 1.0f / seconds;
     }
@@ -7166,17 +6690,14 @@ TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t
     return TERRIMP_OK;
 }
 
-/* Where the way from the eye to a point, both relative to the eye, passes through a triangle: the
-   fraction of the way, or 1 when it does not. */
+/* Where the way `to` from the origin passes through a triangle: the fraction of the way, or 1 when
+   it does not. */
 static float terrimpi_hidden_at(const float to[3], const float a[3], const float b[3],
                                 const float c[3])
 {
     float ab[3], ac[3], p[3], q[3], det, u, v, t;
-    int i;
-    for (i = 0; i < 3; i++) {
-        ab[i] = b[i] - a[i];
-        ac[i] = c[i] - a[i];
-    }
+    terrimpi_sub(b, a, ab);
+    terrimpi_sub(c, a, ac);
     terrimpi_cross(to, ac, p);
     det = terrimpi_dot(ab, p);
     if (!(terrimpi_abs(det) > 0.0f))
@@ -7184,7 +6705,7 @@ static float terrimpi_hidden_at(const float to[3], const float a[3], const float
     u = -terrimpi_dot(a, p) / det;
     if (!(u >= 0.0f && u <= 1.0f))
         return 1.0f;
-    terrimpi_cross(a, ab, q); /* of the eye minus a, and ab, with the sign turned */
+    terrimpi_cross(a, ab, q); /* of the origin minus a, and ab, with the sign turned */
     v = -terrimpi_dot(to, q) / det;
     if (!(v >= 0.0f && u + v <= 1.0f))
         return 1.0f;
@@ -7197,18 +6718,25 @@ static float terrimpi_first_hit(const float eye[3], const float *xyz, uint32_t v
                                 const uint16_t *indices, uint32_t index_count)
 {
     float first = 1.0f, to[3], corner[3][3];
-    uint32_t i, k, axis;
-    for (axis = 0; axis < 3u; axis++)
-        to[axis] = xyz[vertex * 3u + axis] - eye[axis];
-    for (i = 0; i < index_count; i += 3u) {
-        if (indices[i] == vertex || indices[i + 1u] == vertex || indices[i + 2u] == vertex)
+    const uint16_t *t;
+    int k;
+    terrimpi_sub(xyz + vertex * 3u, eye, to);
+    for (t = indices; t < indices + index_count; t += 3) {
+        if (t[0] == vertex || t[1] == vertex || t[2] == vertex)
             continue;
-        for (k = 0; k < 3u; k++)
-            for (axis = 0; axis < 3u; axis++)
-                corner[k][axis] = xyz[indices[i + k] * 3u + axis] - eye[axis];
+        for (k = 0; k < 3; k++)
+            terrimpi_sub(xyz + t[k] * 3u, eye, corner[k]);
         first = terrimpi_min(first, terrimpi_hidden_at(to, corner[0], corner[1], corner[2]));
     }
     return first;
+}
+
+/* How far a vertex lies in front of the eye of a capture. */
+static float terrimpi_depth(const terrimp_capture *capture, const float xyz[3])
+{
+    float to[3];
+    terrimpi_sub(xyz, capture->eye, to);
+    return terrimpi_dot(to, capture->forward);
 }
 
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
@@ -7217,32 +6745,24 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 {
     float all = 0.0f, saved[TERRIMPI_SPLITS], first, last, step;
     uint32_t i, k, best = 0;
-    if (!capture || !xyz || !indices || !split)
-        return TERRIMP_E_NULL;
-    if (vertex_count == 0 || index_count % 3u != 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
     for (i = 0; i < index_count; i++)
-        if (indices[i] >= vertex_count)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
     first = TERRIMPI_FLOAT_MAX;
     last = 0.0f;
     for (i = 0; i < vertex_count; i++) {
-        float to[3], depth;
-        for (k = 0; k < 3u; k++)
-            to[k] = xyz[i * 3u + k] - capture->eye[k];
-        depth = terrimpi_dot(to, capture->forward);
+        float depth = terrimpi_depth(capture, xyz + i * 3u);
         first = terrimpi_min(first, depth);
         last = terrimpi_max(last, depth);
     }
     step = (last - first) / (float)(TERRIMPI_SPLITS + 1u);
     memset(saved, 0, sizeof saved);
     for (i = 0; i < vertex_count; i++) {
-        float hit = terrimpi_first_hit(capture->eye, xyz, i, indices, index_count), to[3], depth;
+        float hit = terrimpi_first_hit(capture->eye, xyz, i, indices, index_count);
+        float depth = terrimpi_depth(capture, xyz + i * 3u);
         if (hit > 0.98f) /* a neighbour that leans over it */
             continue;
-        for (k = 0; k < 3u; k++)
-            to[k] = xyz[i * 3u + k] - capture->eye[k];
-        depth = terrimpi_dot(to, capture->forward);
         all += (1.0f - hit) * (1.0f - hit);
         for (k = 0; k < TERRIMPI_SPLITS; k++) {
             float at = first + (float)(k + 1u) * step;
@@ -7266,18 +6786,15 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity)
 {
-    if (!shelves || !items)
-        return TERRIMP_E_NULL;
-    if (width < 1u || width > 65536u || height < 1u || height > 65536u || padding > 65536u ||
-        capacity < 1u)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!shelves || !items, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) || padding > 65536u ||
+                    !terrimpi_within_u32(height, 1u, 65536u) || capacity < 1u, TERRIMP_E_RANGE);
     shelves->width = width;
     shelves->height = height;
     shelves->padding = padding;
     shelves->items = items;
     shelves->capacity = capacity;
-    shelves->count = 0;
-    shelves->top = 0;
+    shelves->count = shelves->top = 0;
     return TERRIMP_OK;
 }
 
@@ -7285,12 +6802,10 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
 {
     terrimp_shelf *shelf;
     uint32_t i;
-    if (!shelves || !shelves->items || !rect)
-        return TERRIMP_E_NULL;
-    if (rect->width < 1u || rect->height < 1u)
-        return TERRIMP_E_RANGE;
-    if (rect->width > shelves->width || rect->height > shelves->height)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || !rect, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(rect->width < 1u || rect->height < 1u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(rect->width > shelves->width ||
+                    rect->height > shelves->height, TERRIMP_E_CAPACITY);
     for (i = 0; i < shelves->count; i++) {
         shelf = &shelves->items[i];
         if (rect->height <= shelf->height && shelf->used <= shelves->width - rect->width)
@@ -7312,10 +6827,28 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
     return TERRIMP_OK;
 }
 
-/* Whether item a comes after item b: lower, or as high and narrower, or later. */
-static int terrimpi_pack_after(const terrimp_pack_item *items, uint32_t a, uint32_t b)
+/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
+   extra memory. */
+static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
+                          int (*after)(const void *items, uint32_t a, uint32_t b))
 {
-    const terrimp_rect *p = &items[a].rect, *q = &items[b].rect;
+    uint32_t i, k, gap;
+    for (gap = 1; gap < count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < count; i++) {
+            uint32_t moved = order[i];
+            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
+                order[k] = order[k - gap];
+            order[k] = moved;
+        }
+}
+
+/* Whether item a comes after item b: lower, or as high and narrower, or later. */
+static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
+{
+    const terrimp_pack_item *item = (const terrimp_pack_item *)items;
+    const terrimp_rect *p = &item[a].rect, *q = &item[b].rect;
     if (p->height != q->height)
         return p->height < q->height;
     if (p->width != q->width)
@@ -7323,36 +6856,12 @@ static int terrimpi_pack_after(const terrimp_pack_item *items, uint32_t a, uint3
     return a > b;
 }
 
-/* Restores the heap below `root`: the item that comes last is on top. */
-static void terrimpi_pack_sift(const terrimp_pack_item *items, uint32_t *order, uint32_t root,
-                               uint32_t count)
-{
-    uint32_t moved = order[root], child;
-    while ((child = 2u * root + 1u) < count) {
-        if (child + 1u < count && terrimpi_pack_after(items, order[child + 1u], order[child]))
-            child++;
-        if (!terrimpi_pack_after(items, order[child], moved))
-            break;
-        order[root] = order[child];
-        root = child;
-    }
-    order[root] = moved;
-}
-
-/* Heapsort: no recursion, no extra memory, the same order everywhere. */
 static void terrimpi_pack_sort(const terrimp_pack_item *items, uint32_t *order, uint32_t count)
 {
     uint32_t i;
     for (i = 0; i < count; i++)
         order[i] = i;
-    for (i = count / 2u; i-- > 0;)
-        terrimpi_pack_sift(items, order, i, count);
-    for (i = count; i-- > 1u;) {
-        uint32_t last = order[0];
-        order[0] = order[i];
-        order[i] = last;
-        terrimpi_pack_sift(items, order, 0, i);
-    }
+    terrimpi_sort(order, count, items, terrimpi_pack_after);
 }
 
 /* Reduces a rectangle that is larger than the atlas, keeping its shape; returns whether it was. */
@@ -7372,11 +6881,9 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_p
                                              uint32_t count, uint32_t *order, uint32_t *placed)
 {
     uint32_t i, done = 0;
-    if (!shelves || !shelves->items || (count && (!items || !order)))
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || (count && (!items || !order)), TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
-        if (items[i].rect.width < 1u || items[i].rect.height < 1u)
-            return TERRIMP_E_RANGE;
+        TERRIMPI_REFUSE(items[i].rect.width < 1u || items[i].rect.height < 1u, TERRIMP_E_RANGE);
     for (i = 0; i < count; i++)
         items[i].flags =
             terrimpi_pack_reduce(shelves, &items[i].rect) ? (uint32_t)TERRIMP_PACK_SCALED : 0u;
@@ -7397,12 +6904,8 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
                                              uint32_t height, terrimp_shelf *items,
                                              uint32_t capacity)
 {
-    terrimp_result result;
-    if (!pair || !items)
-        return TERRIMP_E_NULL;
-    result = terrimp_shelves_init(&pair->shelves[0], width, height, 0, items, capacity);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!pair || !items, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_shelves_init(&pair->shelves[0], width, height, 0, items, capacity));
     terrimp_shelves_init(&pair->shelves[1], width, height, 0, items + capacity, capacity);
     pair->newest = 0;
     pair->repacks = 0;
@@ -7422,8 +6925,7 @@ static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_p
                              float scale)
 {
     uint32_t i;
-    shelves->count = 0;
-    shelves->top = 0;
+    shelves->count = shelves->top = 0;
     for (i = 0; i < count; i++) {
         uint32_t k = order[i];
         terrimp_rect *rect = &slots[k].rect[atlas];
@@ -7444,8 +6946,8 @@ TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp
     uint32_t i, atlas;
     float by = 1.0f;
     int fits;
-    if (!pair || !pair->shelves[0].items || (count && (!slots || !items || !order)))
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!pair || !pair->shelves[0].items ||
+                    (count && (!slots || !items || !order)), TERRIMP_E_NULL);
     atlas = 1u - pair->newest;
     for (i = 0; i < count; i++)
         slots[i].assigned[atlas] = slots[i].filled[atlas] = 0;
@@ -7477,15 +6979,11 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
                                                uint32_t width, uint32_t height)
 {
     terrimp_rect rect;
-    terrimp_result result;
-    if (!pair || !slot)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
     rect.x = rect.y = 0;
     rect.width = width;
     rect.height = height;
-    result = terrimp_shelves_insert(&pair->shelves[pair->newest], &rect);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_shelves_insert(&pair->shelves[pair->newest], &rect));
     slot->rect[pair->newest] = rect;
     slot->assigned[pair->newest] = 1;
     slot->filled[pair->newest] = 0;
@@ -7495,10 +6993,8 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
 TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
                                              terrimp_pair_slot *slot)
 {
-    if (!pair || !slot)
-        return TERRIMP_E_NULL;
-    if (!slot->assigned[pair->newest])
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!slot->assigned[pair->newest], TERRIMP_E_STATE);
     slot->filled[pair->newest] = 1;
     slot->assigned[1u - pair->newest] = slot->filled[1u - pair->newest] = 0;
     return TERRIMP_OK;
@@ -7535,16 +7031,6 @@ static int terrimpi_rect_contains(const terrimp_rect *outer, const terrimp_rect 
     return outer->x <= inner->x && outer->y <= inner->y &&
            inner->x + inner->width <= outer->x + outer->width &&
            inner->y + inner->height <= outer->y + outer->height;
-}
-
-static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
-{
-    terrimp_rect rect;
-    rect.x = x;
-    rect.y = y;
-    rect.width = width;
-    rect.height = height;
-    return rect;
 }
 
 /* The part of a rectangle to the left of, to the right of, below or above what overlaps it; of
@@ -7659,9 +7145,9 @@ static terrimp_rect terrimpi_live_padded(const terrimp_live_atlas *atlas, uint32
 
 static int terrimpi_live_desc_ok(const terrimp_live_atlas_desc *desc)
 {
-    return desc->width >= 1u && desc->width <= 32768u && desc->height >= 1u &&
-           desc->height <= 32768u && desc->padding <= 1024u && desc->max_slots >= 1u &&
-           desc->max_slots <= 65536u;
+    return terrimpi_within_u32(desc->width, 1u, 32768u) && desc->padding <= 1024u &&
+           terrimpi_within_u32(desc->height, 1u, 32768u) &&
+           terrimpi_within_u32(desc->max_slots, 1u, 65536u);
 }
 
 TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
@@ -7675,14 +7161,10 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes)
 {
-    if (!atlas || !desc || !memory)
-        return TERRIMP_E_NULL;
-    if (!terrimpi_live_desc_ok(desc))
-        return TERRIMP_E_RANGE;
-    if ((uintptr_t)memory % 8u != 0)
-        return TERRIMP_E_ALIGN;
-    if (bytes < terrimp_live_atlas_bytes(desc))
-        return TERRIMP_E_MEMORY;
+    TERRIMPI_REFUSE(!atlas || !desc || !memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_live_desc_ok(desc), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE((uintptr_t)memory % 8u != 0, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(bytes < terrimp_live_atlas_bytes(desc), TERRIMP_E_MEMORY);
     atlas->desc = *desc;
     atlas->slots = (terrimp_rect *)memory;
     atlas->holes = atlas->slots + desc->max_slots;
@@ -7693,10 +7175,8 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
 {
     uint32_t i;
-    if (!atlas)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     for (i = 0; i < atlas->desc.max_slots; i++)
         atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
     atlas->holes[0] = terrimpi_live_whole(atlas);
@@ -7776,12 +7256,9 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
 {
     uint32_t hole, handle;
     terrimp_rect taken, whole;
-    if (!atlas || !slot)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (width < 1u || height < 1u)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
     hole = terrimpi_live_find(atlas, width, height);
     handle = atlas->unused;
     if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
@@ -7804,12 +7281,9 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
 /* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
 static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint32_t slot)
 {
-    if (!atlas)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (slot >= atlas->desc.max_slots)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
     return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
@@ -7836,10 +7310,8 @@ static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect 
 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
 {
-    terrimp_result result = terrimpi_live_check(atlas, slot);
     terrimp_rect freed;
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
     freed = terrimpi_live_padded(atlas, slot);
     atlas->texels_used -= atlas->slots[slot].width * atlas->slots[slot].height;
     atlas->slot_count--;
@@ -7852,24 +7324,20 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
 TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
                                                    terrimp_rect *rect)
 {
-    terrimp_result result = terrimpi_live_check(atlas, slot);
-    if (!rect)
-        return TERRIMP_E_NULL;
-    if (result == TERRIMP_OK)
-        *rect = atlas->slots[slot];
-    return result;
+    TERRIMPI_REFUSE(!rect, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
+    *rect = atlas->slots[slot];
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    if (!atlas || !size)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (width < 1u || width > 65536u || height < 1u || height > 65536u)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
         uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
@@ -7905,26 +7373,23 @@ typedef struct terrimpi_live_search {
     float best_cost;
 } terrimpi_live_search;
 
-/* Lists the slots in use from left to right (Shell's sort: no recursion, no extra memory). */
+static int terrimpi_live_right_of(const void *slots, uint32_t a, uint32_t b)
+{
+    return ((const terrimp_rect *)slots)[a].x > ((const terrimp_rect *)slots)[b].x;
+}
+
+/* Lists the slots in use from left to right. */
 static void terrimpi_live_list(terrimpi_live_search *s)
 {
     const terrimp_rect *slots = s->atlas->slots;
-    uint32_t i, k, gap;
+    uint32_t i;
     s->count = s->widest = 0;
     for (i = 0; i < s->atlas->slot_end; i++)
         if (slots[i].width > 0) {
             s->by_x[s->count++] = i;
             s->widest = terrimpi_max_u32(s->widest, slots[i].width + s->atlas->desc.padding);
         }
-    for (gap = 1; gap < s->count / 3u;)
-        gap = 3u * gap + 1u;
-    for (; gap > 0; gap /= 3u)
-        for (i = gap; i < s->count; i++) {
-            uint32_t moved = s->by_x[i];
-            for (k = i; k >= gap && slots[s->by_x[k - gap]].x > slots[moved].x; k -= gap)
-                s->by_x[k] = s->by_x[k - gap];
-            s->by_x[k] = moved;
-        }
+    terrimpi_sort(s->by_x, s->count, slots, terrimpi_live_right_of);
 }
 
 /* The first in the list of slots that may reach over a column. */
@@ -7978,14 +7443,11 @@ static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
     }
 }
 
-/* Searches at the corners of holes and slots; where these are very many, of every n-th.
-   Returns 0 when all such places hold a slot that stays. */
-static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
+/* Searches at the corners of holes and slots; where these are very many, of every n-th. */
+static void terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
 {
-    const float none = 3e38f;
     const terrimp_live_atlas *atlas = s->atlas;
     uint32_t i, step = 1u + (atlas->hole_count + atlas->slot_count) / 512u;
-    s->best_cost = none;
     s->best = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
     terrimpi_live_list(s);
     for (i = 0; i < atlas->hole_count; i += step)
@@ -7994,21 +7456,17 @@ static int terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint3
         terrimp_rect slot = terrimpi_live_padded(atlas, s->by_x[i]);
         terrimpi_live_try(s, &slot);
     }
-    return s->best_cost < none;
 }
 
 /* The same for a mere handle: the slot that costs least. */
-static int terrimpi_live_cheapest_slot(terrimpi_live_search *s)
+static void terrimpi_live_cheapest_slot(terrimpi_live_search *s)
 {
-    const float none = 3e38f;
     uint32_t i;
-    s->best_cost = none;
     for (i = 0; i < s->atlas->slot_end; i++)
         if (s->atlas->slots[i].width > 0 && s->costs[i] >= 0.0f && s->costs[i] < s->best_cost) {
             s->best_cost = s->costs[i];
             s->best = terrimpi_live_padded(s->atlas, i);
         }
-    return s->best_cost < none;
 }
 
 /* Frees the slots that overlap a place; returns how many. */
@@ -8032,14 +7490,10 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
 {
     terrimpi_live_search search;
     int fits;
-    if (!atlas || !costs || !victims || !count)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
-    if (width < 1u || height < 1u)
-        return TERRIMP_E_RANGE;
-    if (width > atlas->desc.width || height > atlas->desc.height)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!atlas || !costs || !victims || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(width > atlas->desc.width || height > atlas->desc.height, TERRIMP_E_CAPACITY);
     fits = terrimpi_live_find(atlas, width, height) < atlas->hole_count;
     if (fits && atlas->unused < atlas->desc.max_slots) {
         *count = 0;
@@ -8048,9 +7502,12 @@ TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, u
     search.atlas = atlas;
     search.costs = costs;
     search.by_x = victims;
-    if (!(fits ? terrimpi_live_cheapest_slot(&search)
-               : terrimpi_live_cheapest(&search, width, height)))
-        return TERRIMP_E_CAPACITY;
+    search.best_cost = TERRIMPI_FLOAT_MAX;
+    if (fits)
+        terrimpi_live_cheapest_slot(&search);
+    else
+        terrimpi_live_cheapest(&search, width, height);
+    TERRIMPI_REFUSE(!(search.best_cost < TERRIMPI_FLOAT_MAX), TERRIMP_E_CAPACITY);
     *count = terrimpi_live_clear(atlas, &search.best, victims);
     return TERRIMP_OK;
 }
@@ -8059,10 +7516,8 @@ TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *at
                                                     terrimp_live_atlas_stats *stats)
 {
     uint32_t i, padding;
-    if (!atlas || !stats)
-        return TERRIMP_E_NULL;
-    if (!atlas->slots)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!atlas || !stats, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     padding = atlas->desc.padding;
     stats->slots = atlas->slot_count;
     stats->texels_used = atlas->texels_used;
@@ -8088,7 +7543,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *at
    What is built stands in four arrays with a fixed share for each node and without any pointer:
    so nodes can be built in any order, and the arrays can lie in read-only memory (room Bake). */
 
-#define TERRIMPI_ALIGN 8u           /* of blocks: pointers, and the simplifier's 64-bit sums */
 #define TERRIMPI_DIRECTIONS 8u      /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u    /* along a side of the floor at most: 2048 triangles in all */
 #define TERRIMPI_HEIGHT_STEPS 65535 /* of the heights of meshes */
@@ -8133,28 +7587,19 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
                                                         terrimp_terrain_desc *out)
 {
     terrimp_terrain_desc d;
-    terrimp_result result;
-    if (!desc || !out)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!desc || !out, TERRIMP_E_NULL);
     d = *desc;
-    result = terrimp_heightfield_resolve(&d.field, &d.field);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite(d.proud) || !terrimpi_finite(d.height_low) ||
-        !terrimpi_finite(d.height_high))
-        return TERRIMP_E_NOT_FINITE;
-    if (d.chunk_quads == 0)
-        d.chunk_quads = 64;
-    if (d.triangle_budget == 0)
-        d.triangle_budget = TERRIMP_TRIANGLE_BUDGET;
-    if (d.not_proud)
-        d.proud = 0.0f;
-    else if (d.proud == 0.0f)
-        d.proud = 1.0f;
-    if (!terrimpi_mip_quads_fit(d.chunk_quads) || d.triangle_budget < 32u ||
-        d.triangle_budget > 400u || d.proud < 0.0f || d.proud > 1.0f ||
-        d.height_low > d.height_high)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimp_heightfield_resolve(&d.field, &d.field));
+    TERRIMPI_REFUSE(!terrimpi_finite(d.proud) || !terrimpi_finite2(d.height_low, d.height_high),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_DEFAULT(d.chunk_quads, 64u);
+    TERRIMPI_DEFAULT(d.triangle_budget, TERRIMP_TRIANGLE_BUDGET);
+    TERRIMPI_DEFAULT(d.proud, 1.0f);
+    d.proud = d.not_proud ? 0.0f : d.proud;
+    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) ||
+                    !terrimpi_within_u32(d.triangle_budget, 32u, 400u) ||
+                    !terrimpi_within(d.proud, 0.0f, 1.0f) || d.height_low > d.height_high,
+                    TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8168,15 +7613,6 @@ static uint32_t terrimpi_floor_vertices(const terrimp_terrain *t)
 static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
 {
     return t->tree.level_x[t->floor_level] * t->tree.level_z[t->floor_level] * 6u;
-}
-
-/* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
-static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
-{
-    size_t at = *offset;
-    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
-    *offset = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
-    return at;
 }
 
 /* Inner points that a border keeps: those of 64 quads are the simplifier's default, and a budget
@@ -8216,28 +7652,22 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
    on overflow. */
 static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 {
-    size_t at = 0, nodes, meshes, points, corners, count;
-    int ok = terrimpi_terrain_count(t);
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t count;
+    b.ok = terrimpi_terrain_count(t);
     count = t->tree.node_count;
-    nodes = terrimpi_place(&at, count, sizeof *t->tree.nodes, &ok);
-    meshes = terrimpi_place(&at, count, sizeof *t->meshes, &ok);
-    points = terrimpi_place(&at, count, t->vertex_limit * sizeof *t->points, &ok);
-    corners = terrimpi_place(&at, count, t->index_limit, &ok);
-    if (base && ok) {
-        t->tree.nodes = (terrimp_geomip_node *)(void *)(base + nodes);
-        t->meshes = (terrimpi_mesh *)(void *)(base + meshes);
-        t->points = (terrimpi_point *)(void *)(base + points);
-        t->corners = base + corners;
-    }
-    return ok ? at : 0;
+    t->tree.nodes = (terrimp_geomip_node *)terrimpi_take(&b, count, sizeof *t->tree.nodes);
+    t->meshes = (terrimpi_mesh *)terrimpi_take(&b, count, sizeof *t->meshes);
+    t->points =
+        (terrimpi_point *)terrimpi_take(&b, count, t->vertex_limit * sizeof *t->points);
+    t->corners = (uint8_t *)terrimpi_take(&b, count, t->index_limit);
+    return b.ok ? b.bytes : 0;
 }
 
 static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
 {
-    if (!memory)
-        return TERRIMP_E_NULL;
-    if ((uintptr_t)memory % TERRIMPI_ALIGN != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
     return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
@@ -8266,14 +7696,12 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
-    column = terrimpi_min_u32(column, t->desc.field.width - 1u);
-    return terrimpi_line(t->desc.field.origin_x, t->desc.field.spacing_x, column);
+    return terrimpi_mip_x(&t->tree, 0, column);
 }
 
 static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
 {
-    row = terrimpi_min_u32(row, t->desc.field.depth - 1u);
-    return terrimpi_line(t->desc.field.origin_z, t->desc.field.spacing_z, row);
+    return terrimpi_mip_z(&t->tree, 0, row);
 }
 
 /* The height that a number of steps stands for. */
@@ -8302,7 +7730,7 @@ typedef struct terrimpi_facet {
 /* Scratch of one node. */
 typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
-    float *row;             /* samples of one row or column of the node */
+    float *row;             /* samples of one row or column of the node; scratch of its errors */
     float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
@@ -8313,34 +7741,28 @@ typedef struct terrimpi_build {
     size_t rest_bytes;
 } terrimpi_build;
 
-static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, unsigned char *base,
+static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base,
                                     terrimpi_build *build)
 {
-    size_t at = 0, tile, row, heights, work, vertices, indices, facets, rest, longest;
-    uint32_t side = desc->chunk_quads + 1u;
-    int ok = 1;
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t side = desc->chunk_quads + 1u, vertices, longest;
     terrimp_mesh_capacity(desc->triangle_budget, &build->vertex_capacity, &build->index_capacity);
-    build->rest_bytes = terrimp_simplify_scratch_bytes(side, side, desc->triangle_budget);
+    build->rest_bytes =
+        terrimp_simplify_scratch_bytes((uint32_t)side, (uint32_t)side, desc->triangle_budget);
+    vertices = build->vertex_capacity;
     longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
-    tile = terrimpi_place(&at, (size_t)side * side, sizeof *build->tile, &ok);
-    row = terrimpi_place(&at, longest, sizeof *build->row, &ok); /* also for the geomip errors */
-    heights = terrimpi_place(&at, build->vertex_capacity, sizeof *build->heights, &ok);
-    work = terrimpi_place(&at, 2u * (size_t)build->vertex_capacity, sizeof *build->work, &ok);
-    vertices = terrimpi_place(&at, build->vertex_capacity, sizeof *build->vertices, &ok);
-    indices = terrimpi_place(&at, build->index_capacity, sizeof *build->indices, &ok);
-    facets = terrimpi_place(&at, desc->triangle_budget, sizeof *build->facets, &ok);
-    rest = terrimpi_place(&at, build->rest_bytes, 1, &ok);
-    if (base) {
-        build->tile = (float *)(void *)(base + tile);
-        build->row = (float *)(void *)(base + row);
-        build->heights = (float *)(void *)(base + heights);
-        build->work = (float *)(void *)(base + work);
-        build->vertices = (terrimp_mesh_vertex *)(void *)(base + vertices);
-        build->indices = (uint16_t *)(void *)(base + indices);
-        build->facets = (terrimpi_facet *)(void *)(base + facets);
-        build->rest = base + rest;
-    }
-    return ok ? at : 0;
+    build->tile = (float *)terrimpi_take(&b, side * side, sizeof *build->tile);
+    build->row = (float *)terrimpi_take(&b, longest, sizeof *build->row);
+    build->heights = (float *)terrimpi_take(&b, vertices, sizeof *build->heights);
+    build->work = (float *)terrimpi_take(&b, 2u * vertices, sizeof *build->work);
+    build->vertices =
+        (terrimp_mesh_vertex *)terrimpi_take(&b, vertices, sizeof *build->vertices);
+    build->indices =
+        (uint16_t *)terrimpi_take(&b, build->index_capacity, sizeof *build->indices);
+    build->facets =
+        (terrimpi_facet *)terrimpi_take(&b, desc->triangle_budget, sizeof *build->facets);
+    build->rest = terrimpi_take(&b, build->rest_bytes, 1);
+    return b.ok ? b.bytes : 0;
 }
 
 /* The sample of a node that column or row k of its tile stands on. */
@@ -8410,18 +7832,26 @@ static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x
         row[first + i] -= start + (float)i * slope;
 }
 
-/* Takes the surface away from the samples of a node's last row, of which the loop has the line. */
-static void terrimpi_take_last_row(const terrimpi_patch *p, const terrimp_mesh *mesh, float *row)
+/* Takes the surface away from the samples of one border, whose line the loop has. */
+static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
+                                 float *line)
 {
-    uint32_t i, n = mesh->border_vertex_count;
-    for (i = 0; i + 1u < n; i++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = a + 1;
-        uint32_t from, to;
-        if (a->z != p->rows - 1u || b->z != p->rows - 1u)
+    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
+    uint32_t i, n = mesh->border_vertex_count, span = along_x ? p->span_x : p->span_z;
+    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
+    for (i = 0; i < n; i++) {
+        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = mesh->vertices + (i + 1u) % n;
+        uint32_t a_at = along_x ? a->x : a->z, b_at = along_x ? b->x : b->z, from, to;
+        if ((along_x ? a->z : a->x) != at || (along_x ? b->z : b->x) != at)
             continue;
-        from = terrimpi_tile_place(a->x, p->level, p->span_x);
-        to = terrimpi_tile_place(b->x, p->level, p->span_x);
-        terrimpi_take_away(row, from, to + (to == p->span_x), (float)from, a->height,
+        if (a_at > b_at) { /* the loop runs the other way on the far two sides */
+            const terrimp_mesh_vertex *swap = a;
+            a = b;
+            b = swap;
+        }
+        from = terrimpi_tile_place(terrimpi_min_u32(a_at, b_at), p->level, span);
+        to = terrimpi_tile_place(terrimpi_max_u32(a_at, b_at), p->level, span);
+        terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
                            (b->height - a->height) / (float)(to - from));
     }
 }
@@ -8436,7 +7866,7 @@ static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *
     float *row = build->row, last = (float)p->span_x;
     terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
-        terrimpi_take_last_row(p, mesh, row);
+        terrimpi_take_border(p, mesh, TERRIMP_BORDER_Z1, row);
         return;
     }
     for (; facet < end; facet++) {
@@ -8483,28 +7913,24 @@ static float terrimpi_line_mean(const float *line, uint32_t k, uint32_t level, u
 static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_patch *p, int side,
                                      float *line)
 {
-    const terrimp_heightfield *f = &t->desc.field;
-    uint32_t i, x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
+    int along_x = terrimpi_along_x(side);
+    uint32_t x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
     uint32_t z = side == TERRIMP_BORDER_Z1 ? p->z + p->span_z : p->z;
-    if (side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1) {
-        terrimpi_heightfield_tile(f, x, z, p->span_x + 1u, 1, 1, line);
-        return p->span_x;
-    }
-    for (i = 0; i <= p->span_z; i++)
-        line[i] = terrimpi_sample(f, x, z + i);
-    return p->span_z;
+    uint32_t span = along_x ? p->span_x : p->span_z;
+    terrimpi_heightfield_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
+                              along_x ? 1u : span + 1u, 1, line);
+    return span;
 }
 
 /* Where a border stands in a tile: its first place, and the way to the next; returns the places. */
 static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t *first,
                                      uint32_t *step)
 {
-    int along_x = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1;
     *first = side == TERRIMP_BORDER_Z1   ? (p->rows - 1u) * p->cols
              : side == TERRIMP_BORDER_X1 ? p->cols - 1u
                                          : 0u;
-    *step = along_x ? 1u : p->cols;
-    return along_x ? p->cols : p->rows;
+    *step = terrimpi_along_x(side) ? 1u : p->cols;
+    return terrimpi_along_x(side) ? p->cols : p->rows;
 }
 
 /* Fills the tile that the simplifier works on: at level 0 the samples, above that the mean of those
@@ -8539,47 +7965,28 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
     }
 }
 
-/* The loop's vertex that is point k of a border, when the borders have so many points. */
-static uint32_t terrimpi_loop_vertex(const uint32_t counts[TERRIMP_BORDER_COUNT], int side,
-                                     uint32_t k)
-{
-    uint32_t x0 = counts[TERRIMP_BORDER_X0] - 1u, z1 = counts[TERRIMP_BORDER_Z1] - 1u;
-    uint32_t x1 = counts[TERRIMP_BORDER_X1] - 1u, z0 = counts[TERRIMP_BORDER_Z0] - 1u;
-    switch (side) {
-    case TERRIMP_BORDER_X0: return k;
-    case TERRIMP_BORDER_Z1: return x0 + k;
-    case TERRIMP_BORDER_X1: return x0 + z1 + x1 - k;
-    default: return k == 0 ? 0 : x0 + z1 + x1 + z0 - k;
-    }
-}
-
 /* Simplifies the tile between its four borders. */
 static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                                             const terrimpi_build *build,
-                                             uint32_t counts[TERRIMP_BORDER_COUNT],
-                                             terrimp_mesh *mesh)
+                                             const terrimpi_build *build, terrimp_mesh *mesh)
 {
     terrimp_border_point points[TERRIMP_BORDER_COUNT][16];
     float line[129];
     terrimp_simplify_desc desc;
     terrimpi_squeeze squeeze;
-    int side;
+    int side, even;
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
     desc.triangle_budget = t->desc.triangle_budget;
     for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_tile_border(p, side, &first, &step);
-        terrimp_result result;
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        result = terrimp_border_simplify(line, count,
-                                         terrimpi_border_points(t->desc.triangle_budget),
-                                         points[side], 16, &counts[side]);
-        if (result != TERRIMP_OK)
-            return result;
+        TERRIMPI_TRY(terrimp_border_simplify(line, count,
+                                             terrimpi_border_points(t->desc.triangle_budget),
+                                             points[side], 16,
+                                             &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
-        desc.borders[side].point_count = counts[side];
     }
     squeeze.step = 1 << p->level;
     squeeze.last_x = (int32_t)p->span_x;
@@ -8589,28 +7996,18 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     mesh->indices = build->indices;
     mesh->vertex_capacity = build->vertex_capacity;
     mesh->index_capacity = build->index_capacity;
-    return terrimpi_simplify(&desc,
-                             (p->span_x | p->span_z) % (1u << p->level) ? &squeeze : NULL,
-                             build->rest, build->rest_bytes, mesh);
+    even = (p->span_x | p->span_z) % (1u << p->level) == 0;
+    return terrimpi_simplify(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
    a sample round it over the polyline. From the border's own samples alone. */
 static void terrimpi_miss_border(const terrimp_terrain *t, const terrimpi_patch *p, int side,
-                                 const uint32_t counts[TERRIMP_BORDER_COUNT],
                                  const terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    int along_x = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1;
     uint32_t span = terrimpi_read_border(t, p, side, build->row), first, step, i, k;
     uint32_t count = terrimpi_tile_border(p, side, &first, &step);
-    for (k = 0; k + 1u < counts[side]; k++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + terrimpi_loop_vertex(counts, side, k);
-        const terrimp_mesh_vertex *b = mesh->vertices + terrimpi_loop_vertex(counts, side, k + 1u);
-        uint32_t from = terrimpi_tile_place(along_x ? a->x : a->z, p->level, span);
-        uint32_t to = terrimpi_tile_place(along_x ? b->x : b->z, p->level, span);
-        terrimpi_take_away(build->row, from, to + (to == span), (float)from, a->height,
-                           (b->height - a->height) / (float)(to - from));
-    }
+    terrimpi_take_border(p, mesh, side, build->row);
     build->tile[first] = build->tile[first + (count - 1u) * step] = 0.0f;
     for (k = 1; k + 1u < count; k++) {
         uint32_t from, end;
@@ -8626,7 +8023,6 @@ static void terrimpi_miss_border(const terrimp_terrain *t, const terrimpi_patch 
 /* Fills the tile with what the mesh misses: for each place the largest height of a sample round it
    over the surface. */
 static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch *p,
-                                 const uint32_t counts[TERRIMP_BORDER_COUNT],
                                  const terrimp_mesh *mesh, const terrimpi_build *build)
 {
     uint32_t i, k, x, z;
@@ -8650,7 +8046,7 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
         }
     }
     for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++)
-        terrimpi_miss_border(t, p, side, counts, mesh, build);
+        terrimpi_miss_border(t, p, side, mesh, build);
 }
 
 /* Raises the mesh so that it stands proud of all samples. Since a raise is a piecewise linear
@@ -8659,14 +8055,11 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
    To do so twice halves the samples that still stand out, from 0.3 to 0.15 %, and makes the error
    larger by a tenth to a fifth: not worth it. */
 static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                                          const uint32_t counts[TERRIMP_BORDER_COUNT],
                                           terrimp_mesh *mesh, const terrimpi_build *build)
 {
     terrimp_raise_desc raise;
-    terrimp_result result;
     uint32_t i;
-    terrimpi_fill_misses(t, p, counts, mesh, build);
-    memset(&raise, 0, sizeof raise); /* corners stay on their samples: four nodes agree on that */
+    terrimpi_fill_misses(t, p, mesh, build);
     raise.heights = build->tile;
     raise.cols = p->cols;
     raise.rows = p->rows;
@@ -8675,10 +8068,10 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
         build->heights[i] = mesh->vertices[i].height;
         mesh->vertices[i].height = 0.0f;
     }
-    result = terrimp_mesh_raise(&raise, mesh, build->work);
+    TERRIMPI_TRY(terrimp_mesh_raise(&raise, mesh, build->work));
     for (i = 0; i < mesh->surface_vertex_count; i++)
         mesh->vertices[i].height += build->heights[i];
-    return result;
+    return TERRIMP_OK;
 }
 
 /* The steps that a height is stored as: rounded up when meshes stand proud. */
@@ -8763,21 +8156,16 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
                                           const terrimpi_build *build)
 {
     terrimpi_patch p = terrimpi_patch_of(t, node);
-    uint32_t counts[TERRIMP_BORDER_COUNT];
     terrimp_mesh mesh;
     terrimpi_error error;
-    terrimp_result result;
     float rms;
     terrimpi_fill_tile(t, &p, build);
-    result = terrimpi_simplify_tile(t, &p, build, counts, &mesh);
-    if (result == TERRIMP_OK && t->desc.proud > 0.0f)
-        result = terrimpi_raise_tile(t, &p, counts, &mesh, build);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_simplify_tile(t, &p, build, &mesh));
+    if (t->desc.proud > 0.0f)
+        TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
     terrimpi_store_surface(t, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
-    if (!terrimpi_finite(error.above) || !terrimpi_finite(error.below))
-        return TERRIMP_E_NOT_FINITE;
+    TERRIMPI_REFUSE(!terrimpi_finite2(error.above, error.below), TERRIMP_E_NOT_FINITE);
     terrimpi_store_mesh(t, node, &mesh, &error, rms);
     return TERRIMP_OK;
 }
@@ -8810,21 +8198,14 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
                                                 size_t bytes, terrimp_terrain **terrain)
 {
     terrimp_terrain t;
-    terrimp_result result;
     size_t needed, at = 0;
     int ok = 1;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     memset(&t, 0, sizeof t);
-    result = terrimp_terrain_desc_resolve(desc, &t.desc);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &t.desc));
     needed = terrimp_terrain_bytes(&t.desc);
-    if (needed == 0)
-        return TERRIMP_E_OVERFLOW;
-    result = terrimpi_check_block(memory, bytes, needed);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_place(&at, 1, sizeof t, &ok);
     terrimpi_terrain_layout(&t, (unsigned char *)memory + at);
@@ -8840,25 +8221,17 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 {
     float low, high, room, step;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     low = terrain->desc.height_low;
     high = terrain->desc.height_high;
     if (low == 0.0f && high == 0.0f) {
         const terrimp_heightfield *f = &terrain->desc.field;
-        terrimpi_scan scan;
-        terrimp_result result;
-        scan.skip_voids = 0;
-        result = terrimpi_scan_tile(f, 0, 0, f->width, f->depth, 1, &scan);
-        if (result != TERRIMP_OK)
-            return result;
-        low = terrimpi_world_height(f, scan.low);
-        high = terrimpi_world_height(f, scan.high);
+        terrimp_rect all = terrimpi_rect(0, 0, f->width, f->depth);
+        TERRIMPI_TRY(terrimpi_height_range(f, all, 0, &low, &high));
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
     step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
-    if (!terrimpi_finite(step) || !terrimpi_finite(low - room))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrimpi_finite(step) || !terrimpi_finite(low - room), TERRIMP_E_RANGE);
     terrain->sample_low = low;
     terrain->sample_high = high;
     terrain->range_low = low - room;
@@ -8871,25 +8244,16 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
                                                       void *scratch, size_t bytes)
 {
     terrimpi_build build;
-    terrimp_result result;
-    if (!terrain)
-        return TERRIMP_E_NULL;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
-    result = terrimpi_check_block(scratch, bytes,
-                                  terrimpi_build_layout(&terrain->desc, NULL, &build));
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrain->begun)
-        return TERRIMP_E_STATE;
-    terrimpi_build_layout(&terrain->desc, (unsigned char *)scratch, &build);
-    result = terrimp_geomip_build_node(&terrain->tree, node, build.row);
-    if (result != TERRIMP_OK)
-        return result;
-    if (node < terrain->tree.level_first[1] &&
-        (terrain->tree.nodes[node].low < terrain->sample_low ||
-         terrain->tree.nodes[node].high > terrain->sample_high))
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node >= terrain->tree.node_count, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_REFUSE(!terrain->begun, TERRIMP_E_STATE);
+    terrimpi_build_layout(&terrain->desc, scratch, &build);
+    TERRIMPI_TRY(terrimp_geomip_build_node(&terrain->tree, node, build.row));
+    TERRIMPI_REFUSE(node < terrain->tree.level_first[1] &&
+                    (terrain->tree.nodes[node].low < terrain->sample_low ||
+                     terrain->tree.nodes[node].high > terrain->sample_high), TERRIMP_E_RANGE);
     return terrimpi_build_mesh(terrain, node, &build);
 }
 
@@ -8903,27 +8267,20 @@ static void terrimpi_hold(terrimpi_mesh *mesh, float low, float high)
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain)
 {
     const terrimp_geomip *tree;
-    uint32_t node, level, x, z;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    uint32_t node;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
-        if (terrain->meshes[node].vertex_count == 0)
-            return TERRIMP_E_STATE;
+        TERRIMPI_REFUSE(terrain->meshes[node].vertex_count == 0, TERRIMP_E_STATE);
     terrimp_geomip_build_finish(tree);
     terrain->mesh_triangle_count = 0;
     for (node = 0; node < tree->node_count; node++) {
         terrimpi_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
         terrain->mesh_triangle_count += terrain->meshes[node].triangle_count;
     }
-    for (level = 1; level < tree->level_count; level++)
-        for (z = 0; z < tree->level_z[level - 1u]; z++)
-            for (x = 0; x < tree->level_x[level - 1u]; x++) {
-                const terrimpi_mesh *child =
-                    &terrain->meshes[terrimpi_mip_number(tree, level - 1u, x, z)];
-                terrimpi_hold(&terrain->meshes[terrimpi_mip_number(tree, level, x / 2u, z / 2u)],
-                              child->low, child->high);
-            }
+    for (node = 0; node + 1u < tree->node_count; node++)
+        terrimpi_hold(&terrain->meshes[terrimpi_mip_parent(tree, node)],
+                      terrain->meshes[node].low, terrain->meshes[node].high);
     terrain->built = 1;
     return TERRIMP_OK;
 }
@@ -8932,47 +8289,48 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
                                                  size_t bytes)
 {
     terrimpi_build build;
-    terrimp_result result;
     uint32_t node;
-    if (!terrain)
-        return TERRIMP_E_NULL;
-    result = terrimpi_check_block(scratch, bytes,
-                                  terrimpi_build_layout(&terrain->desc, NULL, &build));
-    if (result == TERRIMP_OK)
-        result = terrimp_terrain_build_begin(terrain);
-    for (node = 0; result == TERRIMP_OK && node < terrain->tree.node_count; node++)
-        result = terrimp_terrain_build_node(terrain, node, scratch, bytes);
-    return result == TERRIMP_OK ? terrimp_terrain_build_finish(terrain) : result;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimp_terrain_build_begin(terrain));
+    for (node = 0; node < terrain->tree.node_count; node++)
+        TERRIMPI_TRY(terrimp_terrain_build_node(terrain, node, scratch, bytes));
+    return terrimp_terrain_build_finish(terrain);
 }
 
 #endif /* TERRIMP_NO_BUILD */
 
 /* ---- what has been built ---- */
 
+/* What all that give something of a node have to check. */
+static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32_t node,
+                                          const void *out)
+{
+    TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
+}
+
 /* The box of node (x, z) of a level: of everything drawn of it and of those below it. */
 static void terrimpi_node_box(const terrimp_terrain *t, uint32_t level, uint32_t x, uint32_t z,
                               terrimp_box *box)
 {
     const terrimpi_mesh *mesh = &t->meshes[terrimpi_mip_number(&t->tree, level, x, z)];
-    uint32_t quads = t->desc.chunk_quads << level;
-    box->min[0] = terrimpi_world_x(t, x * quads);
+    terrimpi_mip_place p;
+    p.level = level;
+    p.x = x;
+    p.z = z;
+    terrimpi_mip_box(&t->tree, p, box);
     box->min[1] = mesh->low;
-    box->min[2] = terrimpi_world_z(t, z * quads);
-    box->max[0] = terrimpi_world_x(t, (x + 1u) * quads);
     box->max[1] = mesh->high;
-    box->max[2] = terrimpi_world_z(t, (z + 1u) * quads);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box)
 {
     terrimpi_mip_place place;
-    if (!terrain || !box)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, box));
     place = terrimpi_mip_place_of(&terrain->tree, node);
     terrimpi_node_box(terrain, place.level, place.x, place.z, box);
     return TERRIMP_OK;
@@ -8995,12 +8353,7 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                     terrimp_mesh_info *mesh)
 {
-    if (!terrain || !mesh)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, mesh));
     terrimpi_mesh_place(terrain, node, mesh);
     return TERRIMP_OK;
 }
@@ -9025,10 +8378,13 @@ static void terrimpi_touched_along(uint32_t first, uint32_t count, uint32_t marg
     *to = terrimpi_min_u32(last / side, nodes - 1u);
 }
 
+/* What vertices move by hangs on the triangles of two levels above; errors, and how far down skirts
+   reach, on what a finer neighbour draws next to the border. */
 static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const terrimp_rect *rect,
-                                               uint32_t level, uint32_t margin)
+                                               uint32_t level, int morph)
 {
     uint32_t side = t->desc.chunk_quads << level;
+    uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
     terrimpi_touched out;
     terrimpi_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
                            t->tree.level_x[level], &out.x0, &out.x1);
@@ -9039,13 +8395,10 @@ static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const t
 
 static terrimp_result terrimpi_check_touched(const terrimp_terrain *t, const terrimp_rect *rect)
 {
-    if (!t || !rect)
-        return TERRIMP_E_NULL;
-    if (!t->built)
-        return TERRIMP_E_STATE;
-    if (rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
-        rect->y >= t->desc.field.depth)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!t || !rect, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!t->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
+                    rect->y >= t->desc.field.depth, TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -9054,31 +8407,20 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
                                                    uint32_t *nodes, uint32_t capacity,
                                                    uint32_t *count)
 {
-    terrimp_result result = terrimpi_check_touched(terrain, samples);
     uint32_t level, x, z, all = 0;
-    int pass;
-    if (!count)
-        return TERRIMP_E_NULL;
-    if (result != TERRIMP_OK)
-        return result;
-    for (pass = 0; pass < 2; pass++) {
-        for (level = 0; level < terrain->tree.level_count; level++) {
-            /* what vertices move by hangs on the triangles of two levels above, how far down skirts
-               reach on what a finer neighbour draws next to the border */
-            uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
-            terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, margin);
-            if (pass == 0)
-                all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
-            else
-                for (z = in.z0; z <= in.z1; z++)
-                    for (x = in.x0; x <= in.x1; x++)
-                        *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
-        }
-        *count = all;
-        if (!nodes)
-            return TERRIMP_OK;
-        if (all > capacity)
-            return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(!count, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
+    for (level = 0; level < terrain->tree.level_count; level++) {
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
+        all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
+    }
+    *count = all;
+    TERRIMPI_REFUSE(nodes && all > capacity, TERRIMP_E_CAPACITY);
+    for (level = 0; nodes && level < terrain->tree.level_count; level++) {
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++)
+                *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
     }
     return TERRIMP_OK;
 }
@@ -9089,39 +8431,21 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, void *scratch,
                                                    size_t bytes)
 {
-    terrimp_result result = terrimpi_check_touched(terrain, samples);
-    const terrimp_heightfield *f;
     terrimpi_build build;
-    terrimpi_scan scan;
     uint32_t level, x, z;
-    if (result == TERRIMP_OK && terrain->baked)
-        result = TERRIMP_E_STATE;
-    if (result == TERRIMP_OK)
-        result = terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build));
-    if (result != TERRIMP_OK)
-        return result;
-    f = &terrain->desc.field;
-    scan.skip_voids = 0;
-    result = terrimpi_scan_tile(f, samples->x, samples->y,
-                                terrimpi_min_u32(samples->width, f->width - samples->x),
-                                terrimpi_min_u32(samples->height, f->depth - samples->y), 1,
-                                &scan);
-    if (result != TERRIMP_OK)
-        return result;
-    if (terrimpi_world_height(f, scan.low) < terrain->sample_low ||
-        terrimpi_world_height(f, scan.high) > terrain->sample_high)
-        return TERRIMP_E_RANGE;
+    float low, high;
+    TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
+    TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high));
+    TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
     for (level = 0; level < terrain->tree.level_count; level++) {
-        /* errors are also against what a finer neighbour draws next to the border */
-        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, (1u << level) / 2u);
+        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, 0);
         for (z = in.z0; z <= in.z1; z++)
-            for (x = in.x0; x <= in.x1; x++) {
-                uint32_t node = terrimpi_mip_number(&terrain->tree, level, x, z);
-                result = terrimp_terrain_build_node(terrain, node, scratch, bytes);
-                if (result != TERRIMP_OK)
-                    return result;
-            }
+            for (x = in.x0; x <= in.x1; x++)
+                TERRIMPI_TRY(terrimp_terrain_build_node(
+                    terrain, terrimpi_mip_number(&terrain->tree, level, x, z), scratch, bytes));
     }
     return terrimp_terrain_build_finish(terrain);
 }
@@ -9152,19 +8476,13 @@ static uint32_t terrimpi_strip_count(uint32_t chunk_quads)
     return count;
 }
 
-/* Offset of a neighbour: 0 to 7 run around the node, row by row. */
-static void terrimpi_direction(uint32_t direction, int *dx, int *dz)
+/* The quads of a neighbour that lie within `strip` quads of the node, along one axis on which it is
+   before (0), beside (1) or behind (2) the node. */
+static void terrimpi_strip_span(uint32_t place, uint32_t quads, uint32_t strip, uint32_t *from,
+                                uint32_t *to)
 {
-    uint32_t cell = direction < 4u ? direction : direction + 1u; /* of 3 x 3, without the middle */
-    *dx = (int)(cell % 3u) - 1;
-    *dz = (int)(cell / 3u) - 1;
-}
-
-/* The quads of a neighbour that lie within `strip` quads of the node, along one axis. */
-static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t *from, uint32_t *to)
-{
-    *from = d < 0 ? quads - strip : 0;
-    *to = d > 0 ? strip : quads;
+    *from = place == 0 ? quads - strip : 0;
+    *to = place == 2u ? strip : quads;
 }
 
 /* Pattern 0 is the whole node, as geomip pattern 0; then come, for each strip width but the whole,
@@ -9173,7 +8491,7 @@ static void terrimpi_strip_span(int d, uint32_t quads, uint32_t strip, uint32_t 
 static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 {
     terrimpi_pattern p;
-    uint32_t width, direction, number = 1, strips = terrimpi_strip_count(quads);
+    uint32_t width, strip = 0, direction = (wanted - 1u) % TERRIMPI_DIRECTIONS, k;
     p.x0 = p.z0 = p.first_index = 0;
     p.x1 = p.z1 = quads;
     p.index_count = terrimpi_mip_indices(quads, TERRIMP_FORM_LIST, 0);
@@ -9182,26 +8500,21 @@ static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
         return p;
     /* each of the 16 patterns as pattern 0, but half of the 64 sides coarse */
     p.first_index = 16u * p.index_count - 32u * 3u * (quads / 2u);
-    for (width = 0; width < strips; width++) {
-        uint32_t strip = terrimpi_strip_quads(quads, width);
-        if (wanted - number >= TERRIMPI_DIRECTIONS) { /* corners, and whole sides */
-            p.first_index += 24u * strip * (strip + quads);
-            number += TERRIMPI_DIRECTIONS;
-            continue;
-        }
-        for (direction = 0;; direction++) {
-            int dx, dz;
-            terrimpi_direction(direction, &dx, &dz);
-            terrimpi_strip_span(dx, quads, strip, &p.x0, &p.x1);
-            terrimpi_strip_span(dz, quads, strip, &p.z0, &p.z1);
-            p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
-            p.index_count = 3u * p.triangle_count;
-            if (number++ == wanted)
-                return p;
-            p.first_index += p.index_count;
-        }
-    }
     p.index_count = p.triangle_count = 0;
+    for (width = 0; width <= (wanted - 1u) / TERRIMPI_DIRECTIONS; width++) {
+        p.first_index += 24u * strip * (strip + quads); /* corners, and whole sides */
+        strip = terrimpi_strip_quads(quads, width);
+        if (strip == quads)
+            return p;
+    }
+    for (k = 0; k <= direction; k++) {
+        uint32_t cell = k < 4u ? k : k + 1u; /* of 3 x 3, row by row, without the middle */
+        p.first_index += p.index_count;
+        terrimpi_strip_span(cell % 3u, quads, strip, &p.x0, &p.x1);
+        terrimpi_strip_span(cell / 3u, quads, strip, &p.z0, &p.z1);
+        p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
+        p.index_count = 3u * p.triangle_count;
+    }
     return p;
 }
 
@@ -9212,9 +8525,8 @@ static uint32_t terrimpi_strip_pattern(uint32_t quads, uint32_t width, uint32_t 
 }
 
 /* Writes the triangles of a rectangle of quads in columns of 14 quads, row by row within a column,
-   so that a vertex cache of 16 entries still holds the row above. Returns the end. */
-static uint16_t *terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p,
-                                     uint32_t row_vertices)
+   so that a vertex cache of 16 entries still holds the row above. */
+static void terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p, uint32_t row_vertices)
 {
     uint32_t column, x, z;
     for (column = p->x0; column < p->x1; column += 14u)
@@ -9228,7 +8540,6 @@ static uint16_t *terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p,
                 *out++ = (uint16_t)(b + 1u);
                 *out++ = (uint16_t)(a + 1u);
             }
-    return out;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terrain,
@@ -9236,10 +8547,8 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
 {
     const terrimp_geomip *tree;
     uint32_t quads;
-    if (!terrain || !info)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain || !info, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     tree = &terrain->tree;
     quads = terrain->desc.chunk_quads;
     info->chunk_quads = quads;
@@ -9264,13 +8573,11 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
                                                         uint16_t *indices, size_t capacity)
 {
     uint32_t quads, i, strips;
-    if (!terrain || !indices)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain || !indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     quads = terrain->desc.chunk_quads;
-    if (capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index,
+                    TERRIMP_E_CAPACITY);
     terrimp_pattern_fill(quads, TERRIMP_FORM_LIST, indices, capacity);
     strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
     for (i = 1; i <= strips; i++) {
@@ -9280,27 +8587,16 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     return TERRIMP_OK;
 }
 
-/* What the three functions below have to check: `count` items are wanted for each vertex. */
-static terrimp_result terrimpi_check_fill(const terrimp_terrain *terrain, uint32_t node,
-                                          const void *out, size_t capacity, size_t count)
+static size_t terrimpi_ground_vertices(const terrimp_terrain *t)
 {
-    size_t side;
-    if (!terrain || !out)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node >= terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
-    side = terrain->desc.chunk_quads + 1u;
-    return capacity < side * side * count ? TERRIMP_E_CAPACITY : TERRIMP_OK;
+    return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
-    terrimp_result result = terrimpi_check_fill(terrain, node, xyz, capacity, 3);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, xyz));
+    TERRIMPI_REFUSE(capacity < 3u * terrimpi_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
 }
 
@@ -9309,55 +8605,9 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity)
 {
-    terrimp_result result = terrimpi_check_fill(terrain, node, vertices, capacity, 1);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimpi_check_node(terrain, node, vertices));
+    TERRIMPI_REFUSE(capacity < terrimpi_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
-}
-
-TERRIMP_API terrimp_result terrimp_terrain_fill_weights(const terrimp_terrain *terrain,
-                                                        terrimp_geomip_weights *weights,
-                                                        size_t capacity)
-{
-    terrimp_result result = terrimpi_check_fill(terrain, 0, weights, capacity, 1);
-    if (result != TERRIMP_OK)
-        return result;
-    return terrimp_geomip_fill_weights(terrain->desc.chunk_quads, TERRIMP_FORM_LIST, weights);
-}
-
-/* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
-static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
-                               uint16_t *indices)
-{
-    const terrimpi_mesh *mesh = &t->meshes[node];
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    terrimpi_patch p = terrimpi_patch_of(t, node);
-    uint32_t i, vertices = mesh->vertex_count, index_count = 3u * mesh->triangle_count;
-    int upper;
-    memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
-    memset(indices, 0, t->index_stride * sizeof *indices);
-    for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
-        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
-        xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
-        xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
-        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
-    }
-    for (i = 0; i < index_count; i++)
-        indices[i] = corners[i];
-    for (upper = 0; upper < 2; upper++) {
-        float *rim = xyz + (size_t)vertices * 3u;
-        if (upper ? !(mesh->upper_skirt > 0.0f) : t->desc.no_lower_skirts)
-            continue;
-        memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
-        for (i = 0; i < mesh->border_count; i++)
-            rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
-                                     : terrimpi_min(rim[i * 3u + 1u], t->tree.nodes[node].low);
-        terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
-        vertices += mesh->border_count;
-        index_count += 6u * mesh->border_count;
-    }
 }
 
 /* Writes the floor: a quad for each node of its level. A corner has the height of the lowest point
@@ -9385,27 +8635,64 @@ static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *
     terrimpi_emit_quads(indices, &all, wide + 1u);
 }
 
+/* Writes one node's vertices and indices with skirts, its whole share of the buffers; the floor's
+   when the node is node_count. */
+static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
+                               uint16_t *indices)
+{
+    const terrimpi_mesh *mesh = t->meshes + node;
+    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
+    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
+    terrimpi_patch p;
+    uint32_t i, vertices, index_count;
+    int upper;
+    if (node == t->tree.node_count) {
+        terrimpi_fill_floor(t, xyz, indices);
+        return;
+    }
+    p = terrimpi_patch_of(t, node);
+    vertices = mesh->vertex_count;
+    index_count = 3u * mesh->triangle_count;
+    memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
+    memset(indices, 0, t->index_stride * sizeof *indices);
+    for (i = 0; i < vertices; i++) {
+        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
+        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
+        xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
+        xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
+        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
+    }
+    for (i = 0; i < index_count; i++)
+        indices[i] = corners[i];
+    for (upper = 0; upper < 2; upper++) {
+        float *rim = xyz + (size_t)vertices * 3u;
+        if (upper ? !(mesh->upper_skirt > 0.0f) : t->desc.no_lower_skirts)
+            continue;
+        memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
+        for (i = 0; i < mesh->border_count; i++)
+            rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
+                                     : terrimpi_min(rim[i * 3u + 1u], t->tree.nodes[node].low);
+        terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
+        vertices += mesh->border_count;
+        index_count += 6u * mesh->border_count;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                      float *xyz, size_t xyz_capacity,
                                                      uint16_t *indices, size_t index_capacity)
 {
     uint32_t vertices, index_count;
     int is_floor;
-    if (!terrain || !xyz || !indices)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
-    if (node > terrain->tree.node_count)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(!terrain || !xyz || !indices, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(node > terrain->tree.node_count, TERRIMP_E_RANGE);
     is_floor = node == terrain->tree.node_count;
     vertices = is_floor ? terrimpi_floor_vertices(terrain) : terrain->vertex_stride;
     index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
-    if (xyz_capacity / 3u < vertices || index_capacity < index_count)
-        return TERRIMP_E_CAPACITY;
-    if (is_floor)
-        terrimpi_fill_floor(terrain, xyz, indices);
-    else
-        terrimpi_fill_mesh(terrain, node, xyz, indices);
+    TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
+                    index_capacity < index_count, TERRIMP_E_CAPACITY);
+    terrimpi_fill_mesh(terrain, node, xyz, indices);
     return TERRIMP_OK;
 }
 
@@ -9413,20 +8700,16 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity)
 {
-    uint32_t node, nodes;
-    if (!terrain || !xyz || !indices)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    size_t node, nodes;
+    TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_check_node(terrain, 0, xyz));
     nodes = terrain->tree.node_count;
     if (xyz_capacity / 3u < nodes * terrain->vertex_stride + terrimpi_floor_vertices(terrain) ||
         index_capacity < nodes * terrain->index_stride + terrimpi_floor_indices(terrain))
         return TERRIMP_E_CAPACITY;
-    for (node = 0; node < nodes; node++)
-        terrimpi_fill_mesh(terrain, node, xyz + (size_t)node * terrain->vertex_stride * 3u,
-                           indices + (size_t)node * terrain->index_stride);
-    terrimpi_fill_floor(terrain, xyz + (size_t)nodes * terrain->vertex_stride * 3u,
-                        indices + (size_t)nodes * terrain->index_stride);
+    for (node = 0; node <= nodes; node++)
+        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + node * terrain->vertex_stride * 3u,
+                           indices + node * terrain->index_stride);
     return TERRIMP_OK;
 }
 
@@ -9470,15 +8753,11 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
     terrimp_result result;
     size_t bytes, scratch_bytes;
     void *memory, *scratch;
-    if (!terrain || !terrimpi_pick_allocator(allocator, &from))
-        return TERRIMP_E_NULL;
-    result = terrimp_terrain_desc_resolve(desc, &resolved);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!terrain || !terrimpi_pick_allocator(allocator, &from), TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &resolved));
     bytes = terrimp_terrain_bytes(&resolved);
     scratch_bytes = terrimp_terrain_scratch_bytes(&resolved);
-    if (bytes == 0 || scratch_bytes == 0)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(bytes == 0 || scratch_bytes == 0, TERRIMP_E_OVERFLOW);
     memory = from.allocate(from.user, bytes);
     scratch = from.allocate(from.user, scratch_bytes);
     result = memory && scratch ? terrimp_terrain_init(&resolved, memory, bytes, &made)
@@ -9667,11 +8946,6 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 #endif /* TERRIMP_NO_BUILD */
 
 /* ---- validation: nothing of a block is used before it has been looked at ---- */
-
-static int terrimpi_within(float value, float low, float high)
-{
-    return terrimpi_finite(value) && value >= low && value <= high;
-}
 
 /* Fills in a terrain from a header in this machine's byte order: all but the arrays and the field's
    samples. Returns 0 when the header is wrong or speaks of more bytes than there are. */

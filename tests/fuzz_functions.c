@@ -348,19 +348,13 @@ static void finish_mesh(const float *tile, uint32_t cols, uint32_t rows, terrimp
 {
     terrimp_raise_desc raise;
     float *work = (float *)fuzz_take(2u * mesh->surface_vertex_count * sizeof *work);
-    uint32_t vertex_count, index_count;
-    int i;
     memset(&raise, 0, sizeof raise);
     raise.heights = tile;
     raise.cols = cols;
     raise.rows = rows;
     raise.amount = fuzz_float(1.0f);
-    for (i = 0; i < 4; i++)
-        raise.corner_raise[i] = fuzz_u8() & 3u ? 0.0f : fuzz_float(1.0f);
     (void)terrimp_mesh_raise(&raise, mesh, work);
     free(work);
-    FUZZ_CHECK(terrimp_skirt_counts(mesh->border_vertex_count, &vertex_count, &index_count)
-               == TERRIMP_OK);
     (void)terrimp_mesh_add_lower_skirt(mesh, fuzz_float(-100.0f));
     (void)terrimp_mesh_add_upper_skirt(mesh, fuzz_float(10.0f));
     check_mesh(mesh, cols, rows);
@@ -371,7 +365,7 @@ static void simplify_tile(const float *tile, uint32_t cols, uint32_t rows)
     static terrimp_border_point points[4][64];
     terrimp_simplify_desc desc;
     terrimp_mesh mesh;
-    float line[64], ends[2];
+    float line[64];
     uint32_t count, limit = fuzz_below(12), i;
     size_t bytes;
     void *scratch;
@@ -387,7 +381,6 @@ static void simplify_tile(const float *tile, uint32_t cols, uint32_t rows)
                                     &desc.borders[i].point_count) != TERRIMP_OK)
             return;
         desc.borders[i].points = points[i];
-        FUZZ_CHECK(terrimp_border_corner_raise(line, count, desc.borders + i, ends) == TERRIMP_OK);
     }
     if (fuzz_u8() == 1) /* a damaged polyline */
         points[fuzz_below(4)][fuzz_below(4)].at = (uint16_t)fuzz_u32();

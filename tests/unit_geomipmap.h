@@ -1168,6 +1168,47 @@ static void mip_check_children(int form)
     free(indices);
 }
 
+/* What a vertex shader does with a vertex and its weights is what morph does. */
+static void weights_morph_as_the_processor_does(void)
+{
+    static terrimp_geomip_weights weights[9 * 9 + 4 * 3];
+    static terrimp_geomip_vertex vertices[9 * 9 + 4 * 3];
+    static float heights[9 * 9 + 4 * 3];
+    terrimp_geomip_draw draw;
+    uint32_t k, i;
+    int form, moved = 0;
+    memset(&draw, 0, sizeof draw);
+    for (form = 0; form < (int)TERRIMP_FORM_COUNT; form++) {
+        uint32_t count = terrimp_pattern_vertex_count(8, form);
+        CHECK(terrimp_geomip_fill_weights(8, form, weights) == TERRIMP_OK);
+        draw.morph = random_float(0.0f, 1.0f);
+        for (i = 0; i < 4u; i++) {
+            draw.side[i] = random_float(0.0f, 1.0f);
+            draw.side_coarse[i] = random_float(0.0f, 1.0f);
+        }
+        for (k = 0; k < count; k++) {
+            vertices[k].height = random_float(-9.0f, 9.0f);
+            vertices[k].move = random_float(-9.0f, 9.0f);
+            vertices[k].beside[0] = random_float(-9.0f, 9.0f);
+            vertices[k].beside[1] = random_float(-9.0f, 9.0f);
+        }
+        CHECK(terrimp_geomip_morph(8, form, &draw, vertices, heights, 1) == TERRIMP_OK);
+        for (k = 0; k < count; k++) {
+            const terrimp_geomip_weights *w = &weights[k];
+            float factor = (float)w->self * draw.morph, move = vertices[k].move;
+            for (i = 0; i < 4u; i++) {
+                factor += (float)w->odd[i] * draw.side[i] + (float)w->even[i] * draw.side_coarse[i];
+                move += vertices[k].beside[i / 2u] * (float)w->beside[i] * draw.side_coarse[i];
+            }
+            CHECK(fabsf(vertices[k].height + factor * move - heights[k]) < 1e-4f);
+            moved += factor > 0.0f;
+        }
+    }
+    CHECK(moved > 100);
+    CHECK(terrimp_geomip_fill_weights(8, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_geomip_fill_weights(7, 0, weights) == TERRIMP_E_RANGE);
+}
+
 static void children_begin_in_the_shape_of_their_parent(void)
 {
     mip_check_children(TERRIMP_FORM_LIST);
@@ -1324,6 +1365,7 @@ static void geomipmap_tests(void)
     RUN(a_jittering_camera_does_not_flicker);
     RUN(the_same_frame_is_selected_twice_alike);
     RUN(nodes_meet_exactly_at_any_fraction);
+    RUN(weights_morph_as_the_processor_does);
     RUN(children_begin_in_the_shape_of_their_parent);
     RUN(nodes_have_ceased_to_morph_when_they_split);
     RUN(heights_change_with_the_camera_s_step);

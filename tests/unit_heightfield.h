@@ -621,7 +621,7 @@ static void hf_a_position_lies_between_the_lines_of_its_quad(void)
                                terrimpi_line(origin, spacing, at + 1u));
         if (round & 1)
             x = terrimpi_line(origin, spacing, at);
-        if (!terrimpi_locate(origin, spacing, count, x, &quad)) {
+        if (!terrimpi_locate_along(origin, spacing, count, x, &quad)) {
             CHECK(0);
             continue;
         }

@@ -384,16 +384,15 @@ static void skirts_are_closed_walls_that_face_the_right_way(void)
 {
     simp_case *t = &simp_a;
     terrimp_mesh *m = &t->mesh;
-    uint32_t n, i, skirt_vertices = 0, skirt_indices = 0, first;
+    uint32_t n, i, first;
     simp_fill(t, 33, 21, 6);
     simp_make_borders(t, 0);
     CHECK(simp_run(t, 0) == TERRIMP_OK);
     n = m->border_vertex_count;
-    CHECK(terrimp_skirt_counts(n, &skirt_vertices, &skirt_indices) == TERRIMP_OK);
     CHECK(terrimp_mesh_add_lower_skirt(m, -500.0f) == TERRIMP_OK);
     CHECK(terrimp_mesh_add_upper_skirt(m, 7.0f) == TERRIMP_OK);
-    CHECK(m->vertex_count == m->surface_vertex_count + 2 * skirt_vertices);
-    CHECK(m->index_count == m->surface_index_count + 2 * skirt_indices);
+    CHECK(m->vertex_count == m->surface_vertex_count + 2 * n);
+    CHECK(m->index_count == m->surface_index_count + 2 * 6 * n);
     first = m->surface_index_count;
     for (i = first; i < m->index_count; i += 3) {
         const terrimp_mesh_vertex *a = m->vertices + m->indices[i];
@@ -403,7 +402,7 @@ static void skirts_are_closed_walls_that_face_the_right_way(void)
         float vx = (float)(c->x - a->x), vy = c->height - a->height, vz = (float)(c->z - a->z);
         float nx = uy * vz - uz * vy, nz = ux * vy - uy * vx;
         float out = nx * ((float)a->x - 16.0f) + nz * ((float)a->z - 10.0f);
-        CHECK(i < first + skirt_indices ? out > 0.0f : out < 0.0f);
+        CHECK(i < first + 6 * n ? out > 0.0f : out < 0.0f);
     }
     for (i = 0; i < n; i++) {
         const terrimp_mesh_vertex *low = m->vertices + m->surface_vertex_count + i;
@@ -415,37 +414,19 @@ static void skirts_are_closed_walls_that_face_the_right_way(void)
     simp_free(t);
 }
 
-/* Raises a tile's mesh with the corner raises that its own borders ask for. */
-static void simp_raise(simp_case *t, float amount, float extra_corner, float *work)
+static void simp_raise(simp_case *t, float amount, float *work)
 {
-    static const int at[4][2] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}}; /* corner: x end, z end */
     terrimp_raise_desc raise;
-    int k, c;
     memset(&raise, 0, sizeof raise);
     raise.heights = t->heights;
     raise.cols = t->cols;
     raise.rows = t->rows;
     raise.amount = amount;
-    for (k = 0; k < 4; k++) {
-        float line[SIMP_MAX], end[2];
-        int along_x = k == TERRIMP_BORDER_Z0 || k == TERRIMP_BORDER_Z1;
-        int second = k == TERRIMP_BORDER_Z1 || k == TERRIMP_BORDER_X1;
-        uint32_t i, n = along_x ? t->cols : t->rows;
-        for (i = 0; i < n; i++)
-            line[i] = simp_border_sample(t, k, i);
-        CHECK(terrimp_border_corner_raise(line, n, t->desc.borders + k, end) == TERRIMP_OK);
-        for (c = 0; c < 4; c++)
-            if (at[c][along_x ? 1 : 0] == second) {
-                float wanted = end[at[c][along_x ? 0 : 1]] + extra_corner;
-                if (wanted > raise.corner_raise[c])
-                    raise.corner_raise[c] = wanted;
-            }
-    }
     CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_OK);
 }
 
 /* Is every sample under the raised surface, but for those whose weight hangs by more than half on
-   border vertices? Samples of the border have no such excuse: the corners were raised for them. */
+   border vertices? Samples of the border have no such excuse but beside corners. */
 static int simp_hidden(const simp_case *t)
 {
     const terrimp_mesh *m = &t->mesh;
@@ -466,10 +447,15 @@ static int simp_hidden(const simp_case *t)
                 w[1] = (float)u / (float)d;
                 w[2] = (float)v / (float)d;
                 w[0] = 1.0f - w[1] - w[2];
-                for (k = 0; k < 3; k++)
-                    hold += m->indices[i + (uint32_t)k] >= m->border_vertex_count ? w[k] : 0.0f;
+                for (k = 0; k < 3; k++) {
+                    uint32_t at = m->indices[i + (uint32_t)k];
+                    const terrimp_mesh_vertex *p = m->vertices + at;
+                    int corner = (p->x == 0 || p->x == t->cols - 1) &&
+                                 (p->z == 0 || p->z == t->rows - 1);
+                    hold += (on_border ? !corner : at >= m->border_vertex_count) ? w[k] : 0.0f;
+                }
                 h = w[0] * a->height + w[1] * b->height + w[2] * c->height;
-                if ((on_border || hold > 0.501f) && t->heights[z * t->cols + x] > h + 2e-3f)
+                if (hold > 0.501f && t->heights[z * t->cols + x] > h + 2e-3f)
                     return 0;
             }
     return 1;
@@ -487,10 +473,10 @@ static void raised_mesh_hides_the_terrain_and_reports_its_errors(void)
         CHECK(simp_run(t, 0) == TERRIMP_OK);
         before = t->mesh.error_above;
         height0 = t->mesh.vertices[t->mesh.vertex_count - 1].height;
-        simp_raise(t, 0.0f, 0.0f, work);
+        simp_raise(t, 0.0f, work);
         CHECK(t->mesh.error_above == before);
         CHECK(t->mesh.vertices[t->mesh.vertex_count - 1].height == height0);
-        simp_raise(t, 1.0f, 0.0f, work);
+        simp_raise(t, 1.0f, work);
         CHECK(t->mesh.error_above <= before + 4e-3f); /* two last places of such heights */
         CHECK(simp_hidden(t));
         simp_check_errors(t);
@@ -519,13 +505,9 @@ static void raised_neighbours_still_meet(void)
         raise.heights = p->heights;
         raise.cols = 65;
         raise.rows = 33;
-        raise.corner_raise[1] = 3.0f;
-        raise.corner_raise[2] = 5.0f;
         CHECK(terrimp_mesh_raise(&raise, &p->mesh, work) == TERRIMP_OK);
         raise.heights = q->heights;
         raise.rows = 49;
-        raise.corner_raise[0] = 3.0f;
-        raise.corner_raise[3] = 5.0f;
         CHECK(terrimp_mesh_raise(&raise, &q->mesh, work) == TERRIMP_OK);
         for (i = 0; i < p->mesh.border_vertex_count; i++)
             for (k = 0; k < q->mesh.border_vertex_count; k++) {
@@ -592,7 +574,6 @@ static void simplifier_refuses_bad_input(void)
     CHECK(terrimp_simplify_scratch_bytes(5, 5, 0xffffffffu) == 0);
     CHECK(terrimp_mesh_capacity(0, NULL, &i) == TERRIMP_E_NULL);
     CHECK(terrimp_mesh_capacity(0xffffffffu, &v, &i) == TERRIMP_E_RANGE && v == 5 && i == 5);
-    CHECK(terrimp_skirt_counts(3, &v, &i) == TERRIMP_E_RANGE && v == 5 && i == 5);
     CHECK(terrimp_border_simplify(NULL, 4, 0, p, 8, &count) == TERRIMP_E_NULL);
     CHECK(terrimp_border_simplify(h, 4, 0, p, 8, &count) == TERRIMP_E_NOT_FINITE);
     CHECK(terrimp_border_simplify(h, 1, 0, p, 8, &count) == TERRIMP_E_RANGE);
