@@ -80,7 +80,7 @@ bake() # name, first byte, PGM, flight, options of build/bake...
 flat='\100\100\100\100\100\100\100\100\100'
 bake flat '\000' "P5 3 3 255\n$flat" "$(noise 20 150)" --chunk 4 --triangles 32
 bake mended '\001' "P5 3 3 255\n$(noise 11 9)" "$(noise 21 150)" --chunk 4 --triangles 40
-bake levels '\\001' "P5 8 6 255\n$(noise 12 48)" "$(noise 22 150)" --chunk 4 --triangles 32
+bake levels '\001' "P5 8 6 255\n$(noise 12 48)" "$(noise 22 150)" --chunk 4 --triangles 32
 bake large '\000' "P5 9 9 65535\n$(noise 13 162)" "$(noise 23 150)" --chunk 8
 bake turned '\000' "P5 3 2 255\n$(noise 14 6)" "" --chunk 4 --triangles 32 --turn
 bake other '\010' "P5 3 3 255\n$(noise 15 9)" "" --chunk 4 --triangles 32
