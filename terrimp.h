@@ -1365,7 +1365,8 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
    can be built in any order and still meet. Looks at every sample, unless the descriptor names the
    range. To be called once, before any node is built.
 
-   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows
+   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or
+              the sum of its squares over all samples
    Cost       O(width * depth), about 1.5 ns a sample; O(1) when the range is named */
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain);
 
@@ -8280,6 +8281,15 @@ static float terrimpi_mesh_height(const terrimp_terrain *t, uint32_t steps)
     return t->range_low + t->range_step * (float)steps;
 }
 
+/* Whether a range of heights does not overflow, nor squared errors that are summed up over all
+   samples. */
+static int terrimpi_range_fits(const terrimp_heightfield *field, float low, float step)
+{
+    float range = step * (float)TERRIMPI_HEIGHT_STEPS;
+    return step >= 0.0f && terrimpi_finite(low) && terrimpi_finite(low + range) &&
+           terrimpi_finite(range * range * (float)field->width * (float)field->depth);
+}
+
 #ifndef TERRIMP_NO_BUILD
 
 /* ---- building: the survey of a mesh by all samples of its node ---- */
@@ -8855,7 +8865,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
     step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
-    if (!terrimpi_finite(step) || !terrimpi_finite(low - room))
+    if (!terrimpi_range_fits(&terrain->desc.field, low - room, step))
         return TERRIMP_E_RANGE;
     terrain->sample_low = low;
     terrain->sample_high = high;
@@ -9711,9 +9721,8 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     t->range_step = bake->range_step;
     return bake->node_count == t->tree.node_count && bake->vertex_limit == t->vertex_limit &&
            bake->index_limit == t->index_limit && terrimpi_finite(t->sample_low) &&
-           terrimpi_finite(t->sample_high) && terrimpi_finite(t->range_low) &&
-           terrimpi_within(t->range_step, 0.0f, TERRIMPI_FLOAT_MAX) &&
-           terrimpi_finite(terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
+           terrimpi_finite(t->sample_high) &&
+           terrimpi_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
 /* Sets the arrays of a terrain to those of a bake. Only reading functions touch them then. */

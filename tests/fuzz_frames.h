@@ -57,7 +57,8 @@ static void check_mesh_range(uint32_t base, uint32_t first, uint32_t count)
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     FUZZ_CHECK(user == &info && !open_capture && c->node < info.node_count);
-    impostors++;
+    FUZZ_CHECK(c->part_count <= 2 && c->part < c->part_count);
+    impostors += c->part == 0; /* of a picture in two parts both are drawn */
     check_mesh_range(c->base_vertex, c->first_index, c->index_count);
     FUZZ_CHECK(fuzz_finite(c->texture_matrix, 16));
     FUZZ_CHECK(fuzz_finite(&c->depth_bias, 1) && c->depth_bias >= 0.0f);
