@@ -3278,13 +3278,63 @@ static terrimp_result terrimpi_check_box(const terrimp_box *box)
     return TERRIMP_OK;
 }
 
+/* What some points span, seen from a capture's eye: their tangents to the right and up and their
+   depths; and the steepest ray's length over its depth. */
+typedef struct terrimpi_sight {
+    float low[3], high[3], slope;
+} terrimpi_sight;
+
+/* Returns 0 when there is a point whose depth is not more than a fraction of its distance. */
+static int terrimpi_capture_sight(const terrimp_capture *capture, const float *xyz, uint32_t count,
+                                  float fraction, terrimpi_sight *sight)
+{
+    uint32_t i, k;
+    sight->slope = 1.0f;
+    for (k = 0; k < 3u; k++) {
+        sight->low[k] = TERRIMPI_FLOAT_MAX;
+        sight->high[k] = -TERRIMPI_FLOAT_MAX;
+    }
+    for (i = 0; i < count; i++, xyz += 3) {
+        float p[3], at[3], length;
+        for (k = 0; k < 3u; k++)
+            p[k] = xyz[k] - capture->eye[k];
+        length = terrimpi_length(p);
+        at[2] = terrimpi_dot(p, capture->forward);
+        if (!(at[2] > fraction * length))
+            return 0;
+        at[0] = terrimpi_dot(p, capture->right) / at[2];
+        at[1] = terrimpi_dot(p, capture->up) / at[2];
+        sight->slope = terrimpi_max(sight->slope, length / at[2]);
+        for (k = 0; k < 3u; k++) {
+            sight->low[k] = terrimpi_min(sight->low[k], at[k]);
+            sight->high[k] = terrimpi_max(sight->high[k], at[k]);
+        }
+    }
+    return 1;
+}
+
+/* Sets the tangents of a capture, a hair's breadth larger, so that rounding leaves no point
+   outside. */
+static void terrimpi_capture_aim(terrimp_capture *capture, terrimpi_sight *sight)
+{
+    uint32_t k;
+    for (k = 0; k < 2u; k++)
+        terrimpi_widen(&sight->low[k], &sight->high[k], sight->slope);
+    capture->tan_left = sight->low[0];
+    capture->tan_right = sight->high[0];
+    capture->tan_down = sight->low[1];
+    capture->tan_up = sight->high[1];
+}
+
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
+    static const float origin[3] = {0.0f, 0.0f, 0.0f};
     terrimp_capture c;
     terrimp_result result;
-    float slope = 1.0f; /* of the steepest ray to a corner: its length over its depth */
+    terrimpi_sight sight;
+    float corners[8][3];
     int i;
     if (!box || !eye || !capture)
         return TERRIMP_E_NULL;
@@ -3303,31 +3353,14 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
         return TERRIMP_E_INSIDE;
     memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
     terrimpi_basis(c.forward, c.up, c.right);
-    c.z_near = c.z_far = 0.0f;
-    c.tan_left = c.tan_right = c.tan_down = c.tan_up = 0.0f;
-    for (i = 0; i < 8; i++) {
-        float p[3], length, z, x, y;
-        terrimpi_box_corner(box, i, eye, p);
-        z = terrimpi_dot(c.forward, p);
-        length = terrimpi_length(p);
-        /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-        if (!(z > 0.001f * length))
-            return TERRIMP_E_BEHIND;
-        slope = terrimpi_max(slope, length / z);
-        x = terrimpi_dot(c.right, p) / z;
-        y = terrimpi_dot(c.up, p) / z;
-        c.z_near = i ? terrimpi_min(c.z_near, z) : z;
-        c.z_far = i ? terrimpi_max(c.z_far, z) : z;
-        c.tan_left = i ? terrimpi_min(c.tan_left, x) : x;
-        c.tan_right = i ? terrimpi_max(c.tan_right, x) : x;
-        c.tan_down = i ? terrimpi_min(c.tan_down, y) : y;
-        c.tan_up = i ? terrimpi_max(c.tan_up, y) : y;
-    }
-    /* A hair's breadth, so that rounding leaves no corner outside and a flat box has a volume. */
-    c.z_near *= 1.0f - 1e-6f * slope;
-    c.z_far *= 1.0f + 1e-6f * slope;
-    terrimpi_widen(&c.tan_left, &c.tan_right, slope);
-    terrimpi_widen(&c.tan_down, &c.tan_up, slope);
+    for (i = 0; i < 8; i++)
+        terrimpi_box_corner(box, i, origin, corners[i]);
+    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
+    if (!terrimpi_capture_sight(&c, corners[0], 8, 0.001f, &sight))
+        return TERRIMP_E_BEHIND;
+    c.z_near = sight.low[2] * (1.0f - 1e-6f * sight.slope); /* so that a flat box has a volume */
+    c.z_far = sight.high[2] * (1.0f + 1e-6f * sight.slope);
+    terrimpi_capture_aim(&c, &sight);
     *capture = c;
     return TERRIMP_OK;
 }
@@ -3335,35 +3368,14 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count)
 {
-    float low[2], high[2], slope = 1.0f; /* tangents; a ray's length over its depth */
-    uint32_t i, k;
+    terrimpi_sight sight;
     if (!capture || !xyz)
         return TERRIMP_E_NULL;
     if (count == 0)
         return TERRIMP_E_RANGE;
-    low[0] = low[1] = TERRIMPI_FLOAT_MAX;
-    high[0] = high[1] = -TERRIMPI_FLOAT_MAX;
-    for (i = 0; i < count; i++, xyz += 3) {
-        float p[3], depth, tangent[2];
-        for (k = 0; k < 3u; k++)
-            p[k] = xyz[k] - capture->eye[k];
-        depth = terrimpi_dot(p, capture->forward);
-        if (!(depth > 0.0f))
-            return TERRIMP_E_BEHIND;
-        tangent[0] = terrimpi_dot(p, capture->right) / depth;
-        tangent[1] = terrimpi_dot(p, capture->up) / depth;
-        slope = terrimpi_max(slope, terrimpi_length(p) / depth);
-        for (k = 0; k < 2u; k++) {
-            low[k] = terrimpi_min(low[k], tangent[k]);
-            high[k] = terrimpi_max(high[k], tangent[k]);
-        }
-    }
-    for (k = 0; k < 2u; k++)
-        terrimpi_widen(&low[k], &high[k], slope);
-    capture->tan_left = low[0];
-    capture->tan_right = high[0];
-    capture->tan_down = low[1];
-    capture->tan_up = high[1];
+    if (!terrimpi_capture_sight(capture, xyz, count, 0.0f, &sight))
+        return TERRIMP_E_BEHIND;
+    terrimpi_capture_aim(capture, &sight);
     return TERRIMP_OK;
 }
 
@@ -3746,6 +3758,18 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32
         return TERRIMP_E_RANGE;
     terrimpi_mip_box(tree, terrimpi_mip_place_of(tree, node), box);
     return TERRIMP_OK;
+}
+
+/* Which of a node's four children is closest to the eye: bit 0 the one farther along x, bit 1 the
+   one farther along z. */
+static uint32_t terrimpi_mip_closest(const terrimp_geomip *t, uint32_t level, uint32_t x,
+                                     uint32_t z, const float eye[3])
+{
+    const terrimp_heightfield *f = &t->field;
+    uint32_t i = terrimpi_mip_col(t, level - 1u, (x * 2u + 1u) * t->chunk_quads);
+    uint32_t j = terrimpi_mip_row(t, level - 1u, (z * 2u + 1u) * t->chunk_quads);
+    return (eye[0] >= terrimpi_line(f->origin_x, f->spacing_x, i) ? 1u : 0u) |
+           (eye[2] >= terrimpi_line(f->origin_z, f->spacing_z, j) ? 2u : 0u);
 }
 
 /* The place next to a node beyond a side; returns 0 where the terrain ends. */
@@ -4543,7 +4567,7 @@ static void terrimpi_mip_collect(terrimpi_mip_frame *f)
     while (depth > 0) {
         terrimpi_mip_place p;
         terrimp_box box;
-        uint32_t node, closest = 0;
+        uint32_t node, closest;
         top = stack[--depth];
         p = top.place;
         node = terrimpi_mip_number(t, p.level, p.x, p.z);
@@ -4557,15 +4581,10 @@ static void terrimpi_mip_collect(terrimpi_mip_frame *f)
             terrimpi_mip_emit(f, p, node);
             continue;
         }
+        closest = terrimpi_mip_closest(t, p.level, p.x, p.z, f->eye);
         p.level--;
         p.x *= 2u;
         p.z *= 2u;
-        if (f->eye[0] >= terrimpi_line(t->field.origin_x, t->field.spacing_x,
-                                       terrimpi_mip_col(t, p.level, (p.x + 1u) * t->chunk_quads)))
-            closest |= 1u;
-        if (f->eye[2] >= terrimpi_line(t->field.origin_z, t->field.spacing_z,
-                                       terrimpi_mip_row(t, p.level, (p.z + 1u) * t->chunk_quads)))
-            closest |= 2u;
         for (i = 4u; i-- > 0;) { /* the last one pushed is the first one visited */
             terrimpi_mip_place child = p;
             child.x += (closest ^ i) & 1u;
@@ -9676,9 +9695,10 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 
 /* ---- validation: nothing of a block is used before it has been looked at ---- */
 
+/* For finite limits; nothing lies outside of them and within, not even NaN. */
 static int terrimpi_within(float value, float low, float high)
 {
-    return terrimpi_finite(value) && value >= low && value <= high;
+    return value >= low && value <= high;
 }
 
 /* Fills in a terrain from a header in this machine's byte order: all but the arrays and the field's
@@ -10148,10 +10168,19 @@ struct terrimp_view {
 
 /* ---- settings and memory ---- */
 
-static void terrimpi_default(float *value, float otherwise)
+/* One setting: fills in its default and checks it. *result says what is wrong with those so far:
+   one that is not finite counts before one that is out of its limits. */
+static void terrimpi_setting(float *value, float otherwise, float low, float high,
+                             terrimp_result *result)
 {
+    if (!terrimpi_finite(*value)) {
+        *result = TERRIMP_E_NOT_FINITE;
+        return;
+    }
     if (*value == 0.0f)
         *value = otherwise;
+    if (!terrimpi_within(*value, low, high) && *result == TERRIMP_OK)
+        *result = TERRIMP_E_RANGE;
 }
 
 static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
@@ -10160,49 +10189,27 @@ static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
         *value = otherwise;
 }
 
-static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)
+static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrimp_view_desc *d)
 {
-    if (!terrimpi_finite(c->draw) || !terrimpi_finite(c->triangle) ||
-        !terrimpi_finite(c->ground_px) || !terrimpi_finite(c->impostor_px) ||
-        !terrimpi_finite(c->capture))
-        return TERRIMP_E_NOT_FINITE;
-    if (c->draw < 0.0f || c->triangle < 0.0f || c->ground_px < 0.0f || c->impostor_px < 0.0f ||
-        c->capture < 0.0f)
-        return TERRIMP_E_RANGE;
-    terrimpi_default(&c->draw, 40.0f);
-    terrimpi_default(&c->triangle, 1.0f);
-    terrimpi_default(&c->ground_px, 0.25f);
-    terrimpi_default(&c->impostor_px, 0.25f);
-    terrimpi_default(&c->capture, 1400.0f);
-    return TERRIMP_OK;
-}
-
-static void terrimpi_view_defaults(const terrimp_terrain *t, terrimp_view_desc *d)
-{
-    uint32_t chunks = t->tree.level_first[1];
-    if (d->mode == TERRIMP_MODE_DEFAULT)
-        d->mode = TERRIMP_MODE_AUTO;
-    if (d->ground_rule == TERRIMP_GEOMIP_DEFAULT)
-        d->ground_rule = TERRIMP_GEOMIP_PICTURE;
-    terrimpi_default(&d->tolerance_px, 1.0f);
-    terrimpi_default(&d->ground_tolerance_px,
-                     terrimpi_max(0.05f, 0.5f * d->tolerance_px));
-    terrimpi_default(&d->morph_ratio, 1.0f);
-    terrimpi_default(&d->fade_start,
-                     2.0f * (float)t->desc.chunk_quads *
-                         terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z));
-    terrimpi_default(&d->fade_end, 1.5f * d->fade_start);
-    terrimpi_default(&d->max_angle_rad, 0.0873f);
-    terrimpi_default(&d->texels_per_px, 2.0f);
-    terrimpi_default(&d->impostor_px, 320.0f);
-    terrimpi_default_u32(&d->atlas_size, 4096);
-    terrimpi_default_u32(&d->atlas_count, 1);
-    terrimpi_default_u32(&d->max_impostors, 1024);
-    terrimpi_default_u32(&d->max_captures, 64);
-    if (d->max_ground == 0)
-        d->max_ground = d->mode == TERRIMP_MODE_GEOMIP || d->mode == TERRIMP_MODE_AUTO
-                            ? terrimpi_min_u32(chunks, 4096)
-                            : chunks;
+    const float most = TERRIMPI_FLOAT_MAX;
+    float chunk = (float)t->desc.chunk_quads *
+                  terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
+    terrimp_result result = TERRIMP_OK;
+    terrimpi_setting(&d->tolerance_px, 1.0f, 0.05f, 100.0f, &result);
+    terrimpi_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px), 0.05f,
+                     100.0f, &result);
+    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, 4.0f, &result);
+    terrimpi_setting(&d->fade_start, 2.0f * chunk, 0.0f, most, &result);
+    terrimpi_setting(&d->fade_end, 1.5f * d->fade_start, 0.0f, most, &result);
+    terrimpi_setting(&d->max_angle_rad, 0.0873f, 0.001f, 1.5f, &result);
+    terrimpi_setting(&d->texels_per_px, 2.0f, 0.1f, 8.0f, &result);
+    terrimpi_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
+    terrimpi_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.impostor_px, 0.25f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.capture, 1400.0f, 0.0f, most, &result);
+    return result;
 }
 
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
@@ -10211,31 +10218,32 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
 {
     terrimp_view_desc d;
     terrimp_result result;
+    uint32_t chunks;
     if (!terrain || !desc || !out)
         return TERRIMP_E_NULL;
     if (!terrain->built)
         return TERRIMP_E_STATE;
     d = *desc;
-    result = terrimpi_costs_resolve(&d.costs);
+    result = terrimpi_settings_resolve(terrain, &d);
     if (result != TERRIMP_OK)
         return result;
-    if (!terrimpi_finite(d.fade_start) || !terrimpi_finite(d.fade_end) ||
-        !terrimpi_finite(d.max_angle_rad) || !terrimpi_finite(d.tolerance_px) ||
-        !terrimpi_finite(d.ground_tolerance_px) || !terrimpi_finite(d.morph_ratio) ||
-        !terrimpi_finite(d.texels_per_px) || !terrimpi_finite(d.impostor_px))
-        return TERRIMP_E_NOT_FINITE;
-    terrimpi_view_defaults(terrain, &d);
+    if (d.mode == TERRIMP_MODE_DEFAULT)
+        d.mode = TERRIMP_MODE_AUTO;
+    if (d.ground_rule == TERRIMP_GEOMIP_DEFAULT)
+        d.ground_rule = TERRIMP_GEOMIP_PICTURE;
+    terrimpi_default_u32(&d.atlas_size, 4096);
+    terrimpi_default_u32(&d.atlas_count, 1);
+    terrimpi_default_u32(&d.max_impostors, 1024);
+    terrimpi_default_u32(&d.max_captures, 64);
+    chunks = terrain->tree.level_first[1];
+    terrimpi_default_u32(&d.max_ground,
+                         d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
+                             ? terrimpi_min_u32(chunks, 4096)
+                             : chunks);
     if (d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
-        d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || !(d.fade_start > 0.0f) ||
-        !(d.fade_end > d.fade_start) || !terrimpi_finite(d.fade_end) ||
-        !terrimpi_within(d.max_angle_rad, 0.001f, 1.5f) ||
-        !terrimpi_within(d.tolerance_px, 0.05f, 100.0f) ||
-        !terrimpi_within(d.ground_tolerance_px, 0.05f, 100.0f) ||
-        !terrimpi_within(d.morph_ratio, 1.0f, 4.0f) ||
-        !terrimpi_within(d.texels_per_px, 0.1f, 8.0f) ||
-        !terrimpi_within(d.impostor_px, 8.0f, 4096.0f) || d.atlas_size < 64u ||
-        d.atlas_size > 32768u || d.atlas_count > 16u || d.max_impostors > 65534u ||
-        d.max_captures > 1024u)
+        d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || !(d.fade_end > d.fade_start) ||
+        d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
+        d.max_impostors > 65534u || d.max_captures > 1024u)
         return TERRIMP_E_RANGE;
     *out = d;
     return TERRIMP_OK;
@@ -10251,57 +10259,57 @@ static terrimp_live_atlas_desc terrimpi_atlas_desc(const terrimp_view_desc *d)
     return atlas;
 }
 
+/* A block that is being laid out, or only counted when its base is NULL. */
+typedef struct terrimpi_layout {
+    unsigned char *base;
+    size_t at;
+    int ok;
+} terrimpi_layout;
+
+/* Room for some items in it. */
+static void *terrimpi_room(terrimpi_layout *layout, size_t count, size_t size)
+{
+    size_t at = terrimpi_place(&layout->at, count, size, &layout->ok);
+    return layout->base ? layout->base + at : NULL;
+}
+
 /* The one description of a view's block; as terrimpi_terrain_layout. */
 static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
 {
     size_t nodes = v->terrain->tree.node_count, impostors = v->desc.max_impostors;
-    size_t ground = v->desc.max_ground, at = 0, slots;
-    size_t offset[16], k = 0;
+    size_t ground = v->desc.max_ground, slots;
     terrimp_live_atlas_desc atlas = terrimpi_atlas_desc(&v->desc);
+    terrimpi_layout l;
     uint32_t i;
-    int ok = 1;
+    l.base = base;
+    l.at = 0;
+    l.ok = 1;
     slots = terrimp_live_atlas_bytes(&atlas);
-    terrimpi_place(&at, 1, sizeof *v, &ok);
-    offset[k++] = terrimpi_place(&at, v->desc.atlas_count, sizeof *v->atlases, &ok);
-    offset[k++] = terrimpi_place(&at, v->desc.atlas_count, slots + TERRIMPI_ALIGN, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->ground.marks, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->ground.distances, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->leaf_at, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->record_of, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->prefers, &ok);
-    offset[k++] = terrimpi_place(&at, ground, sizeof *v->ground.draws, &ok);
-    offset[k++] = terrimpi_place(&at, ground, sizeof *v->shown + sizeof *v->leaves, &ok);
-    offset[k++] = terrimpi_place(&at, ground, sizeof *v->units, &ok);
-    offset[k++] = terrimpi_place(&at, ground + impostors, sizeof *v->items, &ok);
-    offset[k++] = terrimpi_place(&at, impostors, sizeof *v->wants + sizeof *v->queue, &ok);
-    offset[k++] = terrimpi_place(&at, impostors, sizeof *v->records, &ok);
-    offset[k++] = terrimpi_place(&at, v->desc.max_captures, sizeof *v->jobs, &ok);
-    offset[k++] = terrimpi_place(&at, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz, &ok);
-    offset[k++] = terrimpi_place(&at, v->terrain->index_stride, sizeof *v->mesh_indices, &ok);
-    if (base) {
-        v->atlases = (terrimp_live_atlas *)(void *)(base + offset[0]);
-        v->ground.marks = (terrimp_geomip_mark *)(void *)(base + offset[2]);
-        v->ground.distances = (float *)(void *)(base + offset[3]);
-        v->leaf_at = (uint32_t *)(void *)(base + offset[4]);
-        v->record_of = (uint16_t *)(void *)(base + offset[5]);
-        v->prefers = base + offset[6];
-        v->ground.draws = (terrimp_geomip_draw *)(void *)(base + offset[7]);
-        v->shown = (float *)(void *)(base + offset[8]);
-        v->leaves = (uint32_t *)(void *)(v->shown + ground);
-        v->units = (terrimpi_unit *)(void *)(base + offset[9]);
-        v->items = (terrimpi_item *)(void *)(base + offset[10]);
-        v->wants = (terrimpi_want *)(void *)(base + offset[11]);
-        v->queue = (uint32_t *)(void *)(v->wants + impostors);
-        v->records = (terrimpi_record *)(void *)(base + offset[12]);
-        v->jobs = (terrimpi_job *)(void *)(base + offset[13]);
-        v->mesh_xyz = (float *)(void *)(base + offset[14]);
-        v->mesh_indices = (uint16_t *)(void *)(base + offset[15]);
-        for (i = 0; i < v->desc.atlas_count; i++) {
-            size_t each = slots + TERRIMPI_ALIGN - slots % TERRIMPI_ALIGN;
-            terrimp_live_atlas_init(&v->atlases[i], &atlas, base + offset[1] + i * each, slots);
-        }
+    terrimpi_room(&l, 1, sizeof *v);
+    v->atlases = (terrimp_live_atlas *)terrimpi_room(&l, v->desc.atlas_count, sizeof *v->atlases);
+    for (i = 0; i < v->desc.atlas_count; i++) {
+        void *memory = terrimpi_room(&l, slots, 1);
+        if (memory)
+            terrimp_live_atlas_init(&v->atlases[i], &atlas, memory, slots);
     }
-    return ok && slots ? at : 0;
+    v->ground.marks = (terrimp_geomip_mark *)terrimpi_room(&l, nodes, sizeof *v->ground.marks);
+    v->ground.distances = (float *)terrimpi_room(&l, nodes, sizeof *v->ground.distances);
+    v->ground.draws = (terrimp_geomip_draw *)terrimpi_room(&l, ground, sizeof *v->ground.draws);
+    v->leaf_at = (uint32_t *)terrimpi_room(&l, nodes, sizeof *v->leaf_at);
+    v->record_of = (uint16_t *)terrimpi_room(&l, nodes, sizeof *v->record_of);
+    v->prefers = (unsigned char *)terrimpi_room(&l, nodes, sizeof *v->prefers);
+    v->shown = (float *)terrimpi_room(&l, ground, sizeof *v->shown);
+    v->leaves = (uint32_t *)terrimpi_room(&l, ground, sizeof *v->leaves);
+    v->units = (terrimpi_unit *)terrimpi_room(&l, ground, sizeof *v->units);
+    v->items = (terrimpi_item *)terrimpi_room(&l, ground + impostors, sizeof *v->items);
+    v->wants = (terrimpi_want *)terrimpi_room(&l, impostors, sizeof *v->wants);
+    v->queue = (uint32_t *)terrimpi_room(&l, impostors, sizeof *v->queue);
+    v->records = (terrimpi_record *)terrimpi_room(&l, impostors, sizeof *v->records);
+    v->jobs = (terrimpi_job *)terrimpi_room(&l, v->desc.max_captures, sizeof *v->jobs);
+    v->mesh_xyz = (float *)terrimpi_room(&l, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz);
+    v->mesh_indices = (uint16_t *)terrimpi_room(&l, v->terrain->index_stride,
+                                                sizeof *v->mesh_indices);
+    return l.ok && slots ? l.at : 0;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -10360,29 +10368,21 @@ static terrimpi_site terrimpi_site_at(const terrimp_geomip *tree, uint32_t level
 
 static terrimpi_site terrimpi_site_of(const terrimp_geomip *tree, uint32_t node)
 {
-    uint32_t level = 0, within;
-    while (node >= tree->level_first[level + 1u])
-        level++;
-    within = node - tree->level_first[level];
-    return terrimpi_site_at(tree, level, within % tree->level_x[level],
-                            within / tree->level_x[level]);
+    terrimpi_mip_place p = terrimpi_mip_place_of(tree, node);
+    return terrimpi_site_at(tree, p.level, p.x, p.z);
 }
 
 /* The children of a node, nearest to the eye first. Returns how many there are. */
 static uint32_t terrimpi_children(const terrimp_view *v, const terrimpi_site *s,
                                   terrimpi_site children[4])
 {
-    const terrimp_terrain *t = v->terrain;
-    uint32_t level = s->level - 1u, quads = t->desc.chunk_quads << level, count = 0, i;
-    uint32_t closest = 0;
-    if (v->camera.eye[0] >= terrimpi_world_x(t, (s->x * 2u + 1u) * quads))
-        closest |= 1u;
-    if (v->camera.eye[2] >= terrimpi_world_z(t, (s->z * 2u + 1u) * quads))
-        closest |= 2u;
+    const terrimp_geomip *tree = &v->terrain->tree;
+    uint32_t level = s->level - 1u, count = 0, i;
+    uint32_t closest = terrimpi_mip_closest(tree, s->level, s->x, s->z, v->camera.eye);
     for (i = 0; i < 4u; i++) {
         uint32_t child = closest ^ i, x = s->x * 2u + (child & 1u), z = s->z * 2u + (child >> 1);
-        if (x < t->tree.level_x[level] && z < t->tree.level_z[level])
-            children[count++] = terrimpi_site_at(&t->tree, level, x, z);
+        if (x < tree->level_x[level] && z < tree->level_z[level])
+            children[count++] = terrimpi_site_at(tree, level, x, z);
     }
     return count;
 }
