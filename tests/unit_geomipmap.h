@@ -1252,12 +1252,13 @@ static float mip_largest_step(mip_scene *s, const terrimp_camera *from, const fl
     return largest;
 }
 
-/* The largest change of a height in a frame, on some random ways in steps and in small steps. */
-static void mip_step_changes(int form, float morph_ratio, float coarse[8], float fine[8])
+/* The largest change of a height in a frame, on some random ways in so many steps. */
+static void mip_step_changes(int form, float morph_ratio, uint32_t steps, uint32_t ways,
+                             float changes[8])
 {
     uint16_t *indices = mip_filled(4, form);
     uint32_t way;
-    for (way = 0; way < 8u; way++) {
+    for (way = 0; way < ways; way++) {
         mip_scene s;
         terrimp_camera camera;
         float along[3];
@@ -1272,8 +1273,7 @@ static void mip_step_changes(int form, float morph_ratio, float coarse[8], float
         along[0] = random_float(-40.0f, 40.0f);
         along[1] = random_float(-3.0f, 3.0f);
         along[2] = random_float(-40.0f, 40.0f);
-        coarse[way] = mip_largest_step(&s, &camera, along, 16, indices);
-        fine[way] = mip_largest_step(&s, &camera, along, 256, indices);
+        changes[way] = mip_largest_step(&s, &camera, along, steps, indices);
         mip_free(&s);
     }
     free(indices);
@@ -1282,29 +1282,32 @@ static void mip_step_changes(int form, float morph_ratio, float coarse[8], float
 static void heights_change_with_the_camera_s_step(void)
 {
     float coarse[8], fine[8];
-    uint32_t way;
-    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, coarse, fine);
-    for (way = 0; way < 8u; way++)
+    uint32_t way, ways = check_rounds(4, 8), same = check_state;
+    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, 16, ways, coarse);
+    check_state = same;
+    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, 256, ways, fine);
+    for (way = 0; way < ways; way++)
         CHECK(fine[way] <= coarse[way] / 8.0f + 1e-4f);
 }
 
 /* Where a border vertex is left out, the diagonal beside it turns: what remains of popping. */
 static void fitted_borders_pop_less_than_nodes_that_do_not_morph(void)
 {
-    float coarse[8], fine[8], morphed = 0.0f, popped = 0.0f;
-    uint32_t round, way;
-    for (round = 0; round < 2u; round++) {
-        uint32_t kept = check_state; /* the same ways twice */
-        mip_step_changes(TERRIMP_FORM_FITTED, 1.5f, coarse, fine);
+    float changes[8], morphed = 0.0f, popped = 0.0f;
+    uint32_t round, way, rounds = check_rounds(1, 4);
+    for (round = 0; round < rounds; round++) {
+        uint32_t same = check_state;
+        mip_step_changes(TERRIMP_FORM_FITTED, 1.5f, 128, 8, changes);
         for (way = 0; way < 8u; way++)
-            morphed += fine[way];
-        check_state = kept;
-        mip_step_changes(TERRIMP_FORM_FITTED, 1.0f, coarse, fine);
+            morphed += changes[way];
+        check_state = same;
+        mip_step_changes(TERRIMP_FORM_FITTED, 1.0f, 128, 8, changes);
         for (way = 0; way < 8u; way++)
-            popped += fine[way];
+            popped += changes[way];
     }
-    printf("  largest step of a height in a frame, mean of 16 ways: %.3f morphing, %.3f not\n",
-           (double)morphed / 16.0, (double)popped / 16.0);
+    printf("  largest step of a height in a frame, mean of %u ways: %.3f morphing, %.3f not\n",
+           (unsigned)(8u * rounds), (double)morphed / (8.0 * rounds),
+           (double)popped / (8.0 * rounds));
     CHECK(morphed < 0.5f * popped);
 }
 
