@@ -14,9 +14,11 @@ static uint16_t samples[SIDE * SIDE];
 static terrimp_terrain_desc describe(void)
 {
     terrimp_terrain_desc desc;
-    uint32_t i;
+    uint32_t i, steep = random_range(200, 400);
+    float rough = random_float(100.0f, 200.0f);
     for (i = 0; i < SIDE * SIDE; i++)
-        samples[i] = (uint16_t)((i % SIDE) * (i / SIDE) / 3u + random_range(0, 200));
+        samples[i] = (uint16_t)((i % SIDE) * (i / SIDE) * steep / 1000u +
+                                (uint32_t)random_float(0.0f, rough));
     memset(&desc, 0, sizeof desc);
     desc.field.samples = samples;
     desc.field.width = desc.field.depth = SIDE;

@@ -2,6 +2,7 @@
 #ifndef UNIT_GEOMIPMAP_H
 #define UNIT_GEOMIPMAP_H
 
+#include "unit_oracle.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
