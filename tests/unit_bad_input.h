@@ -1203,6 +1203,142 @@ static void views_refuse(void)
     land_free(&l);
 }
 
+/* ---- what the tests above leave out, in the header's order ---- */
+
+static void meshes_are_not_raised_by_bad_numbers(void)
+{
+    static float work[2 * 1000];
+    simp_case *t = &simp_a;
+    terrimp_raise_desc raise, bad;
+    terrimp_border border;
+    terrimp_border_point points[2];
+    float line[9], end[2];
+    int i;
+    simp_fill(t, 20, 17, 0);
+    simp_make_borders(t, 0);
+    CHECK(simp_run(t, 0) == TERRIMP_OK);
+    memset(&raise, 0, sizeof raise);
+    raise.heights = t->heights;
+    raise.cols = t->cols;
+    raise.rows = t->rows;
+    raise.amount = 1.0f;
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(NULL, &t->mesh, work));
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, NULL, work));
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, &t->mesh, NULL));
+    bad = raise, bad.heights = NULL;
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&bad, &t->mesh, work));
+    bad = raise, bad.cols = 1;
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    bad = raise, bad.cols--; /* the mesh stands out of it */
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    bad = raise, bad.amount = 1.5f;
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    for (i = 0; i < 3; i++) {
+        bad = raise, bad.amount = not_finite(i);
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&bad, &t->mesh, work));
+        bad = raise, bad.corner_raise[i] = not_finite(i);
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&bad, &t->mesh, work));
+        bad = raise, bad.corner_raise[i] = -1.0f;
+        GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    }
+    t->heights[7] = not_finite(0);
+    GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&raise, &t->mesh, work));
+    t->heights[7] = 1.0f;
+    t->mesh.indices[0] = (uint16_t)t->mesh.surface_vertex_count;
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&raise, &t->mesh, work));
+    t->mesh.vertex_count++;
+    GIVES(TERRIMP_E_STATE, terrimp_mesh_raise(&raise, &t->mesh, work));
+    simp_free(t);
+    memset(line, 0, sizeof line);
+    memset(points, 0, sizeof points);
+    points[0].at = 1; /* not at the tile's end */
+    points[1].at = 8;
+    border.points = points;
+    border.point_count = 2;
+    REFUSES(TERRIMP_E_RANGE, end, terrimp_border_corner_raise(line, 9, &border, end));
+}
+
+static void geomip_functions_refuse(void)
+{
+    terrimp_heightfield bad;
+    mip_scene s;
+    terrimp_geomip out;
+    terrimp_box box;
+    terrimp_geomip_weights weights[25];
+    terrimp_geomip_vertex vertices[25];
+    terrimp_geomip_draw draw;
+    float distances[200], heights[25];
+    int i;
+    memset(&draw, 0, sizeof draw);
+    memset(vertices, 0, sizeof vertices);
+    mip_make(&s, TERRIMP_FORM_LIST, 33, 33, 4);
+    bad = s.tree.field;
+    bad.width = 1;
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_geomip_init(&bad, 4, &out));
+    REFUSES(TERRIMP_E_NULL, box, terrimp_geomip_box(NULL, 0, &box));
+    REFUSES(TERRIMP_E_RANGE, box, terrimp_geomip_box(&s.tree, s.tree.node_count, &box));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_fit(NULL, s.scratch));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_build_finish(NULL));
+    REFUSES(TERRIMP_E_NULL, distances,
+            terrimp_geomip_distances(NULL, 0, 1.0f, 1.0f, 500.0f, distances));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 500.0f, NULL));
+    REFUSES(TERRIMP_E_RANGE, distances,
+            terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 0.0f, distances));
+    REFUSES(TERRIMP_E_RANGE, distances,
+            terrimp_geomip_distances(&s.tree, TERRIMP_GEOMIP_RULE_COUNT, 1.0f, 1.0f, 500.0f,
+                                     distances));
+    for (i = 0; i < 3; i++) {
+        float wrong = not_finite(i);
+        terrimp_camera camera;
+        terrimp_geomip_view view = s.view;
+        mip_random_camera(&s, &camera);
+        REFUSES(TERRIMP_E_NOT_FINITE, distances,
+                terrimp_geomip_distances(&s.tree, 0, wrong, 1.0f, 500.0f, distances));
+        REFUSES(TERRIMP_E_NOT_FINITE, distances,
+                terrimp_geomip_distances(&s.tree, 0, 1.0f, wrong, 500.0f, distances));
+        REFUSES(TERRIMP_E_NOT_FINITE, distances,
+                terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, wrong, distances));
+        view.hysteresis = wrong;
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_geomip_select(&s.tree, &view, &camera));
+    }
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_fill_weights(4, TERRIMP_FORM_LIST, NULL));
+    REFUSES(TERRIMP_E_RANGE, weights, terrimp_geomip_fill_weights(3, TERRIMP_FORM_LIST, weights));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, NULL, 1));
+    REFUSES(TERRIMP_E_NULL, heights,
+            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, NULL, vertices, heights, 1));
+    REFUSES(TERRIMP_E_RANGE, heights,
+            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, heights, 0));
+    mip_free(&s);
+}
+
+static void pictures_are_not_tightened_or_split_by_bad_numbers(void)
+{
+    terrimp_box box;
+    terrimp_capture capture, out;
+    terrimp_split split;
+    float eye[3], xyz[9];
+    uint16_t indices[3] = {0, 1, 2};
+    int k;
+    good_capture(&box, eye, &capture);
+    for (k = 0; k < 9; k++) /* in front of it */
+        xyz[k] = capture.eye[k % 3] + 5.0f * capture.forward[k % 3] + 0.1f * (float)(k == 4);
+    out = capture;
+    GIVES(TERRIMP_E_NULL, terrimp_capture_tighten(NULL, xyz, 3));
+    GIVES(TERRIMP_E_NULL, terrimp_capture_tighten(&out, NULL, 3));
+    GIVES(TERRIMP_E_RANGE, terrimp_capture_tighten(&out, xyz, 0));
+    for (k = 0; k < 3; k++)
+        xyz[6 + k] = capture.eye[k] - capture.forward[k];
+    GIVES(TERRIMP_E_BEHIND, terrimp_capture_tighten(&out, xyz, 3));
+    CHECK(memcmp(&out, &capture, sizeof out) == 0);
+    GIVES(TERRIMP_E_NULL, terrimp_capture_split(&capture, xyz, 3, indices, 3, NULL));
+    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(NULL, xyz, 3, indices, 3, &split));
+    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(&capture, NULL, 3, indices, 3, &split));
+    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(&capture, xyz, 3, NULL, 3, &split));
+    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 0, indices, 3, &split));
+    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 3, indices, 2, &split));
+    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 2, indices, 3, &split));
+}
+
 /* Runs last: a code that nothing can provoke would be a promise without a meaning. */
 static void every_result_has_been_provoked(void)
 {
@@ -1232,6 +1368,9 @@ static void bad_input_tests(void)
     RUN(bakes_are_refused);
     RUN(view_descriptors_are_refused);
     RUN(views_refuse);
+    RUN(meshes_are_not_raised_by_bad_numbers);
+    RUN(geomip_functions_refuse);
+    RUN(pictures_are_not_tightened_or_split_by_bad_numbers);
     RUN(every_result_has_been_provoked);
 }
 

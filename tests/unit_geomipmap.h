@@ -1312,8 +1312,79 @@ static void fitted_borders_pop_less_than_nodes_that_do_not_morph(void)
     CHECK(morphed < 0.5f * popped);
 }
 
+/* A host with shaders takes the weights, one without lets the library morph: the same heights. */
+static void weights_say_what_morphing_does(void)
+{
+    static const int forms[] = {TERRIMP_FORM_LIST, TERRIMP_FORM_STITCHED, TERRIMP_FORM_FITTED};
+    uint32_t i, k, side;
+    for (i = 0; i < 30u; i++) {
+        int form = forms[i % 3u];
+        uint32_t quads = 4u + 2u * (i % 7u), count = terrimp_pattern_vertex_count(quads, form);
+        terrimp_geomip_weights *w = (terrimp_geomip_weights *)malloc(count * sizeof *w);
+        terrimp_geomip_vertex *v = (terrimp_geomip_vertex *)malloc(count * sizeof *v);
+        float *heights = (float *)malloc(3u * count * sizeof *heights);
+        terrimp_geomip_draw draw;
+        memset(&draw, 0, sizeof draw);
+        draw.morph = random_float(0.0f, 1.0f);
+        for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
+            draw.side[side] = random_float(0.0f, 1.0f);
+            draw.side_coarse[side] = random_float(0.0f, 1.0f);
+        }
+        for (k = 0; k < count; k++) {
+            v[k].height = random_float(-9.0f, 9.0f);
+            v[k].move = random_float(-9.0f, 9.0f);
+            v[k].beside[0] = random_float(-9.0f, 9.0f);
+            v[k].beside[1] = random_float(-9.0f, 9.0f);
+        }
+        CHECK(terrimp_geomip_fill_weights(quads, form, w) == TERRIMP_OK);
+        CHECK(terrimp_geomip_morph(quads, form, &draw, v, heights + 1, 3) == TERRIMP_OK);
+        for (k = 0; k < count; k++) {
+            const float *coarse = draw.side_coarse;
+            double factor = (double)w[k].self * (double)draw.morph, move = (double)v[k].move;
+            for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
+                int along = side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1 ? 0 : 1;
+                factor += (double)w[k].odd[side] * (double)draw.side[side] +
+                          (double)w[k].even[side] * (double)coarse[side];
+                move += (double)w[k].beside[side] * (double)coarse[side] *
+                        (double)v[k].beside[along];
+            }
+            CHECK(fabs((double)v[k].height + factor * move - (double)heights[3u * k + 1u]) < 1e-4);
+        }
+        free(w);
+        free(v);
+        free(heights);
+    }
+}
+
+/* What a view finds for itself when its settings change. */
+static void distances_are_those_that_selections_use(void)
+{
+    static const int rules[] = {TERRIMP_GEOMIP_PICTURE, TERRIMP_GEOMIP_BOUND};
+    uint32_t i;
+    for (i = 0; i < 8u; i++) {
+        mip_scene s;
+        terrimp_camera camera;
+        float factor, *distances;
+        mip_make(&s, TERRIMP_FORM_LIST, 65, 49, 8);
+        mip_random_settings(&s);
+        mip_random_camera(&s, &camera);
+        s.view.rule = rules[i % 2u];
+        s.view.morph_ratio = random_float(1.0f, 4.0f);
+        distances = (float *)malloc(s.tree.node_count * sizeof *distances);
+        CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);
+        CHECK(terrimp_geomip_distances(&s.tree, s.view.rule, s.view.tolerance_px,
+                                       s.view.morph_ratio, factor, distances) == TERRIMP_OK);
+        CHECK(memcmp(distances, s.view.distances, s.tree.node_count * sizeof *distances) == 0);
+        free(distances);
+        mip_free(&s);
+    }
+}
+
 static void geomipmap_tests(void)
 {
+    RUN(weights_say_what_morphing_does);
+    RUN(distances_are_those_that_selections_use);
     RUN(every_pattern_covers_its_square_once);
     RUN(patterns_share_every_border_vertex_with_neighbours_of_both_levels);
     RUN(fitted_patterns_put_coarse_borders_on_vertices_of_their_own);

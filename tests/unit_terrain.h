@@ -911,8 +911,51 @@ static void parallax_bound_holds_for_every_sample_of_a_mesh(void)
     land_free(&l);
 }
 
+/* A host that fills its buffers node by node has the same as one that fills them at once. */
+static void parts_of_buffers_are_those_of_the_whole(void)
+{
+    land l;
+    land_prepare(&l, 50, 70, TERRIMP_FORMAT_F32, LAND_HILLS);
+    l.desc.chunk_quads = 8;
+    if (land_build(&l)) {
+        uint32_t node, grid = l.info.ground_vertex_count;
+        size_t mesh = 3u * (size_t)l.info.mesh_vertex_stride, stride = l.info.mesh_index_stride;
+        size_t floor = 3u * (size_t)l.info.mesh_vertex_count - mesh * l.info.node_count;
+        size_t floor_indices = l.info.mesh_index_count - stride * l.info.node_count;
+        float *xyz = (float *)malloc((mesh + floor) * sizeof *xyz);
+        uint16_t *indices = (uint16_t *)malloc((stride + floor_indices) * sizeof *indices);
+        terrimp_geomip_weights *w[2];
+        for (node = 0; node <= l.info.node_count; node++) {
+            size_t floats = node < l.info.node_count ? mesh : floor;
+            size_t corners = node < l.info.node_count ? stride : floor_indices;
+            CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, floats, indices, corners) ==
+                  TERRIMP_OK);
+            CHECK(memcmp(xyz, l.xyz + node * mesh, floats * sizeof *xyz) == 0);
+            CHECK(memcmp(indices, l.indices + node * stride, corners * sizeof *indices) == 0);
+            CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, floats - 1u, indices, corners) ==
+                  TERRIMP_E_CAPACITY);
+            CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, floats, indices, corners - 1u) ==
+                  TERRIMP_E_CAPACITY);
+        }
+        CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, mesh, indices, stride) ==
+              TERRIMP_E_RANGE);
+        w[0] = (terrimp_geomip_weights *)calloc(grid, sizeof **w);
+        w[1] = (terrimp_geomip_weights *)calloc(grid, sizeof **w);
+        CHECK(terrimp_terrain_fill_weights(l.terrain, w[0], grid - 1u) == TERRIMP_E_CAPACITY);
+        CHECK(terrimp_terrain_fill_weights(l.terrain, w[0], grid) == TERRIMP_OK);
+        CHECK(terrimp_geomip_fill_weights(8, TERRIMP_FORM_LIST, w[1]) == TERRIMP_OK);
+        CHECK(memcmp(w[0], w[1], grid * sizeof **w) == 0);
+        free(w[0]);
+        free(w[1]);
+        free(xyz);
+        free(indices);
+    }
+    land_free(&l);
+}
+
 static void terrain_tests(void)
 {
+    RUN(parts_of_buffers_are_those_of_the_whole);
     RUN(terrain_defaults_are_those_of_the_table);
     RUN(terrains_of_every_size_build_and_keep_their_laws);
     RUN(terrain_of_two_columns_builds);
