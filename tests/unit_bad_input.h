@@ -853,6 +853,8 @@ static void terrains_are_not_read_before_they_are_built(void)
     terrimp_box box;
     terrimp_view *view;
     terrimp_view_desc view_desc, view_out;
+    terrimp_rect rect;
+    uint32_t count;
     float xyz[75]; /* enough for the ground of a node, and too little for all meshes */
     uint16_t indices[600];
     memset(&desc, 0, sizeof desc);
@@ -872,7 +874,14 @@ static void terrains_are_not_read_before_they_are_built(void)
     REFUSES(TERRIMP_E_STATE, view, terrimp_view_create(terrain, &view_desc, NULL, &view));
     REFUSES(TERRIMP_E_STATE, view, terrimp_view_init(terrain, &view_desc, memory, 9, &view));
     CHECK(terrimp_view_bytes(terrain, &view_desc) == 0);
+    REFUSES(TERRIMP_E_STATE, xyz, terrimp_terrain_fill_mesh(terrain, 0, xyz, 75, indices, 600));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_mesh(terrain, 0, NULL, 75, indices, 600));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_morph(terrain, 0, NULL, 25));
+    memset(&rect, 0, sizeof rect);
+    rect.width = rect.height = 1;
+    REFUSES(TERRIMP_E_STATE, count, terrimp_terrain_touched(terrain, &rect, 0, NULL, 0, &count));
     GIVES(TERRIMP_E_STATE, terrimp_terrain_build_finish(terrain));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_build_begin(NULL));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build_finish(NULL));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build(NULL, scratch, sizeof scratch));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build(terrain, NULL, sizeof scratch));
@@ -1205,6 +1214,70 @@ static void views_refuse(void)
 
 /* ---- what the tests above leave out, in the header's order ---- */
 
+/* A range of heights that the descriptor names holds for every sample. */
+static void samples_outside_of_the_named_range_are_refused(void)
+{
+    int i;
+    for (i = 0; i < 5; i++) {
+        land l;
+        terrimp_terrain *terrain = NULL;
+        land_prepare(&l, 21, 13, TERRIMP_FORMAT_F32, LAND_NOISE);
+        l.desc.chunk_quads = 4;
+        l.desc.height_low = -1e3f;
+        l.desc.height_high = 1e3f;
+        GIVES(TERRIMP_OK, terrimp_terrain_create(&l.desc, NULL, &terrain));
+        terrimp_terrain_destroy(terrain);
+        l.samples[random_range(0, 21 * 13 - 1)] = i < 3 ? not_finite(i) : i == 3 ? 1001.0f
+                                                                                 : -1001.0f;
+        GIVES(i < 3 ? TERRIMP_E_NOT_FINITE : TERRIMP_E_RANGE,
+              terrimp_terrain_create(&l.desc, NULL, &terrain));
+        land_free(&l);
+    }
+}
+
+/* Even the coarsest ground has several nodes where the eye is in the midst of a rough terrain. */
+static void too_little_room_for_ground_is_an_error(void)
+{
+    land l;
+    terrimp_view_desc desc;
+    terrimp_view *view;
+    terrimp_camera camera;
+    land_prepare(&l, 65, 65, TERRIMP_FORMAT_F32, LAND_NOISE);
+    l.desc.chunk_quads = 8;
+    memset(&desc, 0, sizeof desc);
+    desc.ground_rule = TERRIMP_GEOMIP_BOUND;
+    desc.max_ground = 1;
+    memset(&camera, 0, sizeof camera);
+    camera.eye[0] = camera.eye[2] = 32.0f;
+    camera.forward[0] = 1.0f;
+    camera.width_px = camera.height_px = 8000;
+    camera.z_near = 0.1f;
+    camera.z_far = 1000.0f;
+    if (land_build(&l)) {
+        CHECK(terrimp_heightfield_height(&l.desc.field, 32.0f, 32.0f, &camera.eye[1]) ==
+              TERRIMP_OK);
+        CHECK(terrimp_view_create(l.terrain, &desc, NULL, &view) == TERRIMP_OK);
+        GIVES(TERRIMP_E_CAPACITY, terrimp_view_update(view, &camera));
+        camera.eye[1] += 1e5f; /* so far away that one node will do */
+        camera.z_far = 1e6f;
+        camera.forward[0] = 0.0f;
+        camera.forward[1] = -1.0f;
+        GIVES(TERRIMP_OK, terrimp_view_update(view, &camera));
+        terrimp_view_destroy(view);
+    }
+    land_free(&l);
+}
+
+/* A picture that is renewed all the time has no rate. */
+static void pictures_without_a_lifetime_have_no_rate(void)
+{
+    terrimp_box box;
+    terrimp_capture capture;
+    float eye[3], rate;
+    good_capture(&box, eye, &capture);
+    REFUSES(TERRIMP_E_RANGE, rate, terrimp_capture_rate(&box, 1, eye, 5.0f, 0.0f, 1.0f, &rate));
+}
+
 static void meshes_are_not_raised_by_bad_numbers(void)
 {
     static float work[2 * 1000];
@@ -1368,6 +1441,9 @@ static void bad_input_tests(void)
     RUN(bakes_are_refused);
     RUN(view_descriptors_are_refused);
     RUN(views_refuse);
+    RUN(samples_outside_of_the_named_range_are_refused);
+    RUN(too_little_room_for_ground_is_an_error);
+    RUN(pictures_without_a_lifetime_have_no_rate);
     RUN(meshes_are_not_raised_by_bad_numbers);
     RUN(geomip_functions_refuse);
     RUN(pictures_are_not_tightened_or_split_by_bad_numbers);
