@@ -120,6 +120,7 @@ suite "documentation" sh tests/docs.sh
 suite "compilers and build options" sh tests/compile/run.sh
 suite "hygiene" sh tests/hygiene.sh
 suite "fuzzers, over their corpus" sh tests/fuzz.sh
+suite "fuzzers, some seconds each" sh tests/fuzz.sh 5
 suite "examples" sh tests/examples.sh
 
 if has_library GL/osmesa.h -lOSMesa; then
