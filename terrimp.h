@@ -8620,7 +8620,7 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     mesh->vertex_capacity = build->vertex_capacity;
     mesh->index_capacity = build->index_capacity;
     return terrimpi_simplify(&desc,
-                             (p->span_x | p->span_z) % (1u << p->level) ? &squeeze : NULL,
+                             ((p->span_x | p->span_z) & ((1u << p->level) - 1u)) ? &squeeze : NULL,
                              build->rest, build->rest_bytes, mesh);
 }
 
@@ -11421,7 +11421,7 @@ static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
 {
     const terrimp_geomip *tree = &v->terrain->tree;
     terrimpi_site children[4];
-    uint32_t i, count = 0, level = want->site.level, up;
+    uint32_t i, count, level = want->site.level, up;
     if (terrimpi_list_impostor(v, want->site.node, TERRIMPI_STALE))
         return 1;
     v->stats.waiting++;

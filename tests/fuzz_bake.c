@@ -127,7 +127,7 @@ static int make_field(const terrimp_bake_info *bake, terrimp_heightfield *field)
         return 0;
     samples = (unsigned char *)fuzz_take(count * size);
     for (i = 0; i < count * size; i++)
-        samples[i] = bake->format == TERRIMP_FORMAT_F32 ? 0 : (unsigned char)(i * 2654435761u >> 24);
+        samples[i] = bake->format == TERRIMP_FORMAT_F32 ? 0 : (unsigned char)(i * 2654435761u >> 9);
     memset(field, 0, sizeof *field);
     field->samples = samples;
     field->width = bake->width;

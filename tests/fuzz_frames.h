@@ -4,7 +4,7 @@
 #ifndef FUZZ_FRAMES_H
 #define FUZZ_FRAMES_H
 
-#define GREATEST_BLOCK ((size_t)1 << 27) /* more memory is not worth a fuzzer's time */
+#define GREATEST_BLOCK ((size_t)1 << 24) /* more memory is not worth a fuzzer's time */
 
 static terrimp_terrain_info info;
 static terrimp_view_desc settings; /* as resolved */
