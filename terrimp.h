@@ -11533,6 +11533,7 @@ static int terrimpi_floor_wanted(const terrimp_view *v)
 static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t pattern,
                                     terrimp_pattern *found)
 {
+    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
     terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST, pattern, found);
 }
 

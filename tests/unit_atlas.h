@@ -945,7 +945,7 @@ static void live_atlas_refuses_without_a_change(void)
     desc.height = 32;
     desc.max_slots = 5;
     bytes = terrimp_live_atlas_bytes(&desc);
-    memory = (unsigned char *)malloc(bytes + 8u);
+    memory = (unsigned char *)calloc(bytes + 8u, 1); /* it is compared as a whole */
     copy = (unsigned char *)malloc(bytes);
     for (k = 0; k < 7; k++) {
         bad = desc;
