@@ -141,8 +141,11 @@
          TERRIMP_NO_MALLOC     no create and destroy, no stdlib.h (also before the API)
          TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
                                before the API)
-       No double, and no 64-bit division once a terrain is built. Small state: 257 x 257 samples
-       in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take under 32 KiB in all.
+       No double, and no 64-bit division once a terrain is built (make sizes checks it). With
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links about 29 KB of code at
+       -Os on a Cortex-M4, if its linker drops unused functions: -ffunction-sections for the
+       compiler, --gc-sections for the linker. Small state: 257 x 257 samples in chunks of 16 from
+       a bake, 24 pictures and 64 ground nodes, take under 32 KiB in all.
 
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
@@ -1312,7 +1315,8 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
    can be built in any order and still meet. Looks at every sample, unless the descriptor names the
    range. To be called once, before any node is built.
 
-   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows
+   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or
+              the sum of its squares over all samples
    Cost       O(width * depth), about 1.5 ns a sample; O(1) when the range is named */
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain);
 
@@ -3580,6 +3584,18 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32
     return TERRIMP_OK;
 }
 
+/* Which of a node's four children is closest to the eye: bit 0 the one farther along x, bit 1 the
+   one farther along z. */
+static uint32_t terrimpi_mip_closest(const terrimp_geomip *t, uint32_t level, uint32_t x,
+                                     uint32_t z, const float eye[3])
+{
+    const terrimp_heightfield *f = &t->field;
+    uint32_t i = terrimpi_mip_col(t, level - 1u, (x * 2u + 1u) * t->chunk_quads);
+    uint32_t j = terrimpi_mip_row(t, level - 1u, (z * 2u + 1u) * t->chunk_quads);
+    return (eye[0] >= terrimpi_line(f->origin_x, f->spacing_x, i) ? 1u : 0u) |
+           (eye[2] >= terrimpi_line(f->origin_z, f->spacing_z, j) ? 2u : 0u);
+}
+
 /* The place next to a node beyond a side; returns 0 where the terrain ends. */
 static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, int side,
                                terrimpi_mip_place *beyond)
@@ -4354,7 +4370,7 @@ static void terrimpi_mip_collect(terrimpi_mip_frame *f)
         terrimpi_mip_visit v = stack[--depth];
         terrimpi_mip_place p = v.place;
         terrimp_box box;
-        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z), closest = 0;
+        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
         if (v.mask) {
             terrimpi_mip_box(t, p, &box);
             v.mask = terrimp_frustum_test(&f->frustum, &box, v.mask);
@@ -4365,12 +4381,8 @@ static void terrimpi_mip_collect(terrimpi_mip_frame *f)
             terrimpi_mip_emit(f, p, node);
             continue;
         }
-        p.level--; /* the eye against where the first child ends */
-        if (f->eye[0] >= terrimpi_mip_x(t, p.level, (2u * p.x + 1u) * t->chunk_quads))
-            closest |= 1u;
-        if (f->eye[2] >= terrimpi_mip_z(t, p.level, (2u * p.z + 1u) * t->chunk_quads))
-            closest |= 2u;
-        depth = terrimpi_mip_push_children(t, v, closest, stack, depth);
+        depth = terrimpi_mip_push_children(t, v, terrimpi_mip_closest(t, p.level, p.x, p.z, f->eye),
+                                           stack, depth);
     }
 }
 
@@ -7710,6 +7722,15 @@ static float terrimpi_mesh_height(const terrimp_terrain *t, uint32_t steps)
     return t->range_low + t->range_step * (float)steps;
 }
 
+/* Whether a range of heights does not overflow, nor squared errors that are summed up over all
+   samples. */
+static int terrimpi_range_fits(const terrimp_heightfield *field, float low, float step)
+{
+    float range = step * (float)TERRIMPI_HEIGHT_STEPS;
+    return step >= 0.0f && terrimpi_finite(low) && terrimpi_finite(low + range) &&
+           terrimpi_finite(range * range * (float)field->width * (float)field->depth);
+}
+
 #ifndef TERRIMP_NO_BUILD
 
 /* ---- building: the survey of a mesh by all samples of its node ---- */
@@ -8231,7 +8252,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
     step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
-    TERRIMPI_REFUSE(!terrimpi_finite(step) || !terrimpi_finite(low - room), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_range_fits(&terrain->desc.field, low - room, step), TERRIMP_E_RANGE);
     terrain->sample_low = low;
     terrain->sample_high = high;
     terrain->range_low = low - room;
@@ -8899,17 +8920,12 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     const terrimp_terrain_desc *desc;
     terrimpi_bake bake;
     size_t arrays;
-    if (!terrain || !out)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     arrays = terrimpi_bake_arrays(terrain);
-    if (arrays == 0)
-        return TERRIMP_E_OVERFLOW;
-    if (bytes < sizeof bake + arrays)
-        return TERRIMP_E_CAPACITY;
-    if ((uintptr_t)out % TERRIMPI_ALIGN != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_REFUSE(arrays == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_REFUSE(bytes < sizeof bake + arrays, TERRIMP_E_CAPACITY);
+    TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
     desc = &terrain->desc;
     memset(&bake, 0, sizeof bake);
     bake.magic = TERRIMPI_BAKE_MAGIC;
@@ -8987,9 +9003,8 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     t->range_step = bake->range_step;
     return bake->node_count == t->tree.node_count && bake->vertex_limit == t->vertex_limit &&
            bake->index_limit == t->index_limit && terrimpi_finite(t->sample_low) &&
-           terrimpi_finite(t->sample_high) && terrimpi_finite(t->range_low) &&
-           terrimpi_within(t->range_step, 0.0f, TERRIMPI_FLOAT_MAX) &&
-           terrimpi_finite(terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
+           terrimpi_finite(t->sample_high) &&
+           terrimpi_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
 /* Sets the arrays of a terrain to those of a bake. Only reading functions touch them then. */
@@ -9115,20 +9130,15 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes, terrim
 {
     terrimpi_bake bake;
     uint32_t node, triangles = 0;
-    if (!block)
-        return TERRIMP_E_NULL;
-    if ((uintptr_t)block % TERRIMPI_ALIGN != 0)
-        return TERRIMP_E_ALIGN;
-    if (bytes < sizeof bake)
-        return TERRIMP_E_BAKE;
+    TERRIMPI_REFUSE(!block, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)block % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(bytes < sizeof bake, TERRIMP_E_BAKE);
     memcpy(&bake, block, sizeof bake);
-    if (bake.magic == TERRIMPI_BAKE_MAGIC_TURNED)
-        return TERRIMP_E_ORDER;
-    if (bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, t))
-        return TERRIMP_E_BAKE;
+    TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_TURNED, TERRIMP_E_ORDER);
+    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC ||
+                    !terrimpi_bake_header(&bake, bytes, t), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
-    if (terrimpi_bake_hash(&bake, t) != bake.checksum)
-        return TERRIMP_E_BAKE;
+    TERRIMPI_REFUSE(terrimpi_bake_hash(&bake, t) != bake.checksum, TERRIMP_E_BAKE);
     for (node = 0; node < t->tree.node_count; node++) {
         if (!terrimpi_node_ok(t, node))
             return TERRIMP_E_BAKE;
@@ -9197,10 +9207,8 @@ TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes,
     terrimp_terrain t;
     terrimpi_bake bake;
     terrimp_result result;
-    if (!block || !out)
-        return TERRIMP_E_NULL;
-    if ((uintptr_t)out % TERRIMPI_ALIGN != 0)
-        return TERRIMP_E_ALIGN;
+    TERRIMPI_REFUSE(!block || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
     result = terrimpi_bake_read(block, bytes, &t);
     if (result != TERRIMP_OK && result != TERRIMP_E_ORDER)
         return result;
@@ -9210,8 +9218,7 @@ TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes,
         if (!terrimpi_bake_header(&bake, bytes, &t))
             return TERRIMP_E_BAKE;
     }
-    if (capacity < bake.bytes)
-        return TERRIMP_E_CAPACITY;
+    TERRIMPI_REFUSE(capacity < bake.bytes, TERRIMP_E_CAPACITY);
     memmove(out, block, bake.bytes);
     terrimpi_turn_words(out, sizeof bake / 4u);
     terrimpi_bake_arrays_at(&t, out);
@@ -9265,8 +9272,7 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
     terrimp_terrain t;
     terrimp_heightfield resolved;
     terrimp_result result;
-    if (!terrain)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     result = terrimp_heightfield_resolve(field, &resolved);
     if (result == TERRIMP_OK)
         result = terrimpi_check_block(memory, memory_bytes, sizeof t);
@@ -9274,8 +9280,7 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
         result = terrimpi_bake_read(block, bytes, &t);
     if (result != TERRIMP_OK)
         return result;
-    if (!terrimpi_bake_fits(&t, &resolved))
-        return TERRIMP_E_BAKE;
+    TERRIMPI_REFUSE(!terrimpi_bake_fits(&t, &resolved), TERRIMP_E_BAKE);
     t.desc.field = t.tree.field = resolved;
     t.begun = t.built = t.baked = 1;
     *(terrimp_terrain *)memory = t;
@@ -9416,10 +9421,19 @@ struct terrimp_view {
 
 /* ---- settings and memory ---- */
 
-static void terrimpi_default(float *value, float otherwise)
+/* One setting: fills in its default and checks it. *result says what is wrong with those so far:
+   one that is not finite counts before one that is out of its limits. */
+static void terrimpi_setting(float *value, float otherwise, float low, float high,
+                             terrimp_result *result)
 {
+    if (!terrimpi_finite(*value)) {
+        *result = TERRIMP_E_NOT_FINITE;
+        return;
+    }
     if (*value == 0.0f)
         *value = otherwise;
+    if (!terrimpi_within(*value, low, high) && *result == TERRIMP_OK)
+        *result = TERRIMP_E_RANGE;
 }
 
 static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
@@ -9428,55 +9442,34 @@ static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
         *value = otherwise;
 }
 
-static terrimp_result terrimpi_costs_resolve(terrimp_costs *c)
-{
-    if (!terrimpi_finite(c->draw) || !terrimpi_finite(c->triangle) ||
-        !terrimpi_finite(c->ground_px) || !terrimpi_finite(c->impostor_px) ||
-        !terrimpi_finite(c->capture))
-        return TERRIMP_E_NOT_FINITE;
-    if (c->draw < 0.0f || c->triangle < 0.0f || c->ground_px < 0.0f || c->impostor_px < 0.0f ||
-        c->capture < 0.0f)
-        return TERRIMP_E_RANGE;
-    terrimpi_default(&c->draw, 40.0f);
-    terrimpi_default(&c->triangle, 1.0f);
-    terrimpi_default(&c->ground_px, 0.25f);
-    terrimpi_default(&c->impostor_px, 0.25f);
-    terrimpi_default(&c->capture, 1400.0f);
-    return TERRIMP_OK;
-}
-
 /* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels
    that live for longer and begin closer to the eye. (Measured on the rough terrain of 4097 samples:
    at 4 px 0.035 of the full mesh's time at 30 dB; before that 0.075 at 32 dB.) */
-static void terrimpi_view_defaults(const terrimp_terrain *t, terrimp_view_desc *d)
+static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrimp_view_desc *d)
 {
-    uint32_t chunks = t->tree.level_first[1];
     float coarse = 1.0f; /* the tolerance, where pictures follow it */
-    if (d->mode == TERRIMP_MODE_DEFAULT)
-        d->mode = TERRIMP_MODE_AUTO;
-    if (d->ground_rule == TERRIMP_GEOMIP_DEFAULT)
-        d->ground_rule = TERRIMP_GEOMIP_PICTURE;
-    terrimpi_default(&d->tolerance_px, 1.0f);
+    const float most = TERRIMPI_FLOAT_MAX;
+    float chunk = (float)t->desc.chunk_quads *
+                  terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
+    terrimp_result result = TERRIMP_OK;
+    terrimpi_setting(&d->tolerance_px, 1.0f, 0.05f, 100.0f, &result);
     if (d->mode == TERRIMP_MODE_AUTO)
         coarse = terrimpi_clamp(d->tolerance_px, 1.0f, 9.0f);
-    terrimpi_default(&d->ground_tolerance_px,
-                     terrimpi_max(0.05f, 0.5f * d->tolerance_px));
-    terrimpi_default(&d->morph_ratio, 1.0f);
-    terrimpi_default(&d->fade_start,
-                     terrimpi_max(1.0f, 2.0f / coarse) * (float)t->desc.chunk_quads *
-                         terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z));
-    terrimpi_default(&d->fade_end, 1.5f * d->fade_start);
-    terrimpi_default(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse));
-    terrimpi_default(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse));
-    terrimpi_default(&d->impostor_px, 320.0f);
-    terrimpi_default_u32(&d->atlas_size, 4096);
-    terrimpi_default_u32(&d->atlas_count, 1);
-    terrimpi_default_u32(&d->max_impostors, 1024);
-    terrimpi_default_u32(&d->max_captures, 64);
-    if (d->max_ground == 0)
-        d->max_ground = d->mode == TERRIMP_MODE_GEOMIP || d->mode == TERRIMP_MODE_AUTO
-                            ? terrimpi_min_u32(chunks, 4096)
-                            : chunks;
+    terrimpi_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px), 0.05f,
+                     100.0f, &result);
+    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, 4.0f, &result);
+    terrimpi_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
+                     &result);
+    terrimpi_setting(&d->fade_end, 1.5f * d->fade_start, 0.0f, most, &result);
+    terrimpi_setting(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse), 0.001f, 1.5f, &result);
+    terrimpi_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
+    terrimpi_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
+    terrimpi_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.impostor_px, 0.25f, 0.0f, most, &result);
+    terrimpi_setting(&d->costs.capture, 1400.0f, 0.0f, most, &result);
+    return result;
 }
 
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
@@ -9484,33 +9477,29 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                                                      terrimp_view_desc *out)
 {
     terrimp_view_desc d;
-    terrimp_result result;
-    if (!terrain || !desc || !out)
-        return TERRIMP_E_NULL;
-    if (!terrain->built)
-        return TERRIMP_E_STATE;
+    uint32_t chunks;
+    TERRIMPI_REFUSE(!terrain || !desc || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     d = *desc;
-    result = terrimpi_costs_resolve(&d.costs);
-    if (result != TERRIMP_OK)
-        return result;
-    if (!terrimpi_finite(d.fade_start) || !terrimpi_finite(d.fade_end) ||
-        !terrimpi_finite(d.max_angle_rad) || !terrimpi_finite(d.tolerance_px) ||
-        !terrimpi_finite(d.ground_tolerance_px) || !terrimpi_finite(d.morph_ratio) ||
-        !terrimpi_finite(d.texels_per_px) || !terrimpi_finite(d.impostor_px))
-        return TERRIMP_E_NOT_FINITE;
-    terrimpi_view_defaults(terrain, &d);
-    if (d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
-        d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT || !(d.fade_start > 0.0f) ||
-        !(d.fade_end > d.fade_start) || !terrimpi_finite(d.fade_end) ||
-        !terrimpi_within(d.max_angle_rad, 0.001f, 1.5f) ||
-        !terrimpi_within(d.tolerance_px, 0.05f, 100.0f) ||
-        !terrimpi_within(d.ground_tolerance_px, 0.05f, 100.0f) ||
-        !terrimpi_within(d.morph_ratio, 1.0f, 4.0f) ||
-        !terrimpi_within(d.texels_per_px, 0.1f, 8.0f) ||
-        !terrimpi_within(d.impostor_px, 8.0f, 4096.0f) || d.atlas_size < 64u ||
-        d.atlas_size > 32768u || d.atlas_count > 16u || d.max_impostors > 65534u ||
-        d.max_captures > 1024u)
-        return TERRIMP_E_RANGE;
+    if (d.mode == TERRIMP_MODE_DEFAULT)
+        d.mode = TERRIMP_MODE_AUTO;
+    TERRIMPI_TRY(terrimpi_settings_resolve(terrain, &d));
+    if (d.ground_rule == TERRIMP_GEOMIP_DEFAULT)
+        d.ground_rule = TERRIMP_GEOMIP_PICTURE;
+    terrimpi_default_u32(&d.atlas_size, 4096);
+    terrimpi_default_u32(&d.atlas_count, 1);
+    terrimpi_default_u32(&d.max_impostors, 1024);
+    terrimpi_default_u32(&d.max_captures, 64);
+    chunks = terrain->tree.level_first[1];
+    terrimpi_default_u32(&d.max_ground,
+                         d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
+                             ? terrimpi_min_u32(chunks, 4096)
+                             : chunks);
+    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
+                    d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+                    !(d.fade_end > d.fade_start) || d.atlas_size < 64u || d.atlas_size > 32768u ||
+                    d.atlas_count > 16u || d.max_impostors > 65534u ||
+                    d.max_captures > 1024u, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -9529,53 +9518,36 @@ static terrimp_live_atlas_desc terrimpi_atlas_desc(const terrimp_view_desc *d)
 static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
 {
     size_t nodes = v->terrain->tree.node_count, impostors = v->desc.max_impostors;
-    size_t ground = v->desc.max_ground, at = 0, slots;
-    size_t offset[16], k = 0;
+    size_t ground = v->desc.max_ground, slots;
     terrimp_live_atlas_desc atlas = terrimpi_atlas_desc(&v->desc);
+    terrimpi_arena l = terrimpi_arena_at(base);
     uint32_t i;
-    int ok = 1;
     slots = terrimp_live_atlas_bytes(&atlas);
-    terrimpi_place(&at, 1, sizeof *v, &ok);
-    offset[k++] = terrimpi_place(&at, v->desc.atlas_count, sizeof *v->atlases, &ok);
-    offset[k++] = terrimpi_place(&at, v->desc.atlas_count, slots + TERRIMPI_ALIGN, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->ground.marks, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->ground.distances, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->leaf_at, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->record_of, &ok);
-    offset[k++] = terrimpi_place(&at, nodes, sizeof *v->prefers, &ok);
-    offset[k++] = terrimpi_place(&at, ground, sizeof *v->ground.draws, &ok);
-    offset[k++] = terrimpi_place(&at, ground, sizeof *v->shown + sizeof *v->leaves, &ok);
-    offset[k++] = terrimpi_place(&at, ground, sizeof *v->units, &ok);
-    offset[k++] = terrimpi_place(&at, ground + impostors, sizeof *v->items, &ok);
-    offset[k++] = terrimpi_place(&at, impostors, sizeof *v->wants + sizeof *v->queue, &ok);
-    offset[k++] = terrimpi_place(&at, impostors, sizeof *v->records, &ok);
-    offset[k++] = terrimpi_place(&at, v->desc.max_captures, sizeof *v->jobs, &ok);
-    offset[k++] = terrimpi_place(&at, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz, &ok);
-    offset[k++] = terrimpi_place(&at, v->terrain->index_stride, sizeof *v->mesh_indices, &ok);
-    if (base) {
-        v->atlases = (terrimp_live_atlas *)(void *)(base + offset[0]);
-        v->ground.marks = (terrimp_geomip_mark *)(void *)(base + offset[2]);
-        v->ground.distances = (float *)(void *)(base + offset[3]);
-        v->leaf_at = (uint32_t *)(void *)(base + offset[4]);
-        v->record_of = (uint16_t *)(void *)(base + offset[5]);
-        v->prefers = base + offset[6];
-        v->ground.draws = (terrimp_geomip_draw *)(void *)(base + offset[7]);
-        v->shown = (float *)(void *)(base + offset[8]);
-        v->leaves = (uint32_t *)(void *)(v->shown + ground);
-        v->units = (terrimpi_unit *)(void *)(base + offset[9]);
-        v->items = (terrimpi_item *)(void *)(base + offset[10]);
-        v->wants = (terrimpi_want *)(void *)(base + offset[11]);
-        v->queue = (uint32_t *)(void *)(v->wants + impostors);
-        v->records = (terrimpi_record *)(void *)(base + offset[12]);
-        v->jobs = (terrimpi_job *)(void *)(base + offset[13]);
-        v->mesh_xyz = (float *)(void *)(base + offset[14]);
-        v->mesh_indices = (uint16_t *)(void *)(base + offset[15]);
-        for (i = 0; i < v->desc.atlas_count; i++) {
-            size_t each = slots + TERRIMPI_ALIGN - slots % TERRIMPI_ALIGN;
-            terrimp_live_atlas_init(&v->atlases[i], &atlas, base + offset[1] + i * each, slots);
-        }
+    terrimpi_take(&l, 1, sizeof *v);
+    v->atlases = (terrimp_live_atlas *)terrimpi_take(&l, v->desc.atlas_count, sizeof *v->atlases);
+    for (i = 0; i < v->desc.atlas_count; i++) {
+        void *memory = terrimpi_take(&l, slots, 1);
+        if (memory)
+            terrimp_live_atlas_init(&v->atlases[i], &atlas, memory, slots);
     }
-    return ok && slots ? at : 0;
+    v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
+    v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
+    v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
+    v->leaf_at = (uint32_t *)terrimpi_take(&l, nodes, sizeof *v->leaf_at);
+    v->record_of = (uint16_t *)terrimpi_take(&l, nodes, sizeof *v->record_of);
+    v->prefers = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->prefers);
+    v->shown = (float *)terrimpi_take(&l, ground, sizeof *v->shown);
+    v->leaves = (uint32_t *)terrimpi_take(&l, ground, sizeof *v->leaves);
+    v->units = (terrimpi_unit *)terrimpi_take(&l, ground, sizeof *v->units);
+    v->items = (terrimpi_item *)terrimpi_take(&l, ground + impostors, sizeof *v->items);
+    v->wants = (terrimpi_want *)terrimpi_take(&l, impostors, sizeof *v->wants);
+    v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
+    v->records = (terrimpi_record *)terrimpi_take(&l, impostors, sizeof *v->records);
+    v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
+    v->mesh_xyz = (float *)terrimpi_take(&l, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz);
+    v->mesh_indices = (uint16_t *)terrimpi_take(&l, v->terrain->index_stride,
+                                                sizeof *v->mesh_indices);
+    return l.ok && slots ? l.bytes : 0;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -9592,21 +9564,14 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              size_t bytes, terrimp_view **view)
 {
     terrimp_view v;
-    terrimp_result result;
     size_t needed;
-    if (!view)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
-    result = terrimp_view_desc_resolve(terrain, desc, &v.desc);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
     v.terrain = terrain;
     needed = terrimpi_view_layout(&v, NULL);
-    if (needed == 0)
-        return TERRIMP_E_OVERFLOW;
-    result = terrimpi_check_block(memory, bytes, needed);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_view_layout(&v, (unsigned char *)memory);
     v.ground.rule = v.desc.ground_rule;
@@ -9634,29 +9599,21 @@ static terrimpi_site terrimpi_site_at(const terrimp_geomip *tree, uint32_t level
 
 static terrimpi_site terrimpi_site_of(const terrimp_geomip *tree, uint32_t node)
 {
-    uint32_t level = 0, within;
-    while (node >= tree->level_first[level + 1u])
-        level++;
-    within = node - tree->level_first[level];
-    return terrimpi_site_at(tree, level, within % tree->level_x[level],
-                            within / tree->level_x[level]);
+    terrimpi_mip_place p = terrimpi_mip_place_of(tree, node);
+    return terrimpi_site_at(tree, p.level, p.x, p.z);
 }
 
 /* The children of a node, nearest to the eye first. Returns how many there are. */
 static uint32_t terrimpi_children(const terrimp_view *v, const terrimpi_site *s,
                                   terrimpi_site children[4])
 {
-    const terrimp_terrain *t = v->terrain;
-    uint32_t level = s->level - 1u, quads = t->desc.chunk_quads << level, count = 0, i;
-    uint32_t closest = 0;
-    if (v->camera.eye[0] >= terrimpi_world_x(t, (s->x * 2u + 1u) * quads))
-        closest |= 1u;
-    if (v->camera.eye[2] >= terrimpi_world_z(t, (s->z * 2u + 1u) * quads))
-        closest |= 2u;
+    const terrimp_geomip *tree = &v->terrain->tree;
+    uint32_t level = s->level - 1u, count = 0, i;
+    uint32_t closest = terrimpi_mip_closest(tree, s->level, s->x, s->z, v->camera.eye);
     for (i = 0; i < 4u; i++) {
         uint32_t child = closest ^ i, x = s->x * 2u + (child & 1u), z = s->z * 2u + (child >> 1);
-        if (x < t->tree.level_x[level] && z < t->tree.level_z[level])
-            children[count++] = terrimpi_site_at(&t->tree, level, x, z);
+        if (x < tree->level_x[level] && z < tree->level_z[level])
+            children[count++] = terrimpi_site_at(tree, level, x, z);
     }
     return count;
 }
@@ -9778,8 +9735,7 @@ static void terrimpi_cancel_jobs(terrimp_view *v)
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     uint32_t i;
-    if (!view)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(view->record_of, 0xff, view->terrain->tree.node_count * sizeof *view->record_of);
     memset(view->records, 0, view->desc.max_impostors * sizeof *view->records);
     for (i = 0; i < view->desc.atlas_count; i++)
@@ -9795,11 +9751,10 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 {
     const terrimp_geomip *tree;
     uint32_t i;
-    if (!view)
-        return TERRIMP_E_NULL;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     tree = &view->terrain->tree;
-    if (x >= tree->field.width || z >= tree->field.depth || cols == 0 || rows == 0)
-        return TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
+                    rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_cancel_jobs(view);
@@ -10733,7 +10688,7 @@ static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
 {
     const terrimp_geomip *tree = &v->terrain->tree;
     terrimpi_site children[4];
-    uint32_t i, count = 0, level = want->site.level, up;
+    uint32_t i, count, level = want->site.level, up;
     if (terrimpi_list_impostor(v, want->site.node, TERRIMPI_STALE))
         return 1;
     v->stats.waiting++;
@@ -10845,6 +10800,7 @@ static int terrimpi_floor_wanted(const terrimp_view *v)
 static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t pattern,
                                     terrimp_pattern *found)
 {
+    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
     terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST, pattern, found);
 }
 
@@ -10929,11 +10885,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimp_result result;
     float spread = 0.0f, drawn = 0.0f;
     uint32_t i;
-    if (!view)
-        return TERRIMP_E_NULL;
-    result = terrimp_camera_resolve(camera, &resolved);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     before = view->camera;
     frustum = view->frustum;
     view->camera = resolved;
@@ -11109,10 +11062,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks)
 {
     uint32_t i;
-    if (!view || !callbacks)
-        return TERRIMP_E_NULL;
-    if (view->frame == 0 || view->outdated)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(view->frame == 0 || view->outdated, TERRIMP_E_STATE);
     if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
@@ -11138,10 +11089,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
 
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats)
 {
-    if (!view || !stats)
-        return TERRIMP_E_NULL;
-    if (view->frame == 0)
-        return TERRIMP_E_STATE;
+    TERRIMPI_REFUSE(!view || !stats, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(view->frame == 0, TERRIMP_E_STATE);
     *stats = view->stats;
     return TERRIMP_OK;
 }
@@ -11159,17 +11108,12 @@ TERRIMP_API terrimp_result terrimp_view_create(const terrimp_terrain *terrain,
     terrimp_result result;
     size_t bytes;
     void *memory;
-    if (!view || !terrimpi_pick_allocator(allocator, &from))
-        return TERRIMP_E_NULL;
-    result = terrimp_view_desc_resolve(terrain, desc, &resolved);
-    if (result != TERRIMP_OK)
-        return result;
+    TERRIMPI_REFUSE(!view || !terrimpi_pick_allocator(allocator, &from), TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &resolved));
     bytes = terrimp_view_bytes(terrain, &resolved);
-    if (bytes == 0)
-        return TERRIMP_E_OVERFLOW;
+    TERRIMPI_REFUSE(bytes == 0, TERRIMP_E_OVERFLOW);
     memory = from.allocate(from.user, bytes);
-    if (!memory)
-        return TERRIMP_E_MEMORY;
+    TERRIMPI_REFUSE(!memory, TERRIMP_E_MEMORY);
     result = terrimp_view_init(terrain, &resolved, memory, bytes, &made);
     if (result != TERRIMP_OK) {
         from.release(from.user, memory, bytes);

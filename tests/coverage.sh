@@ -1,5 +1,6 @@
 #!/bin/sh
-# Prints how much of terrimp.h the unit tests reach, in lines and branches, and what they do not.
+# Prints how much of terrimp.h the unit tests reach, in lines and branches, and what they do not,
+# with the reasons from tests/coverage_reasons.txt.
 # Asserts count for nothing: their other branch is a mistake of the library. The whole annotated
 # header stands in build/coverage/terrimp.h.gcov afterwards.
 # Argument: "all" also lists the branches that are never taken [only lines].
@@ -27,6 +28,13 @@ tail -n 1 $work/unit.txt
 # A function's lines follow its line "function NAME called ..."; branches follow their line.
 awk -v all="$1" -v line_aim=$line_aim -v branch_aim=$branch_aim '
     function shown(text) { gsub(/^ +/, "", text); return substr(text, 1, 76) }
+    FNR == NR {
+        if (!/^#/ && NF > 1) {
+            reason[$1] = $0
+            sub(/^[^ ]+ +/, "", reason[$1])
+        }
+        next
+    }
     /^function / { name = $2; next }
     /^call / { next }
     /^branch / {
@@ -49,7 +57,11 @@ awk -v all="$1" -v line_aim=$line_aim -v branch_aim=$branch_aim '
         lines++
         if (count ~ /^[#=]/) {
             lines_missed++
-            line_list = line_list sprintf("  %5d %-38s %s\n", at, name, shown(code))
+            if (name != listed)
+                line_list = line_list sprintf("  %s: %s\n", name,
+                                              name in reason ? reason[name] : "UNEXPLAINED")
+            listed = name
+            line_list = line_list sprintf("  %5d     %s\n", at, shown(code))
             dead = 1
         }
     }
@@ -61,4 +73,4 @@ awk -v all="$1" -v line_aim=$line_aim -v branch_aim=$branch_aim '
         printf "lines    %6.2f %% of %5d (aim: %d %%)\n", line_part, lines, line_aim
         printf "branches %6.2f %% of %5d (aim: %d %%)\n", branch_part, branches, branch_aim
         exit line_part < line_aim || branch_part < branch_aim
-    }' $work/terrimp.h.gcov
+    }' tests/coverage_reasons.txt $work/terrimp.h.gcov

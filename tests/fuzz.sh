@@ -3,6 +3,7 @@
 # seconds: lets clang's libFuzzer look for new input, so long for each of tests/fuzz_*.c (or those
 # named after the number, like `terrain`); what it keeps goes to build/fuzz/NAME/, what breaks the
 # library to build/fuzz/NAME.crash-*, to be copied to tests/corpus/NAME/ once it is understood.
+# SEED=n begins with other random numbers.
 
 cd "$(dirname "$0")/.." || exit 1
 . tests/check.sh
@@ -36,8 +37,8 @@ fuzz() # name
     mkdir -p $work/$1
     clang -O2 $flags -DFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
         tests/fuzz_$1.c -lm -o $work/fuzz_$1 || return
-    $work/fuzz_$1 -max_total_time=$seconds -max_len=1024 -len_control=20 -timeout=20 \
-        -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=$work/$1. \
+    $work/fuzz_$1 -max_total_time=$seconds -max_len=2048 -len_control=20 -timeout=30 \
+        -seed=${SEED:-1} -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=$work/$1. \
         $work/$1 tests/corpus/$1 > $work/fuzz_$1.txt 2>&1
     code=$?
     [ $code -eq 0 ] || grep -vE '^#[0-9]|NEW_FUNC' $work/fuzz_$1.txt | tail -n 40

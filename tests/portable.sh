@@ -119,6 +119,8 @@ bare() # name, "flags", board
 if wanted bare; then
     bare cortex-m0 "-mcpu=cortex-m0 -mfloat-abi=soft" mps2-an385
     bare cortex-m4 "-mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16" mps2-an386
+    check "Cortex-M0 and M4: the run-time part needs no double and no 64-bit division" \
+        sh tests/sizes.sh
 fi
 machines
 check_report

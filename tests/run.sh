@@ -72,6 +72,18 @@ sanitizers_work() # compiler
     build/test/probe > /dev/null 2>&1 && echo "(leaks cannot be detected here)"
 }
 
+# The first compiler that has one; in some containers it cannot lay out memory as it needs to.
+thread_sanitizer()
+{
+    echo 'int main(void) { return 0; }' > build/test/probe.c
+    for compiler in clang gcc; do
+        have $compiler || continue
+        $compiler $races build/test/probe.c -o build/test/probe > /dev/null 2>&1 &&
+            build/test/probe > /dev/null 2>&1 && echo $compiler && return
+    done
+    false
+}
+
 # All libraries for pictures are known to the Makefile; one make for each OpenGL that is here.
 graphics_tests() # osmesa|egl
 {
@@ -84,6 +96,7 @@ rm -f build/test/result
 limit=
 have timeout && limit="timeout 600"
 sanitize="-g -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+races="-std=c99 -g -O1 -fsanitize=thread -I."
 unit="-std=c99 -I. tests/unit.c -lm -o"
 
 suite "unit tests, built as the README says" \
@@ -96,10 +109,18 @@ for compiler in gcc clang; do
         skip "unit tests, $compiler with sanitizers: it is not here, or has none"
     fi
 done
+if compiler=$(thread_sanitizer); then
+    suite "threads, $compiler with ThreadSanitizer" \
+        sh -c "$compiler $races tests/threads.c -lm -lpthread -o build/test/threads &&
+            build/test/threads"
+else
+    skip "threads, ThreadSanitizer: no compiler here has one that runs"
+fi
 suite "documentation" sh tests/docs.sh
 suite "compilers and build options" sh tests/compile/run.sh
 suite "hygiene" sh tests/hygiene.sh
 suite "fuzzers, over their corpus" sh tests/fuzz.sh
+suite "fuzzers, some seconds each" sh tests/fuzz.sh 5
 suite "examples" sh tests/examples.sh
 
 if has_library GL/osmesa.h -lOSMesa; then

@@ -1,30 +1,43 @@
 #!/bin/sh
 # Prints the size of the library's code and tables at -Os, without libc and libm, for Cortex-M4,
-# Cortex-M0 and the machine it runs on. The run-time part is what a host links that updates and
-# renders a view: everything else is left out by the linker, or by TERRIMP_NO_BUILD.
+# Cortex-M0 and the machine it runs on. The run-time part is TERRIMP_NO_BUILD: terrains come from
+# bakes. What a host does not call is left out by its linker: two hosts are shown, one that only
+# opens, updates and renders, and one that fills its buffers and asks for statistics too.
+# Fails when the run-time part needs double or divides 64 bits on a machine that has neither.
 
 cd "$(dirname "$0")/.." || exit 1
 work=build/test/sizes
 mkdir -p $work
 flags="-std=c99 -Os -DNDEBUG -DTERRIMP_NO_MALLOC -ffunction-sections -fdata-sections -I."
 aim=24576
-run_time="terrimp_view_desc_resolve terrimp_view_bytes terrimp_view_init terrimp_view_update
-          terrimp_view_render terrimp_view_get_stats terrimp_view_invalidate
-          terrimp_terrain_get_info terrimp_terrain_get_box terrimp_terrain_get_mesh
-          terrimp_terrain_fill_indices terrimp_terrain_fill_ground terrimp_terrain_fill_meshes"
-if grep -q TERRIMP_NO_BUILD terrimp.h; then
-    no_build=1
-fi
+draws="terrimp_terrain_open_bytes terrimp_terrain_open terrimp_view_bytes terrimp_view_init
+       terrimp_view_update terrimp_view_render"
+fills="$draws terrimp_terrain_get_info terrimp_terrain_fill_indices terrimp_terrain_fill_ground
+       terrimp_terrain_fill_meshes terrimp_view_get_stats terrimp_view_invalidate"
+# What compilers for ARM call for them, by their own names and by those of other machines.
+heavy='^(__aeabi_(u?ldivmod|d[a-z0-9]+|[a-z]+2d)|__(u?div|u?mod)di3|__[a-z]*df[a-z0-9]*)$'
+failed=0
 
-row() # name, what, object
+row() # name, what, object, "judged" or ""
 {
-    "$size" -B "$3" | awk -v name="$1" -v what="$2" -v aim=$aim 'NR == 2 {
-        judged = what ~ /run time/ && name == "cortex-m4"
-        printf "%-11s %-48s %7d bytes of code and tables, %d of data%s\n", name, what, $1, $2 + $3,
+    "$size" -B "$3" | awk -v name="$1" -v what="$2" -v aim=$aim -v judged="$4" 'NR == 2 {
+        printf "%-11s %-50s %7d bytes of code and tables, %d of data%s\n", name, what, $1, $2 + $3,
                judged ? ($1 <= aim ? "  (within the aim)" : "  (over the aim)") : "" }'
 }
 
-machine() # name, prefix, flags
+linked() # prefix, object, functions...: what is left of it in a host that calls these
+{
+    prefix=$1
+    object=$2
+    shift 2
+    roots=
+    for name in "$@"; do
+        roots="$roots -u $name"
+    done
+    "${prefix}ld" -r --gc-sections -e terrimp_view_update $roots "$object" -o $work/part.o
+}
+
+machine() # name, prefix, flags, "judged" or ""
 {
     compiler=$2gcc
     size=$2size
@@ -36,20 +49,23 @@ machine() # name, prefix, flags
     compile="$compiler $3 $flags -DTERRIMP_IMPLEMENTATION -x c -c terrimp.h"
     $compile -o "$object" || exit 1
     row "$1" "everything" "$object"
-    # A name that the library does not have, or no longer, is no root.
-    roots=
-    for name in $run_time; do
-        ! $2nm "$object" | grep -q " T $name\$" || roots="$roots -u $name"
-    done
-    $2ld -r --gc-sections -e terrimp_view_update $roots "$object" -o $work/part.o || exit 1
-    row "$1" "run time: what a view uses, by the linker" $work/part.o
-    if [ -n "$no_build" ]; then
-        $compile -DTERRIMP_NO_BUILD -o "$object" || exit 1
-        row "$1" "run time: TERRIMP_NO_BUILD, every function of it" "$object"
-        $2ld -r --gc-sections -e terrimp_view_update $roots "$object" -o $work/part.o || exit 1
-        row "$1" "run time: both" $work/part.o
-    fi
+    $compile -DTERRIMP_NO_BUILD -o "$object" || exit 1
+    row "$1" "run time, every function of it" "$object"
+    linked "$2" "$object" $fills || exit 1
+    row "$1" "run time, a host that also fills buffers" $work/part.o
+    linked "$2" "$object" $draws || exit 1
+    row "$1" "run time, a host that opens, updates, renders" $work/part.o "$4"
     largest "$2" $work/part.o
+    [ -z "$2" ] || needs_nothing_heavy "$1" "$2" "$object"
+}
+
+# Every function of the run-time part, not only those that a host calls.
+needs_nothing_heavy() # name, prefix, object
+{
+    calls=$("$2nm" -u "$3" | awk '{ print $2 }' | grep -E "$heavy")
+    [ -n "$calls" ] || { echo "    calls neither double nor 64-bit division"; return; }
+    echo "    FAILED: the run-time part calls" $calls
+    failed=1
 }
 
 largest() # prefix, object
@@ -61,7 +77,7 @@ largest() # prefix, object
 }
 
 echo "Aim for the run-time part on Cortex-M4: at most $aim bytes."
-machine cortex-m4 arm-none-eabi- "-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16"
+machine cortex-m4 arm-none-eabi- "-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16" judged
 machine cortex-m0 arm-none-eabi- "-mcpu=cortex-m0 -mthumb -mfloat-abi=soft"
 machine "$(uname -m)" "" ""
-[ -n "$no_build" ] || echo "(The library has no TERRIMP_NO_BUILD.)"
+exit $failed

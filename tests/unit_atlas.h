@@ -880,7 +880,7 @@ static void live_atlas_stays_full(void)
         static uint32_t victims[SLOTS];
         terrimp_live_atlas_desc desc;
         terrimp_live_atlas atlas;
-        terrimp_rect rect;
+        terrimp_rect rect = {0, 0, 0, 0};
         double full = 0.0;
         void *memory;
         memset(&desc, 0, sizeof desc);
@@ -945,7 +945,7 @@ static void live_atlas_refuses_without_a_change(void)
     desc.height = 32;
     desc.max_slots = 5;
     bytes = terrimp_live_atlas_bytes(&desc);
-    memory = (unsigned char *)malloc(bytes + 8u);
+    memory = (unsigned char *)calloc(bytes + 8u, 1); /* it is compared as a whole */
     copy = (unsigned char *)malloc(bytes);
     for (k = 0; k < 7; k++) {
         bad = desc;

@@ -837,6 +837,8 @@ static void terrains_are_not_read_before_they_are_built(void)
     terrimp_box box;
     terrimp_view *view;
     terrimp_view_desc view_desc, view_out;
+    terrimp_rect rect;
+    uint32_t count;
     float xyz[75]; /* enough for the ground of a node, and too little for all meshes */
     uint16_t indices[600];
     memset(&desc, 0, sizeof desc);
@@ -856,7 +858,14 @@ static void terrains_are_not_read_before_they_are_built(void)
     REFUSES(TERRIMP_E_STATE, view, terrimp_view_create(terrain, &view_desc, NULL, &view));
     REFUSES(TERRIMP_E_STATE, view, terrimp_view_init(terrain, &view_desc, memory, 9, &view));
     CHECK(terrimp_view_bytes(terrain, &view_desc) == 0);
+    REFUSES(TERRIMP_E_STATE, xyz, terrimp_terrain_fill_mesh(terrain, 0, xyz, 75, indices, 600));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_mesh(terrain, 0, NULL, 75, indices, 600));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_fill_morph(terrain, 0, NULL, 25));
+    memset(&rect, 0, sizeof rect);
+    rect.width = rect.height = 1;
+    REFUSES(TERRIMP_E_STATE, count, terrimp_terrain_touched(terrain, &rect, 0, NULL, 0, &count));
     GIVES(TERRIMP_E_STATE, terrimp_terrain_build_finish(terrain));
+    GIVES(TERRIMP_E_NULL, terrimp_terrain_build_begin(NULL));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build_finish(NULL));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build(NULL, scratch, sizeof scratch));
     GIVES(TERRIMP_E_NULL, terrimp_terrain_build(terrain, NULL, sizeof scratch));
@@ -1187,6 +1196,192 @@ static void views_refuse(void)
     land_free(&l);
 }
 
+/* ---- what the tests above leave out, in the header's order ---- */
+
+/* A range of heights that the descriptor names holds for every sample. */
+static void samples_outside_of_the_named_range_are_refused(void)
+{
+    int i;
+    for (i = 0; i < 5; i++) {
+        land l;
+        terrimp_terrain *terrain = NULL;
+        land_prepare(&l, 21, 13, TERRIMP_FORMAT_F32, LAND_NOISE);
+        l.desc.chunk_quads = 4;
+        l.desc.height_low = -1e3f;
+        l.desc.height_high = 1e3f;
+        GIVES(TERRIMP_OK, terrimp_terrain_create(&l.desc, NULL, &terrain));
+        terrimp_terrain_destroy(terrain);
+        l.samples[random_range(0, 21 * 13 - 1)] = i < 3 ? not_finite(i) : i == 3 ? 1001.0f
+                                                                                 : -1001.0f;
+        GIVES(i < 3 ? TERRIMP_E_NOT_FINITE : TERRIMP_E_RANGE,
+              terrimp_terrain_create(&l.desc, NULL, &terrain));
+        land_free(&l);
+    }
+}
+
+/* Even the coarsest ground has several nodes where the eye is in the midst of a rough terrain. */
+static void too_little_room_for_ground_is_an_error(void)
+{
+    land l;
+    terrimp_view_desc desc;
+    terrimp_view *view;
+    terrimp_camera camera;
+    land_prepare(&l, 65, 65, TERRIMP_FORMAT_F32, LAND_NOISE);
+    l.desc.chunk_quads = 8;
+    memset(&desc, 0, sizeof desc);
+    desc.ground_rule = TERRIMP_GEOMIP_BOUND;
+    desc.max_ground = 1;
+    memset(&camera, 0, sizeof camera);
+    camera.eye[0] = camera.eye[2] = 32.0f;
+    camera.forward[0] = 1.0f;
+    camera.width_px = camera.height_px = 8000;
+    camera.z_near = 0.1f;
+    camera.z_far = 1000.0f;
+    if (land_build(&l)) {
+        CHECK(terrimp_heightfield_height(&l.desc.field, 32.0f, 32.0f, &camera.eye[1]) ==
+              TERRIMP_OK);
+        CHECK(terrimp_view_create(l.terrain, &desc, NULL, &view) == TERRIMP_OK);
+        GIVES(TERRIMP_E_CAPACITY, terrimp_view_update(view, &camera));
+        camera.eye[1] += 1e5f; /* so far away that one node will do */
+        camera.z_far = 1e6f;
+        camera.forward[0] = 0.0f;
+        camera.forward[1] = -1.0f;
+        GIVES(TERRIMP_OK, terrimp_view_update(view, &camera));
+        terrimp_view_destroy(view);
+    }
+    land_free(&l);
+}
+
+/* A picture that is renewed all the time has no rate. */
+static void pictures_without_a_lifetime_have_no_rate(void)
+{
+    terrimp_box box;
+    terrimp_capture capture;
+    float eye[3], rate;
+    good_capture(&box, eye, &capture);
+    REFUSES(TERRIMP_E_RANGE, rate, terrimp_capture_rate(&box, 1, eye, 5.0f, 0.0f, 1.0f, &rate));
+}
+
+static void meshes_are_not_raised_by_bad_numbers(void)
+{
+    static float work[2 * 1000];
+    simp_case *t = &simp_a;
+    terrimp_raise_desc raise, bad;
+    int i;
+    simp_fill(t, 20, 17, 0);
+    simp_make_borders(t, 0);
+    CHECK(simp_run(t, 0) == TERRIMP_OK);
+    memset(&raise, 0, sizeof raise);
+    raise.heights = t->heights;
+    raise.cols = t->cols;
+    raise.rows = t->rows;
+    raise.amount = 1.0f;
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(NULL, &t->mesh, work));
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, NULL, work));
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, &t->mesh, NULL));
+    bad = raise, bad.heights = NULL;
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&bad, &t->mesh, work));
+    bad = raise, bad.cols = 1;
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    bad = raise, bad.cols--; /* the mesh stands out of it */
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    bad = raise, bad.amount = 1.5f;
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    for (i = 0; i < 3; i++) {
+        bad = raise, bad.amount = not_finite(i);
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&bad, &t->mesh, work));
+    }
+    t->heights[7] = not_finite(0);
+    GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&raise, &t->mesh, work));
+    t->heights[7] = 1.0f;
+    t->mesh.indices[0] = (uint16_t)t->mesh.surface_vertex_count;
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&raise, &t->mesh, work));
+    t->mesh.vertex_count++;
+    GIVES(TERRIMP_E_STATE, terrimp_mesh_raise(&raise, &t->mesh, work));
+    simp_free(t);
+}
+
+static void geomip_functions_refuse(void)
+{
+    terrimp_heightfield bad;
+    mip_scene s;
+    terrimp_geomip out;
+    terrimp_box box;
+    terrimp_geomip_weights weights[25];
+    terrimp_geomip_vertex vertices[25];
+    terrimp_geomip_draw draw;
+    float distances[200], heights[25];
+    int i;
+    memset(&draw, 0, sizeof draw);
+    memset(vertices, 0, sizeof vertices);
+    mip_make(&s, TERRIMP_FORM_LIST, 33, 33, 4);
+    bad = s.tree.field;
+    bad.width = 1;
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_geomip_init(&bad, 4, &out));
+    REFUSES(TERRIMP_E_NULL, box, terrimp_geomip_box(NULL, 0, &box));
+    REFUSES(TERRIMP_E_RANGE, box, terrimp_geomip_box(&s.tree, s.tree.node_count, &box));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_fit(NULL, s.scratch));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_build_finish(NULL));
+    REFUSES(TERRIMP_E_NULL, distances,
+            terrimp_geomip_distances(NULL, 0, 1.0f, 1.0f, 500.0f, distances));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 500.0f, NULL));
+    REFUSES(TERRIMP_E_RANGE, distances,
+            terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 0.0f, distances));
+    REFUSES(TERRIMP_E_RANGE, distances,
+            terrimp_geomip_distances(&s.tree, TERRIMP_GEOMIP_RULE_COUNT, 1.0f, 1.0f, 500.0f,
+                                     distances));
+    for (i = 0; i < 3; i++) {
+        float wrong = not_finite(i);
+        terrimp_camera camera;
+        terrimp_geomip_view view = s.view;
+        mip_random_camera(&s, &camera);
+        REFUSES(TERRIMP_E_NOT_FINITE, distances,
+                terrimp_geomip_distances(&s.tree, 0, wrong, 1.0f, 500.0f, distances));
+        REFUSES(TERRIMP_E_NOT_FINITE, distances,
+                terrimp_geomip_distances(&s.tree, 0, 1.0f, wrong, 500.0f, distances));
+        REFUSES(TERRIMP_E_NOT_FINITE, distances,
+                terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, wrong, distances));
+        view.hysteresis = wrong;
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_geomip_select(&s.tree, &view, &camera));
+    }
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_fill_weights(4, TERRIMP_FORM_LIST, NULL));
+    REFUSES(TERRIMP_E_RANGE, weights, terrimp_geomip_fill_weights(3, TERRIMP_FORM_LIST, weights));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, NULL, 1));
+    REFUSES(TERRIMP_E_NULL, heights,
+            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, NULL, vertices, heights, 1));
+    REFUSES(TERRIMP_E_RANGE, heights,
+            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, heights, 0));
+    mip_free(&s);
+}
+
+static void pictures_are_not_tightened_or_split_by_bad_numbers(void)
+{
+    terrimp_box box;
+    terrimp_capture capture, out;
+    terrimp_split split;
+    float eye[3], xyz[9];
+    uint16_t indices[3] = {0, 1, 2};
+    int k;
+    good_capture(&box, eye, &capture);
+    for (k = 0; k < 9; k++) /* in front of it */
+        xyz[k] = capture.eye[k % 3] + 5.0f * capture.forward[k % 3] + 0.1f * (float)(k == 4);
+    out = capture;
+    GIVES(TERRIMP_E_NULL, terrimp_capture_tighten(NULL, xyz, 3));
+    GIVES(TERRIMP_E_NULL, terrimp_capture_tighten(&out, NULL, 3));
+    GIVES(TERRIMP_E_RANGE, terrimp_capture_tighten(&out, xyz, 0));
+    for (k = 0; k < 3; k++)
+        xyz[6 + k] = capture.eye[k] - capture.forward[k];
+    GIVES(TERRIMP_E_BEHIND, terrimp_capture_tighten(&out, xyz, 3));
+    CHECK(memcmp(&out, &capture, sizeof out) == 0);
+    GIVES(TERRIMP_E_NULL, terrimp_capture_split(&capture, xyz, 3, indices, 3, NULL));
+    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(NULL, xyz, 3, indices, 3, &split));
+    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(&capture, NULL, 3, indices, 3, &split));
+    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(&capture, xyz, 3, NULL, 3, &split));
+    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 0, indices, 3, &split));
+    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 3, indices, 2, &split));
+    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 2, indices, 3, &split));
+}
+
 /* Runs last: a code that nothing can provoke would be a promise without a meaning. */
 static void every_result_has_been_provoked(void)
 {
@@ -1216,6 +1411,12 @@ static void bad_input_tests(void)
     RUN(bakes_are_refused);
     RUN(view_descriptors_are_refused);
     RUN(views_refuse);
+    RUN(samples_outside_of_the_named_range_are_refused);
+    RUN(too_little_room_for_ground_is_an_error);
+    RUN(pictures_without_a_lifetime_have_no_rate);
+    RUN(meshes_are_not_raised_by_bad_numbers);
+    RUN(geomip_functions_refuse);
+    RUN(pictures_are_not_tightened_or_split_by_bad_numbers);
     RUN(every_result_has_been_provoked);
 }
 

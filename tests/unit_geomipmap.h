@@ -2,6 +2,7 @@
 #ifndef UNIT_GEOMIPMAP_H
 #define UNIT_GEOMIPMAP_H
 
+#include "unit_oracle.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -1293,12 +1294,13 @@ static float mip_largest_step(mip_scene *s, const terrimp_camera *from, const fl
     return largest;
 }
 
-/* The largest change of a height in a frame, on some random ways in steps and in small steps. */
-static void mip_step_changes(int form, float morph_ratio, float coarse[8], float fine[8])
+/* The largest change of a height in a frame, on some random ways in so many steps. */
+static void mip_step_changes(int form, float morph_ratio, uint32_t steps, uint32_t ways,
+                             float changes[8])
 {
     uint16_t *indices = mip_filled(4, form);
     uint32_t way;
-    for (way = 0; way < 8u; way++) {
+    for (way = 0; way < ways; way++) {
         mip_scene s;
         terrimp_camera camera;
         float along[3];
@@ -1313,8 +1315,7 @@ static void mip_step_changes(int form, float morph_ratio, float coarse[8], float
         along[0] = random_float(-40.0f, 40.0f);
         along[1] = random_float(-3.0f, 3.0f);
         along[2] = random_float(-40.0f, 40.0f);
-        coarse[way] = mip_largest_step(&s, &camera, along, 16, indices);
-        fine[way] = mip_largest_step(&s, &camera, along, 256, indices);
+        changes[way] = mip_largest_step(&s, &camera, along, steps, indices);
         mip_free(&s);
     }
     free(indices);
@@ -1323,34 +1324,108 @@ static void mip_step_changes(int form, float morph_ratio, float coarse[8], float
 static void heights_change_with_the_camera_s_step(void)
 {
     float coarse[8], fine[8];
-    uint32_t way;
-    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, coarse, fine);
-    for (way = 0; way < 8u; way++)
+    uint32_t way, ways = check_rounds(4, 8), same = check_state;
+    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, 16, ways, coarse);
+    check_state = same;
+    mip_step_changes(TERRIMP_FORM_STITCHED, 1.5f, 256, ways, fine);
+    for (way = 0; way < ways; way++)
         CHECK(fine[way] <= coarse[way] / 8.0f + 1e-4f);
 }
 
 /* Where a border vertex is left out, the diagonal beside it turns: what remains of popping. */
 static void fitted_borders_pop_less_than_nodes_that_do_not_morph(void)
 {
-    float coarse[8], fine[8], morphed = 0.0f, popped = 0.0f;
-    uint32_t round, way;
-    for (round = 0; round < 2u; round++) {
-        uint32_t kept = check_state; /* the same ways twice */
-        mip_step_changes(TERRIMP_FORM_FITTED, 1.5f, coarse, fine);
+    float changes[8], morphed = 0.0f, popped = 0.0f;
+    uint32_t round, way, rounds = check_rounds(1, 4);
+    for (round = 0; round < rounds; round++) {
+        uint32_t same = check_state;
+        mip_step_changes(TERRIMP_FORM_FITTED, 1.5f, 128, 8, changes);
         for (way = 0; way < 8u; way++)
-            morphed += fine[way];
-        check_state = kept;
-        mip_step_changes(TERRIMP_FORM_FITTED, 1.0f, coarse, fine);
+            morphed += changes[way];
+        check_state = same;
+        mip_step_changes(TERRIMP_FORM_FITTED, 1.0f, 128, 8, changes);
         for (way = 0; way < 8u; way++)
-            popped += fine[way];
+            popped += changes[way];
     }
-    printf("  largest step of a height in a frame, mean of 16 ways: %.3f morphing, %.3f not\n",
-           (double)morphed / 16.0, (double)popped / 16.0);
+    printf("  largest step of a height in a frame, mean of %u ways: %.3f morphing, %.3f not\n",
+           (unsigned)(8u * rounds), (double)morphed / (8.0 * rounds),
+           (double)popped / (8.0 * rounds));
     CHECK(morphed < 0.5f * popped);
+}
+
+/* A host with shaders takes the weights, one without lets the library morph: the same heights. */
+static void weights_say_what_morphing_does(void)
+{
+    static const int forms[] = {TERRIMP_FORM_LIST, TERRIMP_FORM_STITCHED, TERRIMP_FORM_FITTED};
+    uint32_t i, k, side;
+    for (i = 0; i < 30u; i++) {
+        int form = forms[i % 3u];
+        uint32_t quads = 4u + 2u * (i % 7u), count = terrimp_pattern_vertex_count(quads, form);
+        terrimp_geomip_weights *w = (terrimp_geomip_weights *)malloc(count * sizeof *w);
+        terrimp_geomip_vertex *v = (terrimp_geomip_vertex *)malloc(count * sizeof *v);
+        float *heights = (float *)malloc(3u * count * sizeof *heights);
+        terrimp_geomip_draw draw;
+        memset(&draw, 0, sizeof draw);
+        draw.morph = random_float(0.0f, 1.0f);
+        for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
+            draw.side[side] = random_float(0.0f, 1.0f);
+            draw.side_coarse[side] = random_float(0.0f, 1.0f);
+        }
+        for (k = 0; k < count; k++) {
+            v[k].height = random_float(-9.0f, 9.0f);
+            v[k].move = random_float(-9.0f, 9.0f);
+            v[k].beside[0] = random_float(-9.0f, 9.0f);
+            v[k].beside[1] = random_float(-9.0f, 9.0f);
+        }
+        CHECK(terrimp_geomip_fill_weights(quads, form, w) == TERRIMP_OK);
+        CHECK(terrimp_geomip_morph(quads, form, &draw, v, heights + 1, 3) == TERRIMP_OK);
+        for (k = 0; k < count; k++) {
+            const float *coarse = draw.side_coarse;
+            double factor = (double)w[k].self * (double)draw.morph, move = (double)v[k].move;
+            for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
+                int along = side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1 ? 0 : 1;
+                factor += (double)w[k].odd[side] * (double)draw.side[side] +
+                          (double)w[k].even[side] * (double)coarse[side];
+                move += (double)w[k].beside[side] * (double)coarse[side] *
+                        (double)v[k].beside[along];
+            }
+            CHECK(fabs((double)v[k].height + factor * move - (double)heights[3u * k + 1u]) < 1e-4);
+        }
+        free(w);
+        free(v);
+        free(heights);
+    }
+}
+
+/* What a view finds for itself when its settings change. */
+static void distances_are_those_that_selections_use(void)
+{
+    static const int rules[] = {TERRIMP_GEOMIP_PICTURE, TERRIMP_GEOMIP_BOUND};
+    uint32_t i;
+    for (i = 0; i < 8u; i++) {
+        mip_scene s;
+        terrimp_camera camera;
+        float factor, *distances;
+        mip_make(&s, TERRIMP_FORM_LIST, 65, 49, 8);
+        mip_random_settings(&s);
+        mip_random_camera(&s, &camera);
+        s.view.rule = rules[i % 2u];
+        s.view.morph_ratio = random_float(1.0f, 4.0f);
+        distances = (float *)malloc(s.tree.node_count * sizeof *distances);
+        CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);
+        CHECK(terrimp_geomip_distances(&s.tree, s.view.rule, s.view.tolerance_px,
+                                       s.view.morph_ratio, factor, distances) == TERRIMP_OK);
+        CHECK(memcmp(distances, s.view.distances, s.tree.node_count * sizeof *distances) == 0);
+        free(distances);
+        mip_free(&s);
+    }
 }
 
 static void geomipmap_tests(void)
 {
+    RUN(weights_say_what_morphing_does);
+    RUN(distances_are_those_that_selections_use);
     RUN(every_pattern_covers_its_square_once);
     RUN(patterns_share_every_border_vertex_with_neighbours_of_both_levels);
     RUN(fitted_patterns_put_coarse_borders_on_vertices_of_their_own);

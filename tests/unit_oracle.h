@@ -119,6 +119,13 @@ static void random_box(const float place[3], float side, terrimp_box *box)
     }
 }
 
+/* How often a test that takes its time repeats: less often than it could, unless TERRIMP_LONG is in
+   the environment. */
+static uint32_t check_rounds(uint32_t ordinary, uint32_t all)
+{
+    return getenv("TERRIMP_LONG") ? all : ordinary;
+}
+
 /* Whether memory is untouched: tests fill outputs with this byte before a call that fails. */
 enum { UNTOUCHED = 0xa5 };
 

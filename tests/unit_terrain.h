@@ -792,7 +792,7 @@ static void patterns_are_those_of_the_geomipmap(void)
         uint32_t count = terrimp_pattern_index_count(quads[i], TERRIMP_FORM_LIST);
         uint16_t *wanted = (uint16_t *)malloc(count * sizeof *wanted);
         terrimpi_pattern whole = terrimpi_find_pattern(quads[i], 0);
-        terrimp_pattern first;
+        terrimp_pattern first = {0, 0, 0};
         land_prepare(&l, 3, 3, TERRIMP_FORMAT_U8, LAND_FLAT);
         l.desc.chunk_quads = quads[i];
         CHECK(terrimp_pattern_fill(quads[i], TERRIMP_FORM_LIST, wanted, count) == TERRIMP_OK);
@@ -911,8 +911,42 @@ static void parallax_bound_holds_for_every_sample_of_a_mesh(void)
     land_free(&l);
 }
 
+/* A host that fills its buffers node by node has the same as one that fills them at once. */
+static void parts_of_buffers_are_those_of_the_whole(void)
+{
+    land l;
+    land_prepare(&l, 50, 70, TERRIMP_FORMAT_F32, LAND_HILLS);
+    l.desc.chunk_quads = 8;
+    if (land_build(&l)) {
+        uint32_t node;
+        size_t mesh = 3u * (size_t)l.info.mesh_vertex_stride, stride = l.info.mesh_index_stride;
+        size_t floor = 3u * (size_t)l.info.mesh_vertex_count - mesh * l.info.node_count;
+        size_t floor_indices = l.info.mesh_index_count - stride * l.info.node_count;
+        float *xyz = (float *)malloc((mesh + floor) * sizeof *xyz);
+        uint16_t *indices = (uint16_t *)malloc((stride + floor_indices) * sizeof *indices);
+        for (node = 0; node <= l.info.node_count; node++) {
+            size_t floats = node < l.info.node_count ? mesh : floor;
+            size_t corners = node < l.info.node_count ? stride : floor_indices;
+            CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, floats, indices, corners) ==
+                  TERRIMP_OK);
+            CHECK(memcmp(xyz, l.xyz + node * mesh, floats * sizeof *xyz) == 0);
+            CHECK(memcmp(indices, l.indices + node * stride, corners * sizeof *indices) == 0);
+            CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, floats - 1u, indices, corners) ==
+                  TERRIMP_E_CAPACITY);
+            CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, floats, indices, corners - 1u) ==
+                  TERRIMP_E_CAPACITY);
+        }
+        CHECK(terrimp_terrain_fill_mesh(l.terrain, node, xyz, mesh, indices, stride) ==
+              TERRIMP_E_RANGE);
+        free(xyz);
+        free(indices);
+    }
+    land_free(&l);
+}
+
 static void terrain_tests(void)
 {
+    RUN(parts_of_buffers_are_those_of_the_whole);
     RUN(terrain_defaults_are_those_of_the_table);
     RUN(terrains_of_every_size_build_and_keep_their_laws);
     RUN(terrain_of_two_columns_builds);
