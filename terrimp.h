@@ -10343,6 +10343,8 @@ static int terrimpi_seats_suit(const terrimp_view *v, const terrimpi_record *rec
                                const uint32_t size[2], uint32_t part_count)
 {
     uint32_t i;
+    if (record->part_count != part_count)
+        return 0;
     for (i = 0; i < part_count; i++) {
         terrimp_rect rect;
         terrimp_live_atlas_rect(&v->atlases[record->parts[i].atlas], record->parts[i].slot, &rect);
@@ -10350,7 +10352,7 @@ static int terrimpi_seats_suit(const terrimp_view *v, const terrimpi_record *rec
             rect.width * 2u > size[0] * 3u || rect.height * 2u > size[1] * 3u)
             return 0;
     }
-    return record->part_count == part_count;
+    return 1;
 }
 
 /* Finds slots for a job: those of the old picture, unless the new one is made in pieces and the old
