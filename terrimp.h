@@ -1591,7 +1591,7 @@ typedef struct terrimp_view_desc {
                                [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
                                ground fades over the impostors [Limits: > fade_start]
-                               [Default 0 -> 1.5 * fade_start] */
+                               [Default 0 -> 1.5 * fade_start; in AUTO 1.25] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
                                much times the root of tolerance_px, but 5 to 15 degrees] */
@@ -9460,7 +9460,8 @@ static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrim
     terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, 4.0f, &result);
     terrimpi_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
                      &result);
-    terrimpi_setting(&d->fade_end, 1.5f * d->fade_start, 0.0f, most, &result);
+    terrimpi_setting(&d->fade_end, (d->mode == TERRIMP_MODE_AUTO ? 1.25f : 1.5f) * d->fade_start,
+                     0.0f, most, &result);
     terrimpi_setting(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse), 0.001f, 1.5f, &result);
     terrimpi_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
     terrimpi_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
