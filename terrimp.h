@@ -10097,7 +10097,7 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
-#define TERRIMPI_SPLIT_SMEAR 4.0f /* ... is split when its smears exceed the tolerance by this */
+#define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears exceed the tolerance by this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
 
 /* A node and where it stands. */
@@ -11214,7 +11214,7 @@ static float terrimpi_depth_error(const terrimp_view *v, uint32_t node,
                                   const terrimp_capture *capture, const terrimp_box *box)
 {
     float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    return terrimpi_min(1.1f * terrimpi_mesh_error(v, node) * capture->z_far /
+    return terrimpi_min(1.1f * v->terrain->meshes[node].error * capture->z_far /
                             terrimpi_max(drop, 1e-20f),
                         capture->z_far);
 }
