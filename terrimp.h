@@ -7247,7 +7247,7 @@ typedef struct terrimpi_smear {
     float saved[TERRIMPI_SPLITS]; /* ... and that a split would spare */
 } terrimpi_smear;
 
-/* Adds the triangle whose indices begin at `own`. Places of a split stand at first + (k + 1) step. */
+/* Adds the triangle whose indices begin at `own`. Places of a split: first + (k + 1) * step. */
 static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
                                const uint16_t *indices, uint32_t index_count, uint32_t own,
                                float reach, float overlap, float first, float step,
@@ -10097,7 +10097,7 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
-#define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears exceed the tolerance by this */
+#define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
 
 /* A node and where it stands. */
