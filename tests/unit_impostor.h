@@ -487,6 +487,9 @@ static void capture_split_stands_behind_what_hides(void)
         CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, reach * 0.2f, 0.5f,
                                     &more) == TERRIMP_OK);
         CHECK(more.gap < split.gap);
+        CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, 1e-3f, 0.5f, &more)
+              == TERRIMP_OK);
+        CHECK(more.gap < 0.1f * split.gap); /* what stays hidden does not count */
         CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, reach, 20.0f, &more)
               == TERRIMP_OK);
         CHECK(more.gap == split.gap && more.gap_left == more.gap);
