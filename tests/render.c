@@ -848,6 +848,95 @@ static void hills_look_like_the_full_mesh(void)
     scene_close(&s);
 }
 
+/* ---- Two parts ---------------------------------------------------------- */
+
+/* By how much more like the full mesh the block has to be, [dB]. */
+#define SPLIT_DB 4.0
+
+enum { RISING_FRAMES = 9, BLOCK_X = 240, BLOCK_Y = 395, BLOCK_WIDTH = 800, BLOCK_HEIGHT = 60 };
+
+/* Ridges that hide the plain behind them: 256 x 256 units, 16 high, one ridge in every 64. */
+static void open_ridges(scene *s)
+{
+    enum { SIDE = 257, PERIOD = 64 };
+    float *heights = (float *)allocate(sizeof *heights * SIDE * SIDE);
+    uint32_t x, z;
+    check_state = 12345u;
+    for (z = 0; z < SIDE; z++)
+        for (x = 0; x < SIDE; x++)
+            heights[z * SIDE + x] = fmaxf(0.0f, 16.0f - 2.0f * fabsf((float)(z % PERIOD) - 20.0f))
+                                    + random_float(-0.1f, 0.1f);
+    memset(s, 0, sizeof *s);
+    s->dem.samples = heights;
+    s->dem.width = s->dem.depth = SIDE;
+    s->dem.format = TERRIMP_FORMAT_F32;
+    s->dem.spacing_x = s->dem.spacing_z = 1.0f;
+    s->field = dem_heightfield(&s->dem);
+    scene_build(s, "ridges", 32);
+    scene_show(s, 1280, 1024, 60.0f, 4096);
+}
+
+/* Rests, then rises round the middle of the terrain: it sees more and more of what was hidden. */
+static flight_pose rising_pose(int frame)
+{
+    float down = (25.0f + 0.4f * (float)(frame > 1 ? frame - 1 : 0)) * DEGREE;
+    flight_pose pose = { { 128.0f, 0.0f, 128.0f }, { 128.0f, 0.0f, 128.0f } };
+    pose.eye[1] = 200.0f * sinf(down);
+    pose.eye[2] -= 200.0f * cosf(down);
+    return pose;
+}
+
+static void cut_block(const scene *s, const uint8_t *rgb, uint8_t *block)
+{
+    int row;
+    for (row = 0; row < BLOCK_HEIGHT; row++)
+        memcpy(block + row * BLOCK_WIDTH * 3,
+               rgb + ((BLOCK_Y + row) * s->width + BLOCK_X) * 3, BLOCK_WIDTH * 3);
+}
+
+/* PSNR of the block behind a crest in the last frame; the block becomes a file in build/test/. */
+static double likeness_behind_crest(scene *s, int no_splits, const char *file, uint32_t *splits)
+{
+    static uint8_t block[BLOCK_WIDTH * BLOCK_HEIGHT * 3], wanted[BLOCK_WIDTH * BLOCK_HEIGHT * 3];
+    terrimp_view_desc settings = manner_named("auto_eager").settings;
+    terrimp_view *view, *full = open_full_view(s);
+    uint8_t *picture = open_picture(s);
+    flight_pose pose;
+    int frame;
+    settings.costs.triangle = 1000.0f; /* impostors wherever they can be */
+    settings.no_splits = no_splits;
+    view = open_view(s, &settings);
+    *splits = 0;
+    for (frame = 0; frame < RISING_FRAMES; frame++) {
+        pose = rising_pose(frame);
+        *splits += draw_pose(s, view, &pose, light_blue, picture).splits;
+    }
+    cut_block(s, picture, block);
+    draw_pose(s, full, &pose, light_blue, picture);
+    cut_block(s, picture, wanted);
+    image_write_png(file, block, BLOCK_WIDTH, BLOCK_HEIGHT); /* to look at */
+    free(picture);
+    terrimp_view_destroy(view);
+    terrimp_view_destroy(full);
+    return image_psnr(image_mean_square(block, wanted, BLOCK_WIDTH * BLOCK_HEIGHT, NULL));
+}
+
+/* A picture in two parts has what a ridge hides, where a whole one smears the ridge over it. */
+static void pictures_in_two_parts_show_what_ridges_hide(void)
+{
+    uint32_t whole_splits, splits;
+    double whole, parts;
+    scene s;
+    open_ridges(&s);
+    whole = likeness_behind_crest(&s, 1, "build/test/smear_before.png", &whole_splits);
+    parts = likeness_behind_crest(&s, 0, "build/test/smear_after.png", &splits);
+    printf("  %s: PSNR behind a crest %.2f dB, with %u pictures in two parts %.2f dB\n", s.name,
+           whole, (unsigned)splits, parts);
+    CHECK(whole_splits == 0 && splits > 0);
+    CHECK(parts > whole + SPLIT_DB);
+    scene_close(&s);
+}
+
 /* ---- Pieces ------------------------------------------------------------- */
 
 /* Rests until no picture is made any more. Returns how many captures the last frames had in all. */
@@ -1401,6 +1490,7 @@ int main(void)
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);
+    RUN(pictures_in_two_parts_show_what_ridges_hide);
     RUN(pictures_in_pieces_are_like_whole_ones);
     RUN(frames_change_no_more_than_those_of_the_full_mesh);
     RUN(no_hole_between_mipmapped_nodes);

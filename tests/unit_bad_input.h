@@ -1373,13 +1373,19 @@ static void pictures_are_not_tightened_or_split_by_bad_numbers(void)
         xyz[6 + k] = capture.eye[k] - capture.forward[k];
     GIVES(TERRIMP_E_BEHIND, terrimp_capture_tighten(&out, xyz, 3));
     CHECK(memcmp(&out, &capture, sizeof out) == 0);
-    GIVES(TERRIMP_E_NULL, terrimp_capture_split(&capture, xyz, 3, indices, 3, NULL));
-    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(NULL, xyz, 3, indices, 3, &split));
-    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(&capture, NULL, 3, indices, 3, &split));
-    REFUSES(TERRIMP_E_NULL, split, terrimp_capture_split(&capture, xyz, 3, NULL, 3, &split));
-    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 0, indices, 3, &split));
-    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 3, indices, 2, &split));
-    REFUSES(TERRIMP_E_RANGE, split, terrimp_capture_split(&capture, xyz, 2, indices, 3, &split));
+    GIVES(TERRIMP_E_NULL, terrimp_capture_split(&capture, xyz, 3, indices, 3, 1.0f, 0.0f, NULL));
+    REFUSES(TERRIMP_E_NULL, split,
+            terrimp_capture_split(NULL, xyz, 3, indices, 3, 1.0f, 0.0f, &split));
+    REFUSES(TERRIMP_E_NULL, split,
+            terrimp_capture_split(&capture, NULL, 3, indices, 3, 1.0f, 0.0f, &split));
+    REFUSES(TERRIMP_E_NULL, split,
+            terrimp_capture_split(&capture, xyz, 3, NULL, 3, 1.0f, 0.0f, &split));
+    REFUSES(TERRIMP_E_RANGE, split,
+            terrimp_capture_split(&capture, xyz, 0, indices, 3, 1.0f, 0.0f, &split));
+    REFUSES(TERRIMP_E_RANGE, split,
+            terrimp_capture_split(&capture, xyz, 3, indices, 2, 1.0f, 0.0f, &split));
+    REFUSES(TERRIMP_E_RANGE, split,
+            terrimp_capture_split(&capture, xyz, 2, indices, 3, 1.0f, 0.0f, &split));
 }
 
 /* Runs last: a code that nothing can provoke would be a promise without a meaning. */

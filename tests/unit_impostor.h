@@ -433,6 +433,79 @@ static void capture_rate_is_the_sum_over_distant_boxes(void)
     }
 }
 
+enum { RIDGE_SIDE = 17 };
+
+/* A level grid, 10 to 26 in front of the eye, with a ridge along x in its row `ridge`. */
+static void make_ridge(int ridge, float height, float *xyz, uint16_t *indices)
+{
+    int x, z;
+    for (z = 0; z < RIDGE_SIDE; z++)
+        for (x = 0; x < RIDGE_SIDE; x++, xyz += 3) {
+            xyz[0] = (float)(x - RIDGE_SIDE / 2);
+            xyz[1] = z == ridge ? height : 0.0f;
+            xyz[2] = -10.0f - (float)z;
+        }
+    for (z = 0; z + 1 < RIDGE_SIDE; z++)
+        for (x = 0; x + 1 < RIDGE_SIDE; x++, indices += 6) {
+            uint16_t a = (uint16_t)(z * RIDGE_SIDE + x), b = (uint16_t)(a + RIDGE_SIDE);
+            indices[0] = a;
+            indices[1] = (uint16_t)(a + 1);
+            indices[2] = indices[3] = b;
+            indices[4] = (uint16_t)(a + 1);
+            indices[5] = (uint16_t)(b + 1);
+        }
+}
+
+/* Nothing comes into sight on a plain; behind a ridge it does, and the more the eye moves the more.
+   The split stands by the overlap behind the ridge; too large an overlap spares nothing. */
+static void capture_split_stands_behind_what_hides(void)
+{
+    enum { INDICES = (RIDGE_SIDE - 1) * (RIDGE_SIDE - 1) * 6, VERTICES = RIDGE_SIDE * RIDGE_SIDE };
+    static float xyz[VERTICES * 3];
+    static uint16_t indices[INDICES];
+    terrimp_capture capture;
+    terrimp_split split, more;
+    int i;
+    memset(&capture, 0, sizeof capture);
+    capture.right[0] = capture.up[1] = 1.0f;
+    capture.forward[2] = -1.0f;
+    for (i = 0; i < 20; i++) {
+        int ridge = (int)random_range(2, 6);
+        float height = random_float(1.5f, 2.5f), reach = random_float(1.5f, 2.5f), crest;
+        capture.eye[1] = height + random_float(1.5f, 2.5f);
+        crest = 10.0f + (float)ridge;
+        make_ridge(ridge, 0.0f, xyz, indices);
+        CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, reach, 0.5f, &split)
+              == TERRIMP_OK);
+        CHECK(split.distance == 0.0f && split.gap == 0.0f && split.gap_left == 0.0f);
+        make_ridge(ridge, height, xyz, indices);
+        CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, reach, 0.5f, &split)
+              == TERRIMP_OK);
+        CHECK(split.gap > 0.0f && split.gap_left < 0.2f * split.gap);
+        CHECK(split.distance > crest - 0.5f);
+        CHECK(split.distance < crest * capture.eye[1] / (capture.eye[1] - height));
+        CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, reach * 0.2f, 0.5f,
+                                    &more) == TERRIMP_OK);
+        CHECK(more.gap < split.gap);
+        CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, 1e-3f, 0.5f, &more)
+              == TERRIMP_OK);
+        CHECK(more.gap < 0.1f * split.gap); /* what stays hidden does not count */
+        CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, reach, 20.0f, &more)
+              == TERRIMP_OK);
+        CHECK(more.gap == split.gap && more.gap_left == more.gap);
+    }
+    more = split;
+    CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, 0.0f, 0.5f, &split)
+          == TERRIMP_E_RANGE);
+    CHECK(terrimp_capture_split(&capture, xyz, VERTICES, indices, INDICES, 1.0f, -1.0f, &split)
+          == TERRIMP_E_RANGE);
+    CHECK(terrimp_capture_split(&capture, xyz, VERTICES - 1, indices, INDICES, 1.0f, 0.5f, &split)
+          == TERRIMP_E_RANGE);
+    CHECK(terrimp_capture_split(NULL, xyz, VERTICES, indices, INDICES, 1.0f, 0.5f, &split)
+          == TERRIMP_E_NULL);
+    CHECK(memcmp(&more, &split, sizeof split) == 0);
+}
+
 static void impostor_tests(void)
 {
     RUN(impostor_size_is_that_of_hess);
@@ -450,6 +523,7 @@ static void impostor_tests(void)
     RUN(lifetime_is_that_of_hess);
     RUN(lifetime_keeps_the_view_angle);
     RUN(capture_rate_is_the_sum_over_distant_boxes);
+    RUN(capture_split_stands_behind_what_hides);
 }
 
 #endif
