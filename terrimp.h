@@ -10620,7 +10620,7 @@ static uint32_t terrimpi_cell_triangles(const terrimp_view *v)
 /* How many triangles the next capture may draw. What is more is left to the next frames. */
 static uint32_t terrimpi_triangles_left(const terrimp_view *v, const terrimpi_spending *s)
 {
-    uint32_t hard = v->desc.max_capture_triangles, left = UINT32_MAX;
+    uint32_t hard = v->desc.max_capture_triangles, left = 0xffffffffu;
     if (!v->desc.no_spreading) {
         float room = (s->allowance - s->cost) / v->desc.costs.triangle;
         left = (uint32_t)terrimpi_clamp(room, 0.0f, 1e9f);
