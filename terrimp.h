@@ -1,4 +1,4 @@
-/* terrimp.h - v0.2.0 - draws large heightfield terrain with terrain impostors - MIT licence
+/* terrimp.h - v0.3.0 - draws large heightfield terrain with terrain impostors - MIT licence
 
    Distant terrain is drawn as pictures of itself: a node of a quadtree is rendered in full detail
    into a slot of a texture atlas, and for many frames after that a coarse mesh of under a hundred
@@ -163,9 +163,9 @@
 #include <stdint.h>
 
 #define TERRIMP_VERSION_MAJOR 0
-#define TERRIMP_VERSION_MINOR 2
+#define TERRIMP_VERSION_MINOR 3
 #define TERRIMP_VERSION_PATCH 0
-#define TERRIMP_VERSION "0.2.0"
+#define TERRIMP_VERSION "0.3.0"
 
 /* Linkage of every public function. TERRIMP_STATIC makes them private to one file. */
 #ifndef TERRIMP_API
@@ -11212,6 +11212,10 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
 #endif /* TERRIMP_IMPLEMENTATION */
 
 /* VERSION HISTORY
+   0.3.0  in mode AUTO the tolerance rules sharpness, view angle and fade; captures that are too
+          large for a frame are made in pieces; terrimp_capture_split counts what comes into sight,
+          and takes how far the eye moves and how far the parts overlap. Gone, as others do the
+          same: terrimp_skirt_counts, terrimp_border_corner_raise, terrimp_terrain_fill_weights
    0.2.0  a quadtree of ground and impostors, one cost model that chooses, a live atlas, a schedule
           that looks ahead, pictures in pieces and in two parts, edits, bakes, building without
           memory of one's own, ground that morphs and whose coarse levels may be fitted
