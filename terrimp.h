@@ -10472,15 +10472,6 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const t
            split.gap_left < split.gap * TERRIMPI_SPLIT_GAIN;
 }
 
-/* The ground that a job draws, for a picture of a size. */
-static void terrimpi_plan_source(const terrimp_view *v, const terrimp_box *box,
-                                 const uint32_t size[2], terrimpi_job *job)
-{
-    job->strip = terrimpi_strip_width(v, job, box, size);
-    job->cell_count = job->cell_to = terrimpi_cell_count(v, job);
-    job->triangles = terrimpi_piece_triangles(v, job);
-}
-
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
    `room` triangles it may be cut. Returns 0 when it cannot be made. */
 static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint32_t room,
@@ -10504,7 +10495,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
         return 0;
     job->part_count = 1;
     job->source = terrimpi_source_level(v, &want->site, terrimp_box_distance(&box, eye));
-    terrimpi_plan_source(v, &box, size, job);
+    job->strip = terrimpi_strip_width(v, job, &box, size);
+    job->cell_count = job->cell_to = terrimpi_cell_count(v, job);
+    job->triangles = terrimpi_piece_triangles(v, job);
     job->in_pieces = v->desc.max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_split_at(v, want, &box, front, &split))
@@ -10514,7 +10507,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     size[0] = job->rects[0].width;
     size[1] = job->rects[0].height;
     terrimp_capture_pad(front, size, TERRIMPI_MARGIN);
-    terrimpi_plan_source(v, &box, size, job);
+    job->strip = terrimpi_strip_width(v, job, &box, size);
     /* The border lies in front of and behind the box that was fitted. */
     border = 1.5f * (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
                             << job->source) *

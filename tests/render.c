@@ -153,6 +153,19 @@ static void add_octave(float *heights, uint32_t side, uint32_t step, float ampli
     free(lattice);
 }
 
+/* A square of heights, a unit apart, which the scene owns from here on. */
+static void scene_of_heights(scene *s, const char *name, float *heights, uint32_t side,
+                             uint32_t chunk_quads)
+{
+    memset(s, 0, sizeof *s);
+    s->dem.samples = heights;
+    s->dem.width = s->dem.depth = side;
+    s->dem.format = TERRIMP_FORMAT_F32;
+    s->dem.spacing_x = s->dem.spacing_z = 1.0f;
+    s->field = dem_heightfield(&s->dem);
+    scene_build(s, name, chunk_quads);
+}
+
 /* Noise with slopes of 45 degrees everywhere, the worst for coarse meshes: 256 x 256 units,
    16 x 16 chunks. */
 static void open_rough(scene *s, int width, int height, float fov_degrees)
@@ -164,13 +177,7 @@ static void open_rough(scene *s, int width, int height, float fov_degrees)
     check_state = 12345u;
     for (step = 64; step; step /= 2)
         add_octave(heights, SIDE, step, 0.6f * (float)step);
-    memset(s, 0, sizeof *s);
-    s->dem.samples = heights;
-    s->dem.width = s->dem.depth = SIDE;
-    s->dem.format = TERRIMP_FORMAT_F32;
-    s->dem.spacing_x = s->dem.spacing_z = 1.0f;
-    s->field = dem_heightfield(&s->dem);
-    scene_build(s, "rough", 16);
+    scene_of_heights(s, "rough", heights, SIDE, 16);
     scene_show(s, width, height, fov_degrees, ATLAS);
 }
 
@@ -866,13 +873,7 @@ static void open_ridges(scene *s)
         for (x = 0; x < SIDE; x++)
             heights[z * SIDE + x] = fmaxf(0.0f, 16.0f - 2.0f * fabsf((float)(z % PERIOD) - 20.0f))
                                     + random_float(-0.1f, 0.1f);
-    memset(s, 0, sizeof *s);
-    s->dem.samples = heights;
-    s->dem.width = s->dem.depth = SIDE;
-    s->dem.format = TERRIMP_FORMAT_F32;
-    s->dem.spacing_x = s->dem.spacing_z = 1.0f;
-    s->field = dem_heightfield(&s->dem);
-    scene_build(s, "ridges", 32);
+    scene_of_heights(s, "ridges", heights, SIDE, 32);
     scene_show(s, 1280, 1024, 60.0f, 4096);
 }
 
