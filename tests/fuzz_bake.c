@@ -72,7 +72,7 @@ static unsigned char *build_block(size_t *bytes)
     desc.triangle_budget = 32u + fuzz_below(100);
     desc.not_proud = fuzz_u8() == 1;
     desc.no_lower_skirts = fuzz_u8() == 1;
-    desc.no_upper_skirts = fuzz_u8() == 1;
+    desc.upper_skirts = fuzz_u8() == 1;
     if (terrimp_terrain_create(&desc, NULL, &terrain) == TERRIMP_OK) {
         *bytes = terrimp_bake_bytes(terrain);
         block = (unsigned char *)fuzz_take(*bytes);

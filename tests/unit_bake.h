@@ -24,7 +24,7 @@ static int bake_land(baked_land *b, uint32_t width, uint32_t depth, int format, 
     b->l.desc.triangle_budget = budget;
     b->l.desc.not_proud = kind % 3 == 0;
     b->l.desc.no_lower_skirts = kind % 4 == 1;
-    b->l.desc.no_upper_skirts = kind % 5 == 1;
+    b->l.desc.upper_skirts = kind % 5 != 1;
     if (!land_build(&b->l))
         return 0;
     b->bytes = terrimp_bake_bytes(b->l.terrain);
