@@ -70,7 +70,10 @@ static const way look_ways[] = {
     GEOMIP(0.5), GEOMIP(1), GEOMIP(4), BOUND(2), BOUND(4)
 };
 
-static const way tile_ways[] = { FULL, AUTO(1), AUTO(2), IMPOSTOR(1), GEOMIP(1), BOUND(2) };
+static const way tile_ways[] = {
+    FULL, AUTO(0.5), AUTO(1), AUTO(2), IMPOSTOR(1),
+    GEOMIP(0.5), GEOMIP(1), GEOMIP(2), GEOMIP(4), BOUND(2)
+};
 
 static const way thesis_ways[] = {
     FULL, AUTO(1), GEOMIP(1), HESS(400, 64), HESS(400, 128),
