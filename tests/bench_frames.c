@@ -102,7 +102,7 @@ typedef struct run {
               .path = "paths/rough.path"
 
 /* Under dear shading, and with trees, the whole path is flown: the first pictures of all nodes take
-   some 17 frames, and a flight of 30 would be one third start, though its figures say they leave
+   16 to 20 frames, and a flight of 30 would be one third start, though its figures say they leave
    that out. */
 enum { LOOK_FRAMES = 120, LOOK_STRIDE = 25 };
 
