@@ -94,7 +94,9 @@ static GLuint make_material(uint32_t index, uint8_t *texels)
     return texture;
 }
 
-/* How much of the sun's light clouds take: 0 in the open, at most 0.55. */
+/* How much of the sun's light clouds take: 0 in the open, at most 0.55. They are soft, and a texel
+   is wider than a pixel but far away: without mipmaps they look the same, and an impostor, of whose
+   two reads this is one, is spared to choose between them. */
 static GLuint make_clouds(uint8_t *texels)
 {
     GLuint texture = make_texture(GL_REPEAT);
@@ -105,7 +107,7 @@ static GLuint make_clouds(uint8_t *texels)
         texels[i] = (uint8_t)(shade * 0.55f * 255.0f + 0.5f);
     }
     glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, DETAIL, DETAIL, 0, GL_RED, GL_UNSIGNED_BYTE, texels);
-    glGenerateMipmap(GL_TEXTURE_2D);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     return texture;
 }
 
