@@ -294,7 +294,7 @@ static terrimp_result send_ground(gl_terrain *g, uint32_t node, uint32_t slot)
     return result;
 }
 
-/* Sends the mesh of a node, or with its own counts the floor. */
+/* Sends the coarse mesh of a node, or the floor, which has its own size. */
 static terrimp_result send_triangles(gl_terrain *g, uint32_t node, uint32_t slot,
                                      size_t vertex_count, size_t index_count)
 {
@@ -312,6 +312,12 @@ static terrimp_result send_triangles(gl_terrain *g, uint32_t node, uint32_t slot
 static terrimp_result send_mesh(gl_terrain *g, uint32_t node, uint32_t slot)
 {
     return send_triangles(g, node, slot, g->mesh_pool.node_vertices, g->mesh_pool.node_indices);
+}
+
+static terrimp_result send_floor(gl_terrain *g)
+{
+    return send_triangles(g, g->mesh_pool.node_count, g->mesh_pool.slot_count, g->floor_vertices,
+                          g->floor_indices);
 }
 
 /* All nodes share the indices of ground: a draw names its node by the base vertex. */
@@ -336,27 +342,29 @@ static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *inf
 static terrimp_result fill_meshes(gl_terrain *g, const terrimp_terrain_info *info, size_t bytes)
 {
     gl_pool *p = &g->mesh_pool;
-    size_t floor_vertices, floor_indices;
     p->send = send_mesh;
     p->node_vertices = info->mesh_vertex_stride;
     p->node_indices = info->mesh_index_stride;
-    floor_vertices = info->mesh_vertex_count - info->node_count * p->node_vertices;
-    floor_indices = info->mesh_index_count - info->node_count * p->node_indices;
     if (!open_pool(p, info->node_count, bytes))
         return TERRIMP_E_MEMORY;
-    make_buffers(p, floor_vertices, floor_indices);
+    make_buffers(p, g->floor_vertices, g->floor_indices);
     fill_pool(g, p);
-    return send_triangles(g, info->node_count, p->slot_count, floor_vertices, floor_indices);
+    return send_floor(g);
+}
+
+static size_t larger(size_t a, size_t b)
+{
+    return a > b ? a : b;
 }
 
 /* Room for what is sent of a node, or of the floor. */
 static int make_room(gl_terrain *g, const terrimp_terrain_info *info)
 {
-    size_t others = info->node_count - 1; /* all meshes but one, and the floor */
-    size_t vertices = info->mesh_vertex_count - others * info->mesh_vertex_stride;
-    size_t indices = info->mesh_index_count - others * info->mesh_index_stride;
-    if (vertices < info->ground_vertex_count)
-        vertices = info->ground_vertex_count;
+    size_t vertices = larger(info->ground_vertex_count, info->mesh_vertex_stride), indices;
+    g->floor_vertices = info->mesh_vertex_count - info->node_count * info->mesh_vertex_stride;
+    g->floor_indices = info->mesh_index_count - info->node_count * info->mesh_index_stride;
+    vertices = larger(vertices, g->floor_vertices);
+    indices = larger(info->mesh_index_stride, g->floor_indices);
     g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
     g->indices = malloc(indices * sizeof *g->indices);
     g->morph = malloc(info->ground_vertex_count * sizeof *g->morph);
@@ -760,7 +768,10 @@ static terrimp_result resend(gl_terrain *g, const gl_pool *p, uint32_t node)
 
 terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node)
 {
-    terrimp_result result = resend(g, &g->ground_pool, node);
+    terrimp_result result;
+    if (node == g->mesh_pool.node_count)
+        return send_floor(g);
+    result = resend(g, &g->ground_pool, node);
     return result == TERRIMP_OK ? resend(g, &g->mesh_pool, node) : result;
 }
 

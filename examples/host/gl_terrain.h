@@ -49,8 +49,8 @@ typedef struct gl_batch {
 
 struct gl_terrain;
 
-/* Slots of one size in a pair of buffers, for what nodes are drawn from: as many nodes as fit, those
-   that were drawn last. */
+/* Slots of one size in a pair of buffers, for what nodes are drawn from: as many nodes as fit,
+   those that were drawn last. */
 typedef struct gl_pool {
     terrimp_result (*send)(struct gl_terrain *g, uint32_t node, uint32_t slot);
     GLuint array, vertices, indices;
@@ -87,6 +87,7 @@ typedef struct gl_terrain {
     const terrimp_terrain *terrain;
     const char *shading;
     gl_pool ground_pool, mesh_pool;  /* behind the slots of meshes stands the floor */
+    size_t floor_vertices, floor_indices;
     uint32_t frame_number;
     GLuint morphing_array, moves, weights; /* with morphing */
     float *xyz;                      /* of one node, to be sent, like the next two */
@@ -114,7 +115,8 @@ const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc);
 /* Prepares for ground commands that morph. Returns null, or what is wrong. */
 const char *gl_terrain_use_morphing(gl_terrain *g);
 
-/* After an edit: sends a node's ground and its coarse mesh anew. */
+/* After an edit: sends a node's ground and its coarse mesh anew; with the number of nodes for a
+   node, the floor. */
 terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node);
 
 /* Starts a frame: clears it to the sky's colour and takes the camera's matrices. */
