@@ -13,7 +13,9 @@
 
    Every size is measured in a process of its own, so that the memory of each can be told. The full
    mesh is drawn in every sixth frame, up to 4097 samples; above that it would take seconds, and
-   more memory than the 1 GiB that all must fit into. */
+   more memory than the 1 GiB that all must fit into. In those frames all pictures are read, too:
+   beyond the end of a small terrain is sky, and the less terrain there is to see, the less of it is
+   drawn, which growth with the size has to be told from. */
 #define _POSIX_C_SOURCE 200112L
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
@@ -49,6 +51,7 @@ static const scene_desc scale_scenes[SIZES] = {
 /* What is kept of a size; medians, 0 where the way was not drawn. */
 typedef struct outcome {
     double ms[WAYS], cpu_ms[WAYS];
+    double terrain[WAYS]; /* share of the pictures, mean */
     double quad_ms, make_s, build_s, samples_mib, terrain_mib, peak_mib;
 } outcome;
 
@@ -64,70 +67,96 @@ static double peak_mib(void)
     return (double)usage.ru_maxrss / 1024.0;
 }
 
+static double terrain_share(const uint8_t *rgb)
+{
+    size_t i, terrain = 0;
+    for (i = 0; i < SCENE_PIXELS; i++)
+        terrain += memcmp(rgb + i * 3, scene_sky, 3) != 0;
+    return (double)terrain / SCENE_PIXELS;
+}
+
 /* The first contender is the full mesh; a size without it has a null view there. */
-static void fly(scene *s, contender *ways, look *l, quad *q)
+static void fly(scene *s, contender *ways, stats *shares, look *l, quad *q)
 {
     size_t count = s->tour.flight.count, start = count / 6 < 20 ? count / 6 : 20, frame;
     int i;
     for (frame = 0; frame < count; frame++) {
         terrimp_camera camera = tour_camera(&s->tour, &s->box, frame);
-        int with_full = ways[0].view && frame >= start && (frame - start) % FULL_EVERY == 0;
+        int is_read = frame >= start && (frame - start) % FULL_EVERY == 0;
+        int with_full = is_read && ways[0].view;
         l->seconds = (float)frame / SCENE_FPS;
         for (i = with_full ? 0 : 1; i < WAYS; i++) {
             contender *c = &ways[i];
             contender_draw(c, camera, frame < start);
-            if (!with_full)
+            if (!is_read)
                 continue;
             contender_read(c, s->context, frame);
-            stats_add(&c->psnr_terrain, image_psnr(image_mean_square(c->picture, ways[0].picture,
-                                                                     SCENE_PIXELS, scene_sky)));
+            stats_add(&shares[i], terrain_share(c->picture));
+            if (with_full)
+                stats_add(&c->psnr_terrain,
+                          image_psnr(image_mean_square(c->picture, ways[0].picture, SCENE_PIXELS,
+                                                       scene_sky)));
         }
         if (frame >= start)
             quad_draw(q, s->context, ways[1].gl->lightmap);
     }
 }
 
-static void say_way(const scene_desc *desc, const contender *c, double quad_ms)
+static void say_way(const scene_desc *desc, const contender *c, double share, double quad_ms)
 {
     stats_summary ms = stats_summarise(&c->ms), cpu = stats_summarise(&c->cpu_ms);
     double n = c->frames;
-    say("| %u | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | ",
+    say("| %u | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | ",
         (unsigned)desc->size, c->way->name, ms.median, ms.mean, ms.deviation, ms.p95, ms.p99,
-        ms.worst, cpu.median, ms.median / quad_ms);
+        ms.worst, cpu.median, ms.median / quad_ms, share * 100.0);
     if (c->psnr_terrain.count && c->way->mode != TERRIMP_MODE_FULL)
         say("%.2f", mean(&c->psnr_terrain));
     say(" | %.0f | %.0f | %.2f | %.0f |\n", c->triangles / n, c->draws / n, c->captures / n,
         c->captured_texels / n / 1e3);
 }
 
+/* OpenGL has its own: of a very large terrain 21 MiB. */
+static void free_light(scene *s)
+{
+    free(s->lightmap);
+    free(s->light_samples);
+    s->lightmap = NULL;
+    s->light_samples = NULL;
+}
+
 static void measure(const scene_desc *desc, const context *frame, outcome *out)
 {
     static contender ways[WAYS];
+    static stats shares[WAYS];
     double start = clock_ms();
     scene s;
     look l;
     quad q;
     int i;
     memset(ways, 0, sizeof ways);
+    memset(shares, 0, sizeof shares);
     scene_open(&s, desc, frame, bench_frames(72));
     out->make_s = (clock_ms() - start) * 1e-3;
-    s.vertex_bytes = (size_t)48 << 20;
+    s.vertex_bytes = (size_t)(desc->size <= FULL_UP_TO ? 64 : 32) << 20; /* a frame, and more */
     s.shared_atlas = 4096; /* the view's default: of three ways one keeps pictures */
     look_open(&l, LOOK_LIGHTMAP, &s);
     quad_open(&q);
     for (i = desc->size <= FULL_UP_TO ? 0 : 1; i < WAYS; i++)
         contender_open(&ways[i], &scale_ways[i], &s, &l);
+    free_light(&s);
     out->build_s = s.build_s[0];
     out->samples_mib = (double)desc->size * desc->size * 2.0 / 1048576.0;
     out->terrain_mib = (double)terrimp_bake_bytes(s.terrain[0]) / 1048576.0;
-    fly(&s, ways, &l, &q);
+    fly(&s, ways, shares, &l, &q);
     out->quad_ms = stats_summarise(&q.ms).median;
     for (i = 0; i < WAYS; i++) {
         if (!ways[i].view)
             continue;
         out->ms[i] = stats_summarise(&ways[i].ms).median;
         out->cpu_ms[i] = stats_summarise(&ways[i].cpu_ms).median;
-        say_way(desc, &ways[i], out->quad_ms);
+        out->terrain[i] = mean(&shares[i]);
+        say_way(desc, &ways[i], out->terrain[i], out->quad_ms);
+        stats_free(&shares[i]);
         contender_close(&ways[i]);
     }
     out->peak_mib = peak_mib();
@@ -140,11 +169,11 @@ static void say_headings(void)
 {
     say_machine(context_renderer());
     say("Pictures of %d x %d; %zu frames of the thesis' circle, 80 units a second; ms of the "
-        "clock, quads: over that of a textured\nquad over the whole picture; PSNR [dB] against the "
-        "full mesh, over terrain.\n\n| samples | way | median | mean | sd | 95 %% | 99 %% | worst "
-        "| CPU "
-        "| quads | PSNR | triangles | draws | captures | ktexels |\n"
-        "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n", SCENE_WIDTH,
+        "clock, quads: over that of a textured\nquad over the whole picture; terrain: percentage "
+        "of the picture that is not sky; PSNR [dB] against the\nfull mesh, over terrain.\n\n"
+        "| samples | way | median | mean | sd | 95 %% | 99 %% | worst | CPU | quads | terrain "
+        "| PSNR | triangles | draws | captures | ktexels |\n"
+        "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n", SCENE_WIDTH,
         SCENE_HEIGHT, bench_frames(72));
 }
 
@@ -201,31 +230,45 @@ static void say_sizes(void)
     }
 }
 
-/* Each size's median over that of 1025 samples. */
+/* Processor time for what of the picture is terrain. */
+static double cpu_per_terrain(const outcome *o, int w)
+{
+    return o->cpu_ms[w] / o->terrain[w];
+}
+
+static void say_growth_of(const scene_desc *desc, const outcome *o, const outcome *one)
+{
+    int w;
+    say("| %u |", (unsigned)desc->size);
+    for (w = 1; w < WAYS; w++)
+        say(" %.2f |", o->ms[w] / one->ms[w]);
+    for (w = 1; w < WAYS; w++)
+        say(" %.2f |", o->cpu_ms[w] / one->cpu_ms[w]);
+    say(" %.2f |", o->terrain[WAYS - 1] / one->terrain[WAYS - 1]);
+    for (w = 1; w < WAYS; w++)
+        say(" %.2f |", cpu_per_terrain(o, w) / cpu_per_terrain(one, w));
+    if (o->ms[0] > 0.0)
+        say(" %.2f |\n", o->ms[0] / one->ms[0]);
+    else
+        say(" |\n");
+}
+
+/* Each size's figures over those of 1025 samples. */
 static void say_growth(void)
 {
     const outcome *one = &outcomes[1];
     size_t i;
-    int w;
     if (one->quad_ms <= 0.0)
         return;
-    say("\nGrowth of the median from 1025 samples a side on; CPU: of the processor's time:\n\n"
-        "| samples | geomip | auto | geomip, CPU | auto, CPU | full |\n"
-        "|--:|--:|--:|--:|--:|--:|\n");
-    for (i = 1; i < SIZES; i++) {
-        const outcome *o = &outcomes[i];
-        if (o->quad_ms <= 0.0)
-            continue;
-        say("| %u |", (unsigned)scale_scenes[i].size);
-        for (w = 1; w < WAYS; w++)
-            say(" %.2f |", o->ms[w] / one->ms[w]);
-        for (w = 1; w < WAYS; w++)
-            say(" %.2f |", o->cpu_ms[w] / one->cpu_ms[w]);
-        if (o->ms[0] > 0.0)
-            say(" %.2f |\n", o->ms[0] / one->ms[0]);
-        else
-            say(" |\n");
-    }
+    say("\nGrowth of the median from 1025 samples a side on; CPU: of the processor's time; "
+        "terrain: of its share of the picture;\nCPU a terrain pixel: of the processor's time over "
+        "that share:\n\n"
+        "| samples | geomip | auto | geomip, CPU | auto, CPU | terrain "
+        "| geomip, CPU a terrain pixel | auto, CPU a terrain pixel | full |\n"
+        "|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+    for (i = 1; i < SIZES; i++)
+        if (outcomes[i].quad_ms > 0.0)
+            say_growth_of(&scale_scenes[i], &outcomes[i], one);
 }
 
 static int is_wanted(const scene_desc *desc)

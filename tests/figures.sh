@@ -119,7 +119,7 @@ rows() # file.tsv
 scale()
 {
     awk -F '\t' '$1 == "samples" { table++ } table == 1' $results/scale.tsv |
-        cut -f 1-3,7,9-14 > $new/scale.tsv
+        cut -f 1-3,7,9-15 > $new/scale.tsv
     rows $new/scale.tsv
 }
 

@@ -63,6 +63,8 @@ typedef struct scene {
     float fov;                    /* vertical [rad] */
     int width, height;            /* of its pictures */
     size_t pixels;
+    size_t vertex_bytes, mesh_bytes; /* of gl_terrain_desc */
+    uint8_t *lightmap;            /* made when OpenGL is first filled; edits leave it as it is */
     context context;
     gl_terrain gl;
 } scene;
@@ -87,17 +89,19 @@ static void scene_build(scene *s, const char *name, uint32_t chunk_quads)
 /* Fills the buffers of OpenGL; a view has to have atlases of the same size. */
 static void scene_fill(scene *s, uint32_t atlas)
 {
-    uint8_t *lightmap = lightmap_bake(&s->field);
     gl_terrain_desc desc;
-    need(lightmap ? NULL : "no lightmap");
+    if (!s->lightmap)
+        s->lightmap = lightmap_bake(&s->field);
+    need(s->lightmap ? NULL : "no lightmap");
     memset(&desc, 0, sizeof desc);
     desc.frame = &s->context;
     desc.terrain = s->terrain;
     desc.field = &s->field;
-    desc.lightmap = lightmap;
+    desc.lightmap = s->lightmap;
     desc.atlas_size = atlas;
+    desc.vertex_bytes = s->vertex_bytes;
+    desc.mesh_bytes = s->mesh_bytes;
     need(gl_terrain_open(&s->gl, &desc));
-    free(lightmap);
 }
 
 static void scene_show(scene *s, int width, int height, float fov_degrees, uint32_t atlas)
@@ -116,6 +120,7 @@ static void scene_close(scene *s)
     context_close(&s->context);
     terrimp_terrain_destroy(s->terrain);
     dem_free(&s->dem);
+    free(s->lightmap);
     memset(s, 0, sizeof *s);
 }
 
@@ -1314,6 +1319,141 @@ static void the_same_flight_gives_the_same_commands_and_pixels(void)
     }
 }
 
+/* ---- Pools of nodes ----------------------------------------------------- */
+
+/* OpenGL anew, with so much memory for ground and for coarse meshes; 0: for all. */
+static void refill_scene(scene *s, size_t vertex_bytes, size_t mesh_bytes)
+{
+    gl_terrain_close(&s->gl);
+    s->vertex_bytes = vertex_bytes;
+    s->mesh_bytes = mesh_bytes;
+    scene_fill(s, ATLAS);
+}
+
+/* A flight, and the outlines of its last frame. */
+static void fly_over_pools(scene *s, const terrimp_view_desc *settings, uint8_t *pictures)
+{
+    flight_pose poses[WILD_FRAMES];
+    terrimp_view *view = open_view(s, settings);
+    int i;
+    wild_flight(s, 60.0f, poses);
+    for (i = 0; i < WILD_FRAMES; i++)
+        draw_pose(s, view, &poses[i], light_blue, pictures + (size_t)i * s->pixels * 3);
+    need_ok(gl_terrain_wireframe(&s->gl, view));
+    context_read(&s->context, pictures + (size_t)WILD_FRAMES * s->pixels * 3);
+    terrimp_view_destroy(view);
+}
+
+/* Has to make room all the time, and in the middle of a frame. */
+static void check_small_pools(scene *s, const char *what, size_t vertex_bytes, size_t mesh_bytes)
+{
+    terrimp_view_desc settings = manner_named(what).settings;
+    size_t bytes = (WILD_FRAMES + 1) * s->pixels * 3;
+    uint8_t *all = (uint8_t *)allocate(bytes), *some = (uint8_t *)allocate(bytes);
+    const gl_pool *ground = &s->gl.ground_pool, *meshes = &s->gl.mesh_pool;
+    refill_scene(s, 0, 0);
+    CHECK(ground->slot_count == s->info.node_count && ground->filled == ground->slot_count);
+    CHECK(meshes->slot_count == s->info.node_count && meshes->filled == meshes->slot_count);
+    fly_over_pools(s, &settings, all);
+    refill_scene(s, vertex_bytes, mesh_bytes);
+    CHECK(ground->slot_count < s->info.node_count && ground->filled == 0);
+    CHECK(meshes->slot_count < s->info.node_count && meshes->filled == 0);
+    fly_over_pools(s, &settings, some);
+    printf("  %s: room for %u of %u nodes' ground and %u meshes\n", what,
+           (unsigned)ground->slot_count, (unsigned)s->info.node_count,
+           (unsigned)meshes->slot_count);
+    CHECK(ground->filled == ground->slot_count);
+    CHECK(meshes->filled == meshes->slot_count);
+    CHECK(memcmp(all, some, bytes) == 0);
+    free(all);
+    free(some);
+}
+
+static void pools_of_any_size_draw_the_same_pictures(void)
+{
+    scene s;
+    open_hills(&s, 320, 256, 40.0f);
+    check_small_pools(&s, "impostor_eager", 1, 1);
+    check_small_pools(&s, "auto_eager", (size_t)40 * 33 * 33 * 12, 20000);
+    scene_close(&s);
+}
+
+static terrimp_stats draw_once(scene *s, const terrimp_view_desc *settings, uint8_t *rgb)
+{
+    flight_pose pose = pose_at(s, 0.1f, 0.1f, 60.0f, 45.0f, 30.0f);
+    terrimp_view *view = open_view(s, settings);
+    terrimp_stats stats = draw_pose(s, view, &pose, light_blue, rgb);
+    terrimp_view_destroy(view);
+    return stats;
+}
+
+/* Turns a part of a terrain of floats upside down, and sends what that touches. */
+static void edit_scene(scene *s)
+{
+    static const terrimp_rect rect = { 90, 70, 60, 80 };
+    float *heights = (float *)s->dem.samples;
+    uint32_t *nodes = (uint32_t *)allocate(s->info.node_count * sizeof *nodes), count, x, z;
+    terrimp_terrain_desc desc;
+    float low, high;
+    size_t bytes;
+    void *scratch;
+    need_ok(terrimp_heightfield_bounds(&s->field, 0, 0, s->field.width, s->field.depth, &low,
+                                       &high));
+    for (z = rect.y; z < rect.y + rect.height; z++)
+        for (x = rect.x; x < rect.x + rect.width; x++)
+            heights[z * s->dem.width + x] = low + high - heights[z * s->dem.width + x];
+    memset(&desc, 0, sizeof desc);
+    desc.field = s->field;
+    desc.chunk_quads = s->info.chunk_quads;
+    bytes = terrimp_terrain_scratch_bytes(&desc);
+    scratch = allocate(bytes);
+    need_ok(terrimp_terrain_rebuild(s->terrain, &rect, scratch, bytes));
+    need_ok(terrimp_terrain_touched(s->terrain, &rect, 1, nodes, s->info.node_count, &count));
+    for (x = 0; x < count; x++)
+        need_ok(gl_terrain_refill(&s->gl, nodes[x]));
+    need_ok(gl_terrain_refill(&s->gl, s->info.node_count));
+    free(scratch);
+    free(nodes);
+}
+
+static void check_refill(const char *what, float morph_ratio, size_t bytes)
+{
+    terrimp_view_desc settings = manner_named(what).settings;
+    uint8_t *before, *edited, *anew;
+    terrimp_stats stats;
+    scene s;
+    open_rough(&s, 320, 256, 60.0f);
+    settings.morph_ratio = morph_ratio;
+    before = open_picture(&s);
+    edited = open_picture(&s);
+    anew = open_picture(&s);
+    refill_scene(&s, bytes, bytes);
+    if (morph_ratio > 1.0f)
+        need(gl_terrain_use_morphing(&s.gl));
+    stats = draw_once(&s, &settings, before);
+    CHECK((stats.impostors > 0) == (settings.mode == TERRIMP_MODE_IMPOSTOR));
+    edit_scene(&s);
+    draw_once(&s, &settings, edited);
+    gl_terrain_close(&s.gl);
+    scene_fill(&s, ATLAS);
+    if (morph_ratio > 1.0f)
+        need(gl_terrain_use_morphing(&s.gl));
+    draw_once(&s, &settings, anew);
+    CHECK(memcmp(before, edited, s.pixels * 3) != 0);
+    CHECK(memcmp(edited, anew, s.pixels * 3) == 0);
+    free(before);
+    free(edited);
+    free(anew);
+    scene_close(&s);
+}
+
+static void what_an_edit_touches_is_drawn_like_anew(void)
+{
+    check_refill("impostor_eager", 1.0f, 0);
+    check_refill("impostor_eager", 1.0f, 30000);
+    check_refill("geomip", 1.5f, 0);
+}
+
 /* The run over OSMesa leaves a picture for the run over EGL, which compares: run.sh keeps the
    order. */
 static void both_systems_draw_the_same_picture(void)
@@ -1498,6 +1638,8 @@ int main(void)
     RUN(long_flights_over_mipmapped_tiles_leave_no_hole);
     RUN(mipmapped_terrain_looks_like_the_full_mesh);
     RUN(the_same_flight_gives_the_same_commands_and_pixels);
+    RUN(pools_of_any_size_draw_the_same_pictures);
+    RUN(what_an_edit_touches_is_drawn_like_anew);
     RUN(both_systems_draw_the_same_picture);
     RUN(captures_keep_to_their_slots);
     RUN(frames_show_nothing_from_outside_of_the_slots);

@@ -185,36 +185,55 @@ void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t of
 
 /* ---- Buffers and textures ----------------------------------------------- */
 
-static void make_array(GLuint *array, GLuint *vertices, GLuint *indices)
+/* Indices are sent as if they were vertices: the other target belongs to the bound vertex array. */
+static void send(GLuint buffer, size_t first, size_t bytes, const void *data)
 {
-    glGenVertexArrays(1, array);
-    glBindVertexArray(*array);
-    glGenBuffers(1, vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, *vertices);
-    glGenBuffers(1, indices);
-    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, *indices);
-    glEnableVertexAttribArray(0);
-    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
+    glBindBuffer(GL_ARRAY_BUFFER, buffer);
+    glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)bytes, data);
 }
 
-/* Sends a node's vertices to a slot. */
-static terrimp_result fill_slot(gl_terrain *g, uint32_t node, uint32_t slot)
+/* A pool for as many nodes as fit into so many bytes, at least one and at most all. */
+static int open_pool(gl_pool *p, uint32_t node_count, size_t bytes)
 {
-    gl_pool *p = &g->pool;
-    size_t bytes = p->node_vertices * 3 * sizeof *p->xyz;
-    terrimp_result result = terrimp_terrain_fill_ground(g->terrain, node, p->xyz,
-                                                        (size_t)p->node_vertices * 3);
-    if (result != TERRIMP_OK)
-        return result;
+    size_t slot_bytes = p->node_vertices * 3 * sizeof(float) + p->node_indices * sizeof(uint16_t);
+    size_t slots = bytes / slot_bytes;
+    p->node_count = node_count;
+    p->slot_count = slots < 1 ? 1 : slots < node_count ? (uint32_t)slots : node_count;
+    p->slot_of = malloc(p->node_count * sizeof *p->slot_of);
+    p->node_of = calloc(p->slot_count, sizeof *p->node_of);
+    p->used = calloc(p->slot_count, sizeof *p->used);
+    if (!p->slot_of || !p->node_of || !p->used)
+        return 0;
+    memset(p->slot_of, 0xff, p->node_count * sizeof *p->slot_of);
+    return 1;
+}
+
+/* Its buffers; `vertices` and `indices` are those that stand behind the slots. */
+static void make_buffers(gl_pool *p, size_t vertices, size_t indices)
+{
+    vertices += (size_t)p->slot_count * p->node_vertices;
+    indices += (size_t)p->slot_count * p->node_indices;
+    glGenVertexArrays(1, &p->array);
+    glBindVertexArray(p->array);
+    glGenBuffers(1, &p->vertices);
     glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
-    glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(slot * bytes), (GLsizeiptr)bytes, p->xyz);
-    if (!p->moves)
-        return TERRIMP_OK;
-    bytes = p->node_vertices * sizeof *p->morph;
-    result = terrimp_terrain_fill_morph(g->terrain, node, p->morph, p->node_vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, p->moves);
-    glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(slot * bytes), (GLsizeiptr)bytes, p->morph);
-    return result;
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(vertices * 3 * sizeof(float)), NULL,
+                 GL_STATIC_DRAW);
+    glGenBuffers(1, &p->indices);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, p->indices);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(indices * sizeof(uint16_t)), NULL,
+                 GL_STATIC_DRAW);
+    gl_point(0, 3, GL_FLOAT, 0, 0);
+}
+
+static void close_pool(gl_pool *p)
+{
+    glDeleteVertexArrays(1, &p->array);
+    glDeleteBuffers(1, &p->vertices);
+    glDeleteBuffers(1, &p->indices);
+    free(p->slot_of);
+    free(p->node_of);
+    free(p->used);
 }
 
 /* The slot that was drawn longest ago. */
@@ -229,10 +248,9 @@ static uint32_t oldest_slot(const gl_pool *p)
 
 static void flush(gl_terrain *g);
 
-/* The slot with a node's vertices; they are made when they are not there. */
-static uint32_t slot_of(gl_terrain *g, uint32_t node)
+/* The slot of a node that is to be drawn; it is filled when the node is not there. */
+static uint32_t slot_of(gl_terrain *g, gl_pool *p, uint32_t node)
 {
-    gl_pool *p = &g->pool;
     uint32_t slot = p->slot_of[node];
     if (slot == UINT32_MAX) {
         if (p->filled < p->slot_count) {
@@ -245,46 +263,112 @@ static uint32_t slot_of(gl_terrain *g, uint32_t node)
         }
         p->slot_of[node] = slot;
         p->node_of[slot] = node;
-        fill_slot(g, node, slot);
+        p->send(g, node, slot);
     }
     p->used[slot] = g->frame_number;
     return slot;
 }
 
-/* Nodes stand one after the other in one buffer: a draw names its node by the base vertex. If all
-   nodes fit they are made now, so that no frame pays for them. */
-static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *info,
-                                  size_t vertex_bytes)
+/* If all nodes fit they are sent now, so that no frame pays for them. */
+static void fill_pool(gl_terrain *g, gl_pool *p)
 {
-    gl_pool *p = &g->pool;
-    size_t bytes = info->ground_vertex_count * 3 * sizeof *p->xyz, i;
+    uint32_t node;
+    for (node = 0; p->slot_count == p->node_count && node < p->node_count; node++)
+        slot_of(g, p, node);
+}
+
+static terrimp_result send_ground(gl_terrain *g, uint32_t node, uint32_t slot)
+{
+    const gl_pool *p = &g->ground_pool;
+    size_t bytes = p->node_vertices * 3 * sizeof *g->xyz;
+    terrimp_result result = terrimp_terrain_fill_ground(g->terrain, node, g->xyz,
+                                                        (size_t)p->node_vertices * 3);
+    if (result != TERRIMP_OK)
+        return result;
+    send(p->vertices, slot * bytes, bytes, g->xyz);
+    if (!g->moves)
+        return TERRIMP_OK;
+    bytes = p->node_vertices * sizeof *g->morph;
+    result = terrimp_terrain_fill_morph(g->terrain, node, g->morph, p->node_vertices);
+    send(g->moves, slot * bytes, bytes, g->morph);
+    return result;
+}
+
+/* Sends the coarse mesh of a node, or the floor, which has its own size. */
+static terrimp_result send_triangles(gl_terrain *g, uint32_t node, uint32_t slot,
+                                     size_t vertex_count, size_t index_count)
+{
+    const gl_pool *p = &g->mesh_pool;
+    size_t vertex_bytes = 3 * sizeof *g->xyz, index_bytes = sizeof *g->indices;
+    terrimp_result result = terrimp_terrain_fill_mesh(g->terrain, node, g->xyz, vertex_count * 3,
+                                                      g->indices, index_count);
+    if (result != TERRIMP_OK)
+        return result;
+    send(p->vertices, slot * p->node_vertices * vertex_bytes, vertex_count * vertex_bytes, g->xyz);
+    send(p->indices, slot * p->node_indices * index_bytes, index_count * index_bytes, g->indices);
+    return TERRIMP_OK;
+}
+
+static terrimp_result send_mesh(gl_terrain *g, uint32_t node, uint32_t slot)
+{
+    return send_triangles(g, node, slot, g->mesh_pool.node_vertices, g->mesh_pool.node_indices);
+}
+
+static terrimp_result send_floor(gl_terrain *g)
+{
+    return send_triangles(g, g->mesh_pool.node_count, g->mesh_pool.slot_count, g->floor_vertices,
+                          g->floor_indices);
+}
+
+/* All nodes share the indices of ground: a draw names its node by the base vertex. */
+static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *info, size_t bytes)
+{
+    gl_pool *p = &g->ground_pool;
     terrimp_result result = TERRIMP_E_MEMORY;
     uint16_t *indices;
+    p->send = send_ground;
     p->node_vertices = info->ground_vertex_count;
-    p->node_count = info->node_count;
-    p->slot_count = (uint32_t)(vertex_bytes / bytes);
-    if (p->slot_count > p->node_count)
-        p->slot_count = p->node_count;
-    p->slot_of = malloc(p->node_count * sizeof *p->slot_of);
-    p->node_of = calloc(p->slot_count, sizeof *p->node_of);
-    p->used = calloc(p->slot_count, sizeof *p->used);
-    p->xyz = malloc(bytes);
-    p->morph = malloc(p->node_vertices * sizeof *p->morph);
-    if (!p->slot_of || !p->node_of || !p->used || !p->xyz || !p->morph)
+    if (!open_pool(p, info->node_count, bytes))
         return result;
-    memset(p->slot_of, 0xff, p->node_count * sizeof *p->slot_of);
-    make_array(&p->array, &p->vertices, &g->ground_indices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(p->slot_count * bytes), NULL, GL_STATIC_DRAW);
-    glBufferData(GL_ELEMENT_ARRAY_BUFFER,
-                 (GLsizeiptr)(info->ground_index_count * sizeof *indices), NULL, GL_STATIC_DRAW);
+    make_buffers(p, 0, info->ground_index_count);
     indices = glMapBuffer(GL_ELEMENT_ARRAY_BUFFER, GL_WRITE_ONLY);
     if (indices)
         result = terrimp_terrain_fill_indices(g->terrain, indices, info->ground_index_count);
     glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
-    if (p->slot_count == p->node_count)
-        for (i = 0; i < p->node_count; i++)
-            slot_of(g, (uint32_t)i);
+    fill_pool(g, p);
     return result;
+}
+
+static terrimp_result fill_meshes(gl_terrain *g, const terrimp_terrain_info *info, size_t bytes)
+{
+    gl_pool *p = &g->mesh_pool;
+    p->send = send_mesh;
+    p->node_vertices = info->mesh_vertex_stride;
+    p->node_indices = info->mesh_index_stride;
+    if (!open_pool(p, info->node_count, bytes))
+        return TERRIMP_E_MEMORY;
+    make_buffers(p, g->floor_vertices, g->floor_indices);
+    fill_pool(g, p);
+    return send_floor(g);
+}
+
+static size_t larger(size_t a, size_t b)
+{
+    return a > b ? a : b;
+}
+
+/* Room for what is sent of a node, or of the floor. */
+static int make_room(gl_terrain *g, const terrimp_terrain_info *info)
+{
+    size_t vertices = larger(info->ground_vertex_count, info->mesh_vertex_stride), indices;
+    g->floor_vertices = info->mesh_vertex_count - info->node_count * info->mesh_vertex_stride;
+    g->floor_indices = info->mesh_index_count - info->node_count * info->mesh_index_stride;
+    vertices = larger(vertices, g->floor_vertices);
+    indices = larger(info->mesh_index_stride, g->floor_indices);
+    g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
+    g->indices = malloc(indices * sizeof *g->indices);
+    g->morph = malloc(info->ground_vertex_count * sizeof *g->morph);
+    return g->xyz && g->indices && g->morph;
 }
 
 /* Weights are the same in every node. */
@@ -295,7 +379,7 @@ static void point_weight(GLuint location, GLint size, size_t offset)
 
 const char *gl_terrain_use_morphing(gl_terrain *g)
 {
-    gl_pool *p = &g->pool;
+    const gl_pool *p = &g->ground_pool;
     terrimp_geomip_weights *weights = malloc(p->node_vertices * sizeof *weights);
     terrimp_terrain_info info;
     uint32_t i;
@@ -304,11 +388,11 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
     terrimp_terrain_get_info(g->terrain, &info);
     terrimp_geomip_fill_weights(info.chunk_quads, TERRIMP_FORM_LIST, weights);
     g->morphing = make_shaded(g, gl_morphing_vertex, ground_main);
-    glGenVertexArrays(1, &p->morphing_array);
-    glBindVertexArray(p->morphing_array);
-    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, g->ground_indices);
-    glGenBuffers(1, &p->weights);
-    glBindBuffer(GL_ARRAY_BUFFER, p->weights);
+    glGenVertexArrays(1, &g->morphing_array);
+    glBindVertexArray(g->morphing_array);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, p->indices);
+    glGenBuffers(1, &g->weights);
+    glBindBuffer(GL_ARRAY_BUFFER, g->weights);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(p->node_vertices * sizeof *weights), weights,
                  GL_STATIC_DRAW);
     free(weights);
@@ -316,37 +400,16 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
     point_weight(3, 4, offsetof(terrimp_geomip_weights, even));
     point_weight(4, 4, offsetof(terrimp_geomip_weights, beside));
     point_weight(5, 1, offsetof(terrimp_geomip_weights, self));
-    glGenBuffers(1, &p->moves);
-    glBindBuffer(GL_ARRAY_BUFFER, p->moves);
+    glGenBuffers(1, &g->moves);
+    glBindBuffer(GL_ARRAY_BUFFER, g->moves);
     glBufferData(GL_ARRAY_BUFFER,
-                 (GLsizeiptr)((size_t)p->slot_count * p->node_vertices * sizeof *p->morph), NULL,
+                 (GLsizeiptr)((size_t)p->slot_count * p->node_vertices * sizeof *g->morph), NULL,
                  GL_STATIC_DRAW);
     for (i = 0; i < p->filled; i++)
-        fill_slot(g, p->node_of[i], i);
+        send_ground(g, p->node_of[i], i);
     if (!g->morphing.id)
         return "a shader does not compile";
     return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for morphing";
-}
-
-static terrimp_result fill_meshes(gl_terrain *g, const terrimp_terrain *terrain,
-                                  const terrimp_terrain_info *info)
-{
-    size_t floats = (size_t)info->mesh_vertex_count * 3;
-    terrimp_result result = TERRIMP_E_MEMORY;
-    uint16_t *indices;
-    float *vertices;
-    make_array(&g->mesh_array, &g->mesh_vertices, &g->mesh_indices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(floats * sizeof *vertices), NULL, GL_STATIC_DRAW);
-    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(info->mesh_index_count * sizeof *indices),
-                 NULL, GL_STATIC_DRAW);
-    vertices = glMapBuffer(GL_ARRAY_BUFFER, GL_WRITE_ONLY);
-    indices = glMapBuffer(GL_ELEMENT_ARRAY_BUFFER, GL_WRITE_ONLY);
-    if (vertices && indices)
-        result = terrimp_terrain_fill_meshes(terrain, vertices, floats, indices,
-                                             info->mesh_index_count);
-    glUnmapBuffer(GL_ARRAY_BUFFER);
-    glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
-    return result;
 }
 
 static GLuint make_texture(GLint least, GLint most)
@@ -420,13 +483,16 @@ static const char *fill(gl_terrain *g, const gl_terrain_desc *desc,
                         const terrimp_heightfield *field)
 {
     size_t vertex_bytes = desc->vertex_bytes ? desc->vertex_bytes : (size_t)400 << 20;
+    size_t mesh_bytes = desc->mesh_bytes ? desc->mesh_bytes : (size_t)16 << 20;
     terrimp_terrain_info info;
     GLint limit = 0;
     terrimp_result result = terrimp_terrain_get_info(g->terrain, &info);
+    if (result == TERRIMP_OK && !make_room(g, &info))
+        result = TERRIMP_E_MEMORY;
     if (result == TERRIMP_OK)
         result = fill_ground(g, &info, vertex_bytes);
     if (result == TERRIMP_OK)
-        result = fill_meshes(g, g->terrain, &info);
+        result = fill_meshes(g, &info, mesh_bytes);
     if (result != TERRIMP_OK)
         return terrimp_result_text((int)result);
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
@@ -465,22 +531,19 @@ const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc)
 
 void gl_terrain_close(gl_terrain *g)
 {
-    gl_pool *p = &g->pool;
-    const GLuint arrays[3] = { p->array, p->morphing_array, g->mesh_array };
-    const GLuint buffers[6] = { p->vertices, p->moves, p->weights, g->ground_indices,
-                                g->mesh_vertices, g->mesh_indices };
-    glDeleteVertexArrays(3, arrays);
-    glDeleteBuffers(6, buffers);
+    close_pool(&g->ground_pool);
+    close_pool(&g->mesh_pool);
+    glDeleteVertexArrays(1, &g->morphing_array);
+    glDeleteBuffers(1, &g->moves);
+    glDeleteBuffers(1, &g->weights);
     glDeleteTextures(1, &g->lightmap);
     glDeleteTextures(GL_ATLASES, g->atlas);
     glDeleteFramebuffers(GL_ATLASES, g->atlas_frame);
     glDeleteRenderbuffers(1, &g->atlas_depth);
     glDeleteProgram(g->morphing.id);
-    free(p->slot_of);
-    free(p->node_of);
-    free(p->used);
-    free(p->xyz);
-    free(p->morph);
+    free(g->xyz);
+    free(g->indices);
+    free(g->morph);
     glDeleteProgram(g->ground.id);
     glDeleteProgram(g->fading.id);
     glDeleteProgram(g->impostor.id);
@@ -530,7 +593,7 @@ static void flush(gl_terrain *g)
     if (g->lines)
         p = &g->line;
     glUseProgram(p->id);
-    glBindVertexArray(g->pool.array);
+    glBindVertexArray(g->ground_pool.array);
     glBindTexture(GL_TEXTURE_2D, g->lightmap);
     glUniform1f(p->scale, 1.0f + b->depth_bias);
     glUniform3f(p->tint, 0.05f, 0.10f, 0.25f);
@@ -611,15 +674,17 @@ static const void *index_offset(uint32_t first_index)
     return (const void *)(uintptr_t)(first_index * sizeof(uint16_t));
 }
 
-/* Draws a range of the coarse meshes; the program has its own uniforms already. */
-static void draw_mesh(gl_terrain *g, const gl_program *p, GLuint texture, uint32_t base_vertex,
-                      uint32_t first_index, uint32_t index_count, float depth_bias)
+/* Draws a slot of the coarse meshes; the program has its own uniforms already. */
+static void draw_mesh(gl_terrain *g, const gl_program *p, GLuint texture, uint32_t slot,
+                      uint32_t index_count, float depth_bias)
 {
-    glBindVertexArray(g->mesh_array);
+    const gl_pool *meshes = &g->mesh_pool;
+    glBindVertexArray(meshes->array);
     glBindTexture(GL_TEXTURE_2D, texture);
     glUniform1f(p->scale, 1.0f + depth_bias);
     glDrawElementsBaseVertex(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT,
-                             index_offset(first_index), (GLint)base_vertex);
+                             index_offset(slot * meshes->node_indices),
+                             (GLint)(slot * meshes->node_vertices));
 }
 
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
@@ -631,7 +696,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     glUseProgram(p->id);
     glUniform3f(p->tint, 0.85f, 0.10f, 0.05f);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
-    draw_mesh(g, p, g->atlas[c->atlas], c->base_vertex, c->first_index, c->index_count,
+    draw_mesh(g, p, g->atlas[c->atlas], slot_of(g, &g->mesh_pool, c->node), c->index_count,
               c->depth_bias);
 }
 
@@ -644,14 +709,13 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     gl_terrain_turn_to_frame(g);
     flush(g);
     glUseProgram(g->ground.id);
-    draw_mesh(g, &g->ground, g->lightmap, c->base_vertex, c->first_index, c->index_count,
-              c->depth_bias);
+    draw_mesh(g, &g->ground, g->lightmap, g->mesh_pool.slot_count, c->index_count, c->depth_bias);
 }
 
 /* A morphing node is a draw of its own: its factors are uniforms. */
 static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32_t slot)
 {
-    const gl_pool *p = &g->pool;
+    const gl_pool *p = &g->ground_pool;
     size_t vertices = (size_t)slot * p->node_vertices;
     flush(g);
     glUseProgram(g->morphing.id);
@@ -660,12 +724,12 @@ static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32
     glUniform1f(g->morphing.morph, c->morph);
     glUniform4fv(g->morphing.side, 1, c->side);
     glUniform4fv(g->morphing.side_coarse, 1, c->side_coarse);
-    glBindVertexArray(p->morphing_array);
+    glBindVertexArray(g->morphing_array);
     glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
     gl_point(0, 3, GL_FLOAT, 0, vertices * 3 * sizeof(float));
-    glBindBuffer(GL_ARRAY_BUFFER, p->moves);
-    gl_point(1, 3, GL_FLOAT, sizeof *p->morph,
-             vertices * sizeof *p->morph + offsetof(terrimp_geomip_vertex, move));
+    glBindBuffer(GL_ARRAY_BUFFER, g->moves);
+    gl_point(1, 3, GL_FLOAT, sizeof *g->morph,
+             vertices * sizeof *g->morph + offsetof(terrimp_geomip_vertex, move));
     glDrawElements(GL_TRIANGLES, (GLsizei)c->index_count, GL_UNSIGNED_SHORT,
                    index_offset(c->first_index));
 }
@@ -680,7 +744,7 @@ static void draw_ground(void *user, const terrimp_ground_command *command)
         return;
     if (!g->capturing)
         gl_terrain_turn_to_frame(g);
-    slot = slot_of(g, command->node);
+    slot = slot_of(g, &g->ground_pool, command->node);
     if (g->morphing.id && !g->capturing && !g->lines && command->alpha >= 1.0f) {
         draw_morphing(g, command, slot);
         return;
@@ -693,40 +757,22 @@ static void draw_ground(void *user, const terrimp_ground_command *command)
     i = b->count++;
     b->counts[i] = (GLsizei)command->index_count;
     b->offsets[i] = index_offset(command->first_index);
-    b->base_vertices[i] = (GLint)(slot * g->pool.node_vertices);
+    b->base_vertices[i] = (GLint)(slot * g->ground_pool.node_vertices);
+}
+
+static terrimp_result resend(gl_terrain *g, const gl_pool *p, uint32_t node)
+{
+    uint32_t slot = p->slot_of[node];
+    return slot == UINT32_MAX ? TERRIMP_OK : p->send(g, node, slot);
 }
 
 terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node)
 {
-    terrimp_terrain_info info;
-    terrimp_mesh_info mesh;
-    terrimp_result result = terrimp_terrain_get_info(g->terrain, &info);
-    float *xyz;
-    uint16_t *indices;
-    if (result == TERRIMP_OK && g->pool.slot_of[node] != UINT32_MAX)
-        result = fill_slot(g, node, g->pool.slot_of[node]);
-    if (result == TERRIMP_OK)
-        result = terrimp_terrain_get_mesh(g->terrain, node, &mesh);
-    if (result != TERRIMP_OK)
-        return result;
-    xyz = malloc(info.mesh_vertex_stride * 3 * sizeof *xyz);
-    indices = malloc(info.mesh_index_stride * sizeof *indices);
-    if (xyz && indices)
-        result = terrimp_terrain_fill_mesh(g->terrain, node, xyz, info.mesh_vertex_stride * 3,
-                                           indices, info.mesh_index_stride);
-    else
-        result = TERRIMP_E_MEMORY;
-    if (result == TERRIMP_OK) {
-        glBindVertexArray(g->mesh_array);
-        glBindBuffer(GL_ARRAY_BUFFER, g->mesh_vertices);
-        glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(mesh.base_vertex * 3 * sizeof *xyz),
-                        (GLsizeiptr)(mesh.vertex_count * 3 * sizeof *xyz), xyz);
-        glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(mesh.first_index * sizeof *indices),
-                        (GLsizeiptr)(mesh.index_count * sizeof *indices), indices);
-    }
-    free(xyz);
-    free(indices);
-    return result;
+    terrimp_result result;
+    if (node == g->mesh_pool.node_count)
+        return send_floor(g);
+    result = resend(g, &g->ground_pool, node);
+    return result == TERRIMP_OK ? resend(g, &g->mesh_pool, node) : result;
 }
 
 /* ---- A frame ------------------------------------------------------------ */

@@ -47,17 +47,18 @@ typedef struct gl_batch {
     float alpha, depth_bias;
 } gl_batch;
 
-/* The vertices of ground nodes: as many as fit its buffer, those that were drawn last. */
+struct gl_terrain;
+
+/* Slots of one size in a pair of buffers, for what nodes are drawn from: as many nodes as fit,
+   those that were drawn last. */
 typedef struct gl_pool {
-    GLuint array, vertices;
-    GLuint morphing_array, moves, weights; /* with morphing */
-    uint32_t node_vertices;          /* of one node */
+    terrimp_result (*send)(struct gl_terrain *g, uint32_t node, uint32_t slot);
+    GLuint array, vertices, indices;
+    uint32_t node_vertices, node_indices; /* of a slot; 0 indices: all share some */
     uint32_t slot_count, node_count;
     uint32_t filled;                 /* slots that have been filled so far */
     uint32_t *slot_of;               /* [node_count] UINT32_MAX: not there */
     uint32_t *node_of, *used;        /* [slot_count] node, and frame that drew it last */
-    float *xyz;                      /* of one node, to be sent */
-    terrimp_geomip_vertex *morph;
 } gl_pool;
 
 enum { GL_ATLASES = 16 };
@@ -71,6 +72,7 @@ typedef struct gl_terrain_desc {
     const uint8_t *lightmap;          /* rgb[depth][width][3] of the field's size */
     uint32_t atlas_size;
     size_t vertex_bytes;              /* of graphics memory, for ground [Default 0 -> 400 MiB] */
+    size_t mesh_bytes;                /* and for coarse meshes [Default 0 -> 16 MiB] */
     const char *shading;              /* GLSL that defines, beside `uniform sampler2D lightmap`:
                                          vec3 shade(vec2 uv, vec3 position)
                                            the colour of the ground, which pictures keep
@@ -84,10 +86,13 @@ typedef struct gl_terrain {
     const context *frame;
     const terrimp_terrain *terrain;
     const char *shading;
-    gl_pool pool;
+    gl_pool ground_pool, mesh_pool;  /* behind the slots of meshes stands the floor */
+    size_t floor_vertices, floor_indices;
     uint32_t frame_number;
-    GLuint ground_indices;
-    GLuint mesh_array, mesh_vertices, mesh_indices;
+    GLuint morphing_array, moves, weights; /* with morphing */
+    float *xyz;                      /* of one node, to be sent, like the next two */
+    uint16_t *indices;
+    terrimp_geomip_vertex *morph;
     GLuint lightmap;
     GLsizei atlas_size;
     GLuint atlas[GL_ATLASES], atlas_frame[GL_ATLASES]; /* made when they are first used */
@@ -110,7 +115,8 @@ const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc);
 /* Prepares for ground commands that morph. Returns null, or what is wrong. */
 const char *gl_terrain_use_morphing(gl_terrain *g);
 
-/* After an edit: sends a node's ground and its coarse mesh anew. */
+/* After an edit: sends a node's ground and its coarse mesh anew; with the number of nodes for a
+   node, the floor. */
 terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node);
 
 /* Starts a frame: clears it to the sky's colour and takes the camera's matrices. */
