@@ -22,6 +22,13 @@ sanitizers_work()
     $CC $sanitize $work/probe.c -o $work/probe > /dev/null 2>&1 && $work/probe > /dev/null 2>&1
 }
 
+# Files of its own, because a replay may run at the same time.
+has_fuzzer()
+{
+    echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' > $work/probe_fuzzer.c
+    clang -fsanitize=fuzzer $work/probe_fuzzer.c -o $work/probe_fuzzer > /dev/null 2>&1
+}
+
 replays() # name
 {
     $CC -O0 $flags $sanitize tests/fuzz_$1.c -lm -o $work/replay_$1 &&
@@ -54,8 +61,7 @@ for name in $names; do
             echo "($CC has no sanitizers: the files are replayed bare)"
         }
         check "fuzz_$name: the corpus breaks no promise" replays "$name"
-    elif echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' > $work/probe.c &&
-            clang -fsanitize=fuzzer $work/probe.c -o $work/probe > /dev/null 2>&1; then
+    elif has_fuzzer; then
         check "fuzz_$name: nothing found in $seconds s" fuzz "$name"
     else
         skip "fuzz_$name: clang's libFuzzer is not here; make deps-portable installs it"
