@@ -12,7 +12,8 @@ seconds=${1:-0}
 names=${*:-$(ls tests/fuzz_*.c | sed 's/.*fuzz_//; s/[.]c$//')}
 work=build/fuzz
 mkdir -p $work
-flags="-std=c99 -g -Wall -Wextra -Wno-unused-function -I."
+# Private to its one file, the library is compiled only where the fuzzer reaches it.
+flags="-std=c99 -g -Wall -Wextra -Wno-unused-function -DTERRIMP_STATIC -I."
 sanitize="-fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
 CC=${CC:-cc}
 

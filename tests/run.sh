@@ -7,7 +7,8 @@
 
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
-jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN 2> /dev/null || echo 1)}
+jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN 2> /dev/null)}
+[ "$jobs" -ge 1 ] 2> /dev/null || jobs=1
 suites=build/test/suites # of the n-th: n.name, n.command, n.taken, n.log and, at its end, n.code
 count=0
 passed=0
@@ -37,13 +38,13 @@ worker()
 {
     n=0
     running=
-    trap 'kill $running 2> /dev/null; exit 1' TERM
+    trap 'kill $running 2> /dev/null; exit 1' INT TERM HUP
     while [ $n -lt $count ]; do
         n=$((n + 1))
         mkdir $suites/$n.taken 2> /dev/null || continue
         $limit sh $suites/$n.command > $suites/$n.log 2>&1 &
         running=$!
-        wait $running
+        wait $running 2>> $suites/$n.log
         echo $? > $suites/$n.code
     done
 }
@@ -51,7 +52,7 @@ worker()
 start_workers()
 {
     workers=
-    trap 'kill $workers; exit 130' INT TERM HUP
+    trap 'kill $workers 2> /dev/null; exit 130' INT TERM HUP
     while [ "$jobs" -gt 0 ]; do
         jobs=$((jobs - 1))
         worker &
@@ -129,7 +130,7 @@ thread_sanitizer()
 # does not build is tried again, and says why, in each suite that needs it.
 build() # arguments of make...
 {
-    $limit make -s -k -j "$jobs" "$@" > build/test/make 2>&1
+    make -s -k -j "$jobs" "$@" > build/test/make 2>&1
 }
 
 # All libraries for pictures are known to the Makefile. The OpenGL that it takes by itself is that
@@ -147,8 +148,9 @@ rm -rf $suites build/test/result
 mkdir -p $suites
 limit=
 have timeout && limit="timeout 600"
-sanitize="-g -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
-races="-std=c99 -g -O1 -fsanitize=thread -I."
+# Of debug information only line numbers: all that reports need, and quicker to compile.
+sanitize="-g1 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+races="-std=c99 -g1 -O1 -fsanitize=thread -I."
 unit="-std=c99 -I. tests/unit.c -lm -o"
 
 # ---- the list: slow suites first, or the last one would run alone
