@@ -133,12 +133,11 @@ build() # arguments of make...
     make -s -k -j "$jobs" "$@" > build/test/make 2>&1
 }
 
-# All libraries for pictures are known to the Makefile. The OpenGL that it takes by itself is that
-# of the examples; for the other there is a folder, where flyover is built to see that it builds.
-graphics_tests() # OpenGL, folder, targets and options of make
+# All libraries for pictures are known to the Makefile. Of flyover is seen that it builds.
+graphics_tests() # OpenGL, folder, options of make
 {
-    build $3 unit_host render
-    suite "render tests, $1" "$earlier make -s $3 render && $2/render"
+    build $3 render flyover unit_host
+    suite "render tests, $1" "$earlier make -s $3 render flyover && $2/render"
     # Its pictures are compared with those of the tests before it.
     earlier="until [ -s $suites/$count.code ]; do sleep 1; done;"
     suite "host helpers, $1" "make -s $3 unit_host && cd $2 && ./unit_host"
@@ -164,23 +163,21 @@ for compiler in gcc clang; do
         skip "unit tests, $compiler with sanitizers: it is not here, or has none"
     fi
 done
-default=
+echo "(building what the suites share, then running them, $jobs at once)"
+build all
 earlier=
 if has_library GL/osmesa.h -lOSMesa; then
-    default=osmesa
-    graphics_tests osmesa build all
+    graphics_tests osmesa build # which the examples use too
 else
     skip "render tests and host helpers, OSMesa: it is not installed"
 fi
 suite "compilers and build options" "sh tests/compile/run.sh"
 suite "fuzzers, some seconds each" "sh tests/fuzz.sh 5"
 suite "fuzzers, over their corpus" "sh tests/fuzz.sh"
-if ! has_library EGL/egl.h -lEGL -lOpenGL; then
-    skip "render tests and host helpers, EGL: it is not installed"
-elif [ -n "$default" ]; then
-    graphics_tests egl build/egl "GL=egl flyover"
+if has_library EGL/egl.h -lEGL -lOpenGL; then
+    graphics_tests egl build/egl GL=egl
 else
-    graphics_tests egl build all
+    skip "render tests and host helpers, EGL: it is not installed"
 fi
 if sanitizers_work "$CC"; then
     suite "host helpers, sanitizers" \
