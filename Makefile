@@ -5,7 +5,8 @@
 ## make demo      flies over a terrain: pictures and a table of statistics, in build/demo/
 ##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
-## make test      runs every test
+## make test      runs every test, as many suites at once as there are cores
+##                  JOBS=N   so many at once; 1: one after the other
 ## make bench     measures; tables and plots also go to build/bench/
 ##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
 ##                  BENCH_ALL=1      the whole protocol, for hours

@@ -1,16 +1,64 @@
 #!/bin/sh
-# Runs every test. Each test program or script ends in a line "N passed, N failed[, N skipped]";
-# the last line here is their sum. A test that crashes, hangs or does not build counts as failed.
+# Runs every test, as many suites at once as there are cores, or JOBS=n. What each prints is shown
+# whole, in the order of the list below. Each test program or script ends in a line
+# "N passed, N failed[, N skipped]"; the last line here is their sum. A test that crashes, hangs or
+# does not build counts as failed.
 # Real elevation tiles are looked for in ../shared/data, or in the directory TERRIMP_DATA.
 
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
-log=build/test/log
+jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN 2> /dev/null)}
+[ "$jobs" -ge 1 ] 2> /dev/null || jobs=1
+suites=build/test/suites # of the n-th: n.name, n.command, n.taken, n.log and, at its end, n.code
+count=0
 passed=0
 failed=0
 skipped=0
 failures=
 export CC
+
+# ---- the list of suites, and those who run it
+
+# suite "name" "command": puts a test at the end of the list.
+suite()
+{
+    count=$((count + 1))
+    printf '%s\n' "$1" > $suites/$count.name
+    printf '%s\n' "$2" > $suites/$count.command
+}
+
+# skip "what and why": something that this machine cannot test.
+skip()
+{
+    suite "skipped: $*" "echo 0 passed, 0 failed, 1 skipped"
+}
+
+# Takes suites until all are taken: only one worker can make the n-th folder.
+worker()
+{
+    n=0
+    running=
+    trap 'kill $running 2> /dev/null; exit 1' INT TERM HUP
+    while [ $n -lt $count ]; do
+        n=$((n + 1))
+        mkdir $suites/$n.taken 2> /dev/null || continue
+        $limit sh $suites/$n.command > $suites/$n.log 2>&1 &
+        running=$!
+        wait $running 2>> $suites/$n.log
+        echo $? > $suites/$n.code
+    done
+}
+
+start_workers()
+{
+    workers=
+    trap 'kill $workers 2> /dev/null; exit 130' INT TERM HUP
+    while [ "$jobs" -gt 0 ]; do
+        jobs=$((jobs - 1))
+        worker &
+        workers="$workers $!"
+    done
+}
 
 # The n-th number of the closing line $1, or 0.
 number()
@@ -18,16 +66,16 @@ number()
     echo "$1" | tr -cs '0-9' ' ' | cut -d ' ' -f "$2" | grep . || echo 0
 }
 
-# suite "name" command...: runs one test and adds up what its closing line says.
-suite()
+# Shows what the n-th suite prints, once it has ended, and adds up what its closing line says.
+report() # n
 {
-    name=$1
-    shift
+    name=$(cat $suites/$1.name)
     echo
     echo "---- $name"
-    { $limit "$@" 2>&1; echo $? > build/test/code; } | tee $log
-    code=$(cat build/test/code)
-    line=$(grep -E "^[0-9]+ passed, [0-9]+ failed" $log | tail -n 1)
+    until [ -s $suites/$1.code ]; do sleep 1; done
+    cat $suites/$1.log
+    code=$(cat $suites/$1.code)
+    line=$(grep -E "^[0-9]+ passed, [0-9]+ failed" $suites/$1.log | tail -n 1)
     bad=$(number "$line" 2)
     if [ "$bad" -eq 0 ] && { [ "$code" -ne 0 ] || [ -z "$line" ]; }; then
         echo "$name: ended with code $code and '$line'"
@@ -40,13 +88,7 @@ suite()
   $name: $bad"
 }
 
-# skip "what and why": something that this machine cannot test.
-skip()
-{
-    echo
-    echo "---- skipped: $*"
-    skipped=$((skipped + 1))
-}
+# ---- what is here
 
 have()
 {
@@ -84,61 +126,84 @@ thread_sanitizer()
     false
 }
 
-# All libraries for pictures are known to the Makefile; one make for each OpenGL that is here.
-graphics_tests() # osmesa|egl
+# What suites share is built before they start, so that no two of them build the same file. What
+# does not build is tried again, and says why, in each suite that needs it.
+build() # arguments of make...
 {
-    suite "host helpers, $1" sh -c "make -s GL=$1 unit_host && build/$1/unit_host"
-    suite "render tests, $1" sh -c "make -s GL=$1 render flyover && build/$1/render"
+    make -s -k -j "$jobs" "$@" > build/test/make 2>&1
 }
 
-mkdir -p build/test
-rm -f build/test/result
+# All libraries for pictures are known to the Makefile. Of flyover is seen that it builds.
+graphics_tests() # OpenGL, folder, options of make
+{
+    build $3 render flyover unit_host
+    suite "render tests, $1" "$earlier make -s $3 render flyover && $2/render"
+    # Its pictures are compared with those of the tests before it.
+    earlier="until [ -s $suites/$count.code ]; do sleep 1; done;"
+    suite "host helpers, $1" "make -s $3 unit_host && cd $2 && ./unit_host"
+}
+
+rm -rf $suites build/test/result
+mkdir -p $suites
 limit=
 have timeout && limit="timeout 600"
-sanitize="-g -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
-races="-std=c99 -g -O1 -fsanitize=thread -I."
+# Of debug information only line numbers: all that reports need, and quicker to compile.
+sanitize="-g1 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+races="-std=c99 -g1 -O1 -fsanitize=thread -I."
 unit="-std=c99 -I. tests/unit.c -lm -o"
 
-suite "unit tests, built as the README says" \
-    sh -c "$CC $unit build/test/unit && build/test/unit"
+# ---- the list: slow suites first, or the last one would run alone
+
+suite "unit tests, built as the README says" "$CC $unit build/test/unit && build/test/unit"
 for compiler in gcc clang; do
     if sanitizers_work $compiler; then
         suite "unit tests, $compiler with sanitizers" \
-            sh -c "$compiler $sanitize $unit build/test/unit-$compiler && build/test/unit-$compiler"
+            "$compiler $sanitize $unit build/test/unit-$compiler && build/test/unit-$compiler"
     else
         skip "unit tests, $compiler with sanitizers: it is not here, or has none"
     fi
 done
+echo "(building what the suites share, then running them, $jobs at once)"
+build all
+earlier=
+if has_library GL/osmesa.h -lOSMesa; then
+    graphics_tests osmesa build # which the examples use too
+else
+    skip "render tests and host helpers, OSMesa: it is not installed"
+fi
+suite "compilers and build options" "sh tests/compile/run.sh"
+suite "fuzzers, some seconds each" "sh tests/fuzz.sh 5"
+suite "fuzzers, over their corpus" "sh tests/fuzz.sh"
+if has_library EGL/egl.h -lEGL -lOpenGL; then
+    graphics_tests egl build/egl GL=egl
+else
+    skip "render tests and host helpers, EGL: it is not installed"
+fi
+if sanitizers_work "$CC"; then
+    suite "host helpers, sanitizers" \
+        "make -s CONFIG=sanitize unit_host && cd build/sanitize && ./unit_host"
+else
+    skip "host helpers, sanitizers: $CC has none"
+fi
 if compiler=$(thread_sanitizer); then
     suite "threads, $compiler with ThreadSanitizer" \
-        sh -c "$compiler $races tests/threads.c -lm -lpthread -o build/test/threads &&
+        "$compiler $races tests/threads.c -lm -lpthread -o build/test/threads &&
             build/test/threads"
 else
     skip "threads, ThreadSanitizer: no compiler here has one that runs"
 fi
-suite "documentation" sh tests/docs.sh
-suite "compilers and build options" sh tests/compile/run.sh
-suite "hygiene" sh tests/hygiene.sh
-suite "fuzzers, over their corpus" sh tests/fuzz.sh
-suite "fuzzers, some seconds each" sh tests/fuzz.sh 5
-suite "examples" sh tests/examples.sh
+suite "documentation" "sh tests/docs.sh"
+suite "hygiene" "sh tests/hygiene.sh"
+suite "examples" "sh tests/examples.sh"
 
-if has_library GL/osmesa.h -lOSMesa; then
-    graphics_tests osmesa
-else
-    skip "host helpers and render tests, OSMesa: it is not installed"
-fi
-if has_library EGL/egl.h -lEGL -lOpenGL; then
-    graphics_tests egl
-else
-    skip "host helpers and render tests, EGL: it is not installed"
-fi
-if sanitizers_work "$CC"; then
-    suite "host helpers, sanitizers" \
-        sh -c "make -s CONFIG=sanitize unit_host && build/sanitize/unit_host"
-else
-    skip "host helpers, sanitizers: $CC has none"
-fi
+# ---- runs them
+
+start_workers
+n=0
+while [ $n -lt $count ]; do
+    n=$((n + 1))
+    report $n
+done
 
 echo
 [ -z "$failures" ] || echo "Failed:$failures"
