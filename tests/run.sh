@@ -126,11 +126,11 @@ thread_sanitizer()
     false
 }
 
-# What suites share is built before they start, so that no two of them build the same file. What
-# does not build is tried again, and says why, in each suite that needs it.
+# What suites share is built before they start, so that no two of them build the same file: here
+# are its warnings. What does not build is tried again, and fails, in each suite that needs it.
 build() # arguments of make...
 {
-    make -s -k -j "$jobs" "$@" > build/test/make 2>&1
+    make -s -k -j "$jobs" "$@" 2>&1 | grep -vE '^(compile|link) '
 }
 
 # All libraries for pictures are known to the Makefile. Of flyover is seen that it builds.
