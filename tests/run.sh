@@ -146,7 +146,7 @@ graphics_tests() # OpenGL, folder, options of make
 rm -rf $suites build/test/result
 mkdir -p $suites
 limit=
-have timeout && limit="timeout 600"
+have timeout && limit="timeout 900"
 # Of debug information only line numbers: all that reports need, and quicker to compile.
 sanitize="-g1 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 races="-std=c99 -g1 -O1 -fsanitize=thread -I."
