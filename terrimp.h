@@ -7642,8 +7642,6 @@ typedef struct terrimpi_point {
 } terrimpi_point;
 
 struct terrimp_terrain {
-    terrimp_terrain_desc desc; /* resolved */
-    terrimp_geomip tree;
     uint32_t border_limit, vertex_limit, index_limit; /* of one surface; the last ones are kept */
     uint32_t vertex_stride, index_stride;  /* of the host's buffers */
     uint32_t mesh_triangle_count;          /* all nodes */
@@ -7654,6 +7652,8 @@ struct terrimp_terrain {
     terrimpi_mesh *meshes;                 /* [node_count] */
     terrimpi_point *points;                /* [node_count][vertex_limit] */
     uint8_t *corners;                      /* [node_count][index_limit] indices of the surface */
+    terrimp_terrain_desc desc; /* resolved */
+    terrimp_geomip tree;
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;           /* of create; release is NULL otherwise */
     size_t bytes;
@@ -9448,21 +9448,8 @@ typedef struct terrimpi_item {
 
 struct terrimp_view {
     const terrimp_terrain *terrain;
-    terrimp_view_desc desc;     /* resolved */
-    terrimp_camera camera;      /* resolved, of the last update */
-    terrimp_frustum frustum;
-    float pixel_factor;
-    float depth_bias;
-    float motion[3];            /* [wu] a frame, smoothed */
-    float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
     uint32_t frame;             /* updates so far */
     uint32_t unit_count, leaf_count, want_count, job_count, item_count;
-    uint32_t next_record;       /* where the search for a free record goes on */
-    int outdated;               /* what this frame would draw has been forgotten */
-    int open;                   /* `opened` is a picture of which pieces are missing */
-    terrimpi_job opened;
-    terrimp_stats stats;
-    terrimp_geomip_view ground;
     terrimp_live_atlas *atlases;   /* [atlas_count] */
     uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
     uint16_t *record_of;           /* [node_count] */
@@ -9478,6 +9465,19 @@ struct terrimp_view {
     terrimpi_job *jobs;            /* [max_captures] */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
+    uint32_t next_record;       /* where the search for a free record goes on */
+    int outdated;               /* what this frame would draw has been forgotten */
+    int open;                   /* `opened` is a picture of which pieces are missing */
+    terrimp_geomip_view ground;
+    terrimp_view_desc desc;     /* resolved */
+    float pixel_factor;
+    float depth_bias;
+    float motion[3];            /* [wu] a frame, smoothed */
+    float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
+    terrimp_camera camera;      /* resolved, of the last update */
+    terrimp_frustum frustum;
+    terrimp_stats stats;
+    terrimpi_job opened;
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
