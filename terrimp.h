@@ -10708,14 +10708,19 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- what is drawn ---- */
 
-/* The eye of the picture that a record will have when impostors are drawn; NULL: it has none. */
-static const float *terrimpi_picture_eye(const terrimp_view *v, uint32_t record)
+/* The picture that a record will have when impostors are drawn: the eye of its capture, NULL when
+   there is none, and its parts. */
+static const float *terrimpi_picture(const terrimp_view *v, uint32_t index, uint32_t *part_count)
 {
-    uint32_t i;
-    for (i = 0; i < v->job_count; i++)
-        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
-            return v->jobs[i].captures[0].eye;
-    return v->records[record].part_count > 0 ? v->records[record].eye : NULL;
+    const terrimpi_record *record = &v->records[index];
+    const terrimpi_job *job;
+    for (job = v->jobs; job < v->jobs + v->job_count; job++)
+        if (job->record == index && job->cell_to == job->cell_count) {
+            *part_count = job->part_count;
+            return job->captures[0].eye;
+        }
+    *part_count = record->part_count;
+    return record->part_count > 0 ? record->eye : NULL;
 }
 
 /* Puts a node's impostor on the list of this frame, once, if it has a picture that is good. */
@@ -10726,13 +10731,14 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     terrimpi_record *record;
     const float *eye;
     float angle, parallax;
+    uint32_t parts;
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
     if (record->listed == v->frame)
         return 1;
     s = terrimpi_site_of(&v->terrain->tree, node);
-    eye = terrimpi_picture_eye(v, index);
+    eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
     record->listed = record->seen = v->frame;
@@ -10782,13 +10788,25 @@ static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
     return 0;
 }
 
+/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
+static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrimp_pattern *found)
+{
+    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
+    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST,
+                         v->ground.draws[draw].pattern, found);
+}
+
 /* Shows a unit's ground. */
 static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
 {
+    terrimp_pattern pattern;
     uint32_t i;
-    for (i = 0; i < unit->leaf_count; i++) {
+    for (i = 0; i < unit->leaf_count && alpha != 0.0f; i++) {
         uint32_t leaf = v->leaves[unit->first_leaf + i];
         v->shown[leaf] = alpha;
+        terrimpi_ground_pattern(v, leaf, &pattern);
+        v->stats.ground++;
+        v->stats.triangles += pattern.triangle_count;
         if (alpha < 0.0f) {
             v->items[v->item_count].index = leaf;
             v->items[v->item_count++].is_impostor = 0;
@@ -10833,8 +10851,14 @@ static void terrimpi_settle(terrimp_view *v)
             terrimpi_site s = terrimpi_site_of(&v->terrain->tree,
                                                v->records[v->items[i].index].node);
             float angle, parallax;
+            terrimp_mesh_info mesh;
             terrimp_box box;
-            terrimpi_judge(v, terrimpi_picture_eye(v, v->items[i].index), &s, &angle, &parallax);
+            uint32_t parts;
+            terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
+                           &parallax);
+            terrimpi_mesh_place(v->terrain, s.node, &mesh);
+            v->stats.triangles += mesh.index_count / 3u * parts;
+            v->stats.draws += parts;
             v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
             v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
             terrimpi_site_box(v, &s, &box);
@@ -10857,48 +10881,15 @@ static int terrimpi_floor_wanted(const terrimp_view *v)
            v->camera.eye[2] <= box.max[2] && v->camera.eye[1] >= box.min[1];
 }
 
-/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
-static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t pattern,
-                                    terrimp_pattern *found)
-{
-    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
-    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST, pattern, found);
-}
-
-/* In how many parts a record will be drawn. */
-static uint32_t terrimpi_parts_of(const terrimp_view *v, uint32_t record)
-{
-    uint32_t i;
-    for (i = 0; i < v->job_count; i++)
-        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
-            return v->jobs[i].part_count;
-    return v->records[record].part_count;
-}
-
 /* The rest of the statistics. */
 static void terrimpi_count_frame(terrimp_view *v)
 {
     const terrimp_terrain *t = v->terrain;
     terrimp_stats *s = &v->stats;
-    terrimp_live_atlas_stats atlas;
     float tan_x, tan_y;
     uint32_t i, u;
     s->visible = v->unit_count;
     s->ground_tolerance_px = v->ground.tolerance_px;
-    for (i = 0; i < v->ground.draw_count; i++)
-        if (v->shown[i] != 0.0f) {
-            terrimp_pattern pattern;
-            terrimpi_ground_pattern(v, v->ground.draws[i].pattern, &pattern);
-            s->ground++;
-            s->triangles += pattern.triangle_count;
-        }
-    for (i = 0; i < v->item_count; i++)
-        if (v->items[i].is_impostor) {
-            terrimp_mesh_info mesh;
-            terrimpi_mesh_place(t, v->records[v->items[i].index].node, &mesh);
-            s->triangles += mesh.index_count / 3u * terrimpi_parts_of(v, v->items[i].index);
-            s->draws += terrimpi_parts_of(v, v->items[i].index);
-        }
     s->draws += s->ground;
     if (terrimpi_floor_wanted(v)) {
         s->draws++;
@@ -10916,10 +10907,9 @@ static void terrimpi_count_frame(terrimp_view *v)
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
     s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
-        if (terrimp_live_atlas_query(&v->atlases[i], &atlas) == TERRIMP_OK) {
-            s->texels_used += atlas.texels_used;
-            s->texels_free += atlas.texels_free;
-        }
+        s->texels_used += v->atlases[i].texels_used;
+    s->texels_free = v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+                     s->texels_used;
 }
 
 /* Follows the eye's motion; a jump is none. */
@@ -10942,10 +10932,9 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 {
     terrimp_camera resolved, before;
     terrimp_frustum frustum;
-    terrimp_stats stats;
     terrimp_result result;
-    float spread = 0.0f, drawn = 0.0f;
-    uint32_t i;
+    float reuse, spread = 0.0f, drawn = 0.0f;
+    uint32_t i, evictions, failures;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     before = view->camera;
@@ -10962,11 +10951,13 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     view->frame++;
     view->outdated = 0;
     terrimpi_cancel_jobs(view);
-    stats = view->stats;
+    reuse = view->stats.reuse; /* these go on */
+    evictions = view->stats.evictions;
+    failures = view->stats.atlas_failures;
     memset(&view->stats, 0, sizeof view->stats);
-    view->stats.reuse = stats.reuse;
-    view->stats.evictions = stats.evictions;
-    view->stats.atlas_failures = stats.atlas_failures;
+    view->stats.reuse = reuse;
+    view->stats.evictions = evictions;
+    view->stats.atlas_failures = failures;
     terrimpi_follow(view, before.eye);
     terrimpi_list_units(view);
     for (i = 0; i < view->unit_count; i++)
@@ -11105,7 +11096,7 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     const terrimp_geomip_draw *draw = &v->ground.draws[index];
     terrimp_ground_command command;
     terrimp_pattern pattern;
-    terrimpi_ground_pattern(v, draw->pattern, &pattern);
+    terrimpi_ground_pattern(v, index, &pattern);
     memset(&command, 0, sizeof command);
     command.node = draw->node;
     command.level = draw->level;
