@@ -1815,6 +1815,10 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view);
 #define TERRIMP_TANF(x) tanf(x)
 #define TERRIMP_ASINF(x) asinf(x)
 #define TERRIMP_ACOSF(x) acosf(x)
+#define TERRIMP_FABSF(x) fabsf(x)
+#endif
+#ifndef TERRIMP_FABSF /* one instruction where there is one */
+#define TERRIMP_FABSF(x) ((x) < 0.0f ? -(x) : (x))
 #endif
 #ifndef TERRIMP_ASSERT
 #include <assert.h>
@@ -1899,7 +1903,7 @@ static int terrimpi_within_u32(uint32_t v, uint32_t low, uint32_t high)
 
 static float terrimpi_min(float a, float b) { return a < b ? a : b; }
 static float terrimpi_max(float a, float b) { return a > b ? a : b; }
-static float terrimpi_abs(float a) { return a < 0.0f ? -a : a; }
+static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
@@ -7770,6 +7774,17 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
     return p;
 }
 
+/* Samples from the node's first one to a point of its mesh. */
+static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
+{
+    return terrimpi_min_u32((uint32_t)point->x << p->level, p->span_x);
+}
+
+static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
+{
+    return terrimpi_min_u32((uint32_t)point->z << p->level, p->span_z);
+}
+
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
@@ -9118,19 +9133,20 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const te
     const terrimpi_mesh *mesh = &t->meshes[node];
     const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
     const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    int64_t area, all = 0;
+    int64_t all = 0;
     uint32_t i, k, edges = 0, border = mesh->border_count;
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
-        int64_t x[3], z[3];
+        int32_t x[3], z[3];
+        int64_t area;
         for (k = 0; k < 3u; k++) {
             if (corners[k] >= mesh->vertex_count)
                 return 0;
-            x[k] = terrimpi_min_u32((uint32_t)points[corners[k]].x << p->level, p->span_x);
-            z[k] = terrimpi_min_u32((uint32_t)points[corners[k]].z << p->level, p->span_z);
+            x[k] = (int32_t)terrimpi_point_x(p, &points[corners[k]]);
+            z[k] = (int32_t)terrimpi_point_z(p, &points[corners[k]]);
         }
-        area = (z[1] - z[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (z[2] - z[0]);
+        area = (int64_t)(z[1] - z[0]) * (x[2] - x[0]) - (int64_t)(x[1] - x[0]) * (z[2] - z[0]);
         if (area <= 0)
             return 0;
         all += area;
@@ -9172,22 +9188,14 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
            terrimpi_corners_ok(t, node, &p);
 }
 
-/* Whether every node is held by its parent. */
-static int terrimpi_hierarchy_ok(const terrimp_terrain *t)
+/* Whether a node is held by its parent. */
+static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
-    uint32_t level, x, z;
-    for (level = 1; level < t->tree.level_count; level++)
-        for (z = 0; z < t->tree.level_z[level - 1u]; z++)
-            for (x = 0; x < t->tree.level_x[level - 1u]; x++) {
-                uint32_t child = terrimpi_mip_number(&t->tree, level - 1u, x, z);
-                uint32_t parent = terrimpi_mip_number(&t->tree, level, x / 2u, z / 2u);
-                const terrimp_geomip_node *c = &t->tree.nodes[child], *p = &t->tree.nodes[parent];
-                if (c->low < p->low || c->high > p->high || c->error > p->error ||
-                    t->meshes[child].low < t->meshes[parent].low ||
-                    t->meshes[child].high > t->meshes[parent].high)
-                    return 0;
-            }
-    return 1;
+    uint32_t parent = node + 1u < t->tree.node_count ? terrimpi_mip_parent(&t->tree, node) : node;
+    const terrimp_geomip_node *c = &t->tree.nodes[node], *p = &t->tree.nodes[parent];
+    return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
+           t->meshes[node].low >= t->meshes[parent].low &&
+           t->meshes[node].high <= t->meshes[parent].high;
 }
 
 /* Checks a whole block and fills in a terrain from it, all but the field. */
@@ -9205,12 +9213,11 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes, terrim
     terrimpi_bake_arrays_at(t, block);
     TERRIMPI_REFUSE(terrimpi_bake_hash(&bake, t) != bake.checksum, TERRIMP_E_BAKE);
     for (node = 0; node < t->tree.node_count; node++) {
-        if (!terrimpi_node_ok(t, node))
+        if (!terrimpi_node_ok(t, node) || !terrimpi_parent_ok(t, node))
             return TERRIMP_E_BAKE;
         triangles += t->meshes[node].triangle_count;
     }
-    return terrimpi_hierarchy_ok(t) && triangles == t->mesh_triangle_count ? TERRIMP_OK
-                                                                           : TERRIMP_E_BAKE;
+    return triangles == t->mesh_triangle_count ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
@@ -10252,21 +10259,39 @@ static uint32_t terrimpi_farthest(uint32_t count, int eye, uint32_t k)
     }
 }
 
-/* The source nodes of a picture: a block of them, with one more on each side for the border. */
-typedef struct terrimpi_block {
-    uint32_t x, z, wide, deep; /* without the border */
-} terrimpi_block;
+/* The source nodes of a picture along x or z, and one more on each side for the border. */
+typedef struct terrimpi_cells {
+    uint32_t first, count; /* without the border */
+} terrimpi_cells;
 
-static terrimpi_block terrimpi_source_block(const terrimp_geomip *tree, const terrimpi_site *s,
-                                            uint32_t source)
+/* `nodes` is how many the source level has. */
+static terrimpi_cells terrimpi_source_cells(const terrimpi_job *job, uint32_t at, uint32_t nodes)
 {
-    uint32_t shift = s->level - source;
-    terrimpi_block b;
-    b.x = s->x << shift;
-    b.z = s->z << shift;
-    b.wide = terrimpi_min_u32(1u << shift, tree->level_x[source] - b.x);
-    b.deep = terrimpi_min_u32(1u << shift, tree->level_z[source] - b.z);
-    return b;
+    uint32_t shift = job->site.level - job->source;
+    terrimpi_cells c;
+    c.first = at << shift;
+    c.count = terrimpi_min_u32(1u << shift, nodes - c.first);
+    return c;
+}
+
+static terrimpi_cells terrimpi_cells_x(const terrimp_view *v, const terrimpi_job *job)
+{
+    return terrimpi_source_cells(job, job->site.x, v->terrain->tree.level_x[job->source]);
+}
+
+static terrimpi_cells terrimpi_cells_z(const terrimp_view *v, const terrimpi_job *job)
+{
+    return terrimpi_source_cells(job, job->site.z, v->terrain->tree.level_z[job->source]);
+}
+
+/* The k-th cell along x or z, from back to front, for an eye that is `eye` cells from the
+   terrain's edge. *place: 0 and 2 are the border's, before and behind the block. */
+static uint32_t terrimpi_cell_along(terrimpi_cells c, float eye, uint32_t k, uint32_t *place)
+{
+    int eye_cell = (int)terrimpi_clamp(eye - (float)c.first + 1.0f, -1.0f, 99.0f);
+    uint32_t cell = terrimpi_farthest(c.count + 2u, eye_cell, k);
+    *place = cell == 0 ? 0u : cell == c.count + 1u ? 2u : 1u;
+    return c.first + cell - 1u; /* wraps below 0, and is then too large */
 }
 
 /* Cell k of a job, cells ordered from back to front: its node and the pattern to draw, the whole
@@ -10276,37 +10301,29 @@ static int terrimpi_cell(const terrimp_view *v, const terrimpi_job *job, uint32_
 {
     const terrimp_terrain *t = v->terrain;
     const terrimp_heightfield *field = &t->desc.field;
-    terrimpi_block b = terrimpi_source_block(&t->tree, &job->site, job->source);
-    uint32_t quads = t->desc.chunk_quads, column, row, x, z, direction, which = 0;
+    const float *eye = job->captures[0].eye;
+    terrimpi_cells across = terrimpi_cells_x(v, job);
+    uint32_t quads = t->desc.chunk_quads, x, z, dx, dz, direction, which = 0;
     float step = (float)(quads << job->source);
-    int eye_x = (int)terrimpi_clamp((job->captures[0].eye[0] - field->origin_x) /
-                                        (step * field->spacing_x) - (float)b.x + 1.0f,
-                                    -1.0f, 99.0f);
-    int eye_z = (int)terrimpi_clamp((job->captures[0].eye[2] - field->origin_z) /
-                                        (step * field->spacing_z) - (float)b.z + 1.0f,
-                                    -1.0f, 99.0f);
-    row = terrimpi_farthest(b.deep + 2u, eye_z, k / (b.wide + 2u));
-    column = terrimpi_farthest(b.wide + 2u, eye_x, k % (b.wide + 2u));
-    x = b.x + column - 1u; /* wraps below 0, and is then too large */
-    z = b.z + row - 1u;
+    x = terrimpi_cell_along(across, (eye[0] - field->origin_x) / (step * field->spacing_x),
+                            k % (across.count + 2u), &dx);
+    z = terrimpi_cell_along(terrimpi_cells_z(v, job),
+                            (eye[2] - field->origin_z) / (step * field->spacing_z),
+                            k / (across.count + 2u), &dz);
     if (x >= t->tree.level_x[job->source] || z >= t->tree.level_z[job->source])
         return 0;
-    if (column == 0 || row == 0 || column == b.wide + 1u || row == b.deep + 1u) {
-        uint32_t dx = column == 0 ? 0u : column == b.wide + 1u ? 2u : 1u;
-        uint32_t dz = row == 0 ? 0u : row == b.deep + 1u ? 2u : 1u;
-        direction = dz * 3u + dx;
-        which = terrimpi_strip_pattern(quads, job->strip, direction > 4u ? direction - 1u
-                                                                          : direction);
-    }
+    direction = dz * 3u + dx;
+    if (direction != 4u)
+        which = terrimpi_strip_pattern(quads, job->strip,
+                                       direction > 4u ? direction - 1u : direction);
     *pattern = terrimpi_find_pattern(quads, which);
-    *node = terrimpi_site_at(&t->tree, job->source, x, z).node;
+    *node = terrimpi_mip_number(&t->tree, job->source, x, z);
     return 1;
 }
 
 static uint32_t terrimpi_cell_count(const terrimp_view *v, const terrimpi_job *job)
 {
-    terrimpi_block block = terrimpi_source_block(&v->terrain->tree, &job->site, job->source);
-    return (block.wide + 2u) * (block.deep + 2u);
+    return (terrimpi_cells_x(v, job).count + 2u) * (terrimpi_cells_z(v, job).count + 2u);
 }
 
 /* Whether a cell's node reaches into the clip distances of a part. */
