@@ -9164,14 +9164,20 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
     const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
     const float most = TERRIMPI_FLOAT_MAX, slack = t->range_step; /* other machines round */
     terrimpi_patch p = terrimpi_patch_of(t, node);
+    float sizes[5];
     uint32_t i;
+    sizes[0] = ground->error;
+    sizes[1] = ground->rms;
+    sizes[2] = mesh->error;
+    sizes[3] = mesh->error_rms;
+    sizes[4] = mesh->upper_skirt;
+    for (i = 0; i < 5u; i++)
+        if (!terrimpi_within(sizes[i], 0.0f, most))
+            return 0;
     if (!terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
         !terrimpi_within(ground->low, mesh->low, mesh->high) ||
         !terrimpi_within(ground->high, ground->low, mesh->high) ||
-        !terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
-        !terrimpi_within(mesh->error, 0.0f, most) ||
-        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
-        !terrimpi_within(mesh->upper_skirt, 0.0f, t->desc.no_upper_skirts ? 0.0f : most))
+        (t->desc.no_upper_skirts && mesh->upper_skirt > 0.0f))
         return 0;
     if (mesh->border_count < 4u || mesh->border_count > t->border_limit ||
         mesh->vertex_count < mesh->border_count || mesh->vertex_count > t->vertex_limit ||
@@ -9696,6 +9702,36 @@ static void terrimpi_site_box(const terrimp_view *v, const terrimpi_site *s, ter
     terrimpi_node_box(v->terrain, s->level, s->x, s->z, box);
 }
 
+/* A node's box, and which of the planes in `mask` its parts have to be tested against. */
+static int terrimpi_sight(const terrimp_view *v, const terrimpi_site *s, int mask, terrimp_box *box)
+{
+    terrimpi_site_box(v, s, box);
+    return mask ? terrimp_frustum_test(&v->frustum, box, mask) : 0;
+}
+
+/* Does something with a node, of which the planes in `mask` may cut a part off, and goes on to its
+   children. Returns 0 to end the walk. */
+typedef int (*terrimpi_visit)(terrimp_view *v, const terrimpi_site *s, int mask);
+
+static int terrimpi_visit_children(terrimp_view *v, const terrimpi_site *s, int mask,
+                                   terrimpi_visit visit)
+{
+    terrimpi_site children[4];
+    uint32_t i, count = s->level > 0 ? terrimpi_children(v, s, children) : 0;
+    for (i = 0; i < count; i++)
+        if (!visit(v, &children[i], mask))
+            return 0;
+    return 1;
+}
+
+/* Visits the root. */
+static void terrimpi_visit_tree(terrimp_view *v, terrimpi_visit visit)
+{
+    terrimpi_site root = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u,
+                                          0, 0);
+    visit(v, &root, TERRIMP_PLANES_ALL);
+}
+
 /* ---- pictures and their slots ---- */
 
 static void terrimpi_drop_seats(terrimp_view *v, const terrimpi_seat *seats, uint32_t count)
@@ -9849,44 +9885,30 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 
 /* ---- the ground cut ---- */
 
-/* Lists all chunks in sight at full resolution, front to back, when there is a list. Returns how
-   many there are. */
-static uint32_t terrimpi_list_chunks(terrimp_view *v, terrimp_geomip_draw *list)
+/* Counts the chunks in sight in draws_needed, and lists the first draw_count of them, front to
+   back, at full resolution. */
+static int terrimpi_visit_chunks(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    struct {
-        terrimpi_site site;
-        int mask;
-    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1, count = 0;
-    stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
-    stack[0].mask = TERRIMP_PLANES_ALL;
-    while (depth > 0) {
-        terrimpi_site children[4];
-        terrimp_box box;
-        uint32_t i;
-        top = stack[--depth];
-        terrimpi_site_box(v, &top.site, &box);
-        if (top.mask)
-            top.mask = terrimp_frustum_test(&v->frustum, &box, top.mask);
-        if (top.mask == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        if (top.site.level == 0) {
-            if (list) {
-                memset(&list[count], 0, sizeof *list);
-                list[count].node = top.site.node;
-                list[count].x = top.site.x;
-                list[count].z = top.site.z;
-            }
-            count++;
-            continue;
-        }
-        for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
-            stack[depth].site = children[i];
-            stack[depth].mask = top.mask;
-            depth++;
-        }
+    terrimp_geomip_view *g = &v->ground;
+    terrimp_box box;
+    mask = terrimpi_sight(v, s, mask, &box);
+    if (mask == TERRIMP_PLANES_OUTSIDE)
+        return 1;
+    if (s->level == 0 && g->draws_needed++ < g->draw_count) {
+        terrimp_geomip_draw *draw = &g->draws[g->draws_needed - 1u];
+        memset(draw, 0, sizeof *draw);
+        draw->node = s->node;
+        draw->x = s->x;
+        draw->z = s->z;
     }
-    return count;
+    return terrimpi_visit_children(v, s, mask, terrimpi_visit_chunks);
+}
+
+static void terrimpi_list_chunks(terrimp_view *v, uint32_t count)
+{
+    v->ground.draw_count = count;
+    v->ground.draws_needed = 0;
+    terrimpi_visit_tree(v, terrimpi_visit_chunks);
 }
 
 /* Makes the ground cut; where max_ground is too small, at a larger tolerance. */
@@ -9894,9 +9916,13 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
 {
     uint32_t i;
     if (v->desc.mode == TERRIMP_MODE_FULL || v->desc.mode == TERRIMP_MODE_IMPOSTOR) {
-        if (terrimpi_list_chunks(v, NULL) > v->desc.max_ground) /* the frame before stays */
+        uint32_t before = v->ground.draw_count;
+        terrimpi_list_chunks(v, 0);
+        if (v->ground.draws_needed > v->desc.max_ground) { /* the frame before stays */
+            v->ground.draw_count = before;
             return TERRIMP_E_CAPACITY;
-        v->ground.draw_count = terrimpi_list_chunks(v, v->ground.draws);
+        }
+        terrimpi_list_chunks(v, v->ground.draws_needed);
     } else {
         terrimp_result result = TERRIMP_E_CAPACITY;
         v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
@@ -9948,60 +9974,41 @@ static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float 
 }
 
 /* Adds the ground draws below a node to the last unit. */
-static void terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    terrimpi_site children[4];
     terrimp_box box;
-    uint32_t i, count, leaf = terrimpi_leaf(v, s->node);
+    uint32_t leaf = terrimpi_leaf(v, s->node);
     if (leaf != TERRIMPI_NO_LEAF) {
         v->leaves[v->leaf_count++] = leaf;
         v->units[v->unit_count].leaf_count++;
-        return;
+        return 1;
     }
-    if (s->level == 0)
-        return;
-    if (mask) {
-        terrimpi_site_box(v, s, &box);
-        mask = terrimp_frustum_test(&v->frustum, &box, mask);
-        if (mask == TERRIMP_PLANES_OUTSIDE)
-            return;
-    }
-    count = terrimpi_children(v, s, children);
-    for (i = 0; i < count; i++)
-        terrimpi_gather_leaves(v, &children[i], mask);
+    if (mask && s->level > 0)
+        mask = terrimpi_sight(v, s, mask, &box);
+    return mask == TERRIMP_PLANES_OUTSIDE ||
+           terrimpi_visit_children(v, s, mask, terrimpi_gather_leaves);
 }
 
 /* Adds the impostors wanted below a node to the last unit. Returns 0 when a part of it that is in
    sight cannot be one. */
 static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    terrimpi_site children[4];
+    terrimpi_want *want = &v->wants[v->want_count];
     terrimp_box box;
     float closest;
-    uint32_t i, count;
-    terrimpi_site_box(v, s, &box);
-    if (mask)
-        mask = terrimp_frustum_test(&v->frustum, &box, mask);
+    mask = terrimpi_sight(v, s, mask, &box);
     if (mask == TERRIMP_PLANES_OUTSIDE)
         return 1;
     closest = terrimp_box_distance(&box, v->camera.eye);
-    if (terrimpi_wanted(v, s, closest)) {
-        terrimpi_want *want = &v->wants[v->want_count];
-        if (v->want_count == v->desc.max_impostors)
-            return 0;
-        memset(want, 0, sizeof *want);
-        want->site = *s;
-        want->closest = closest;
-        v->want_count++;
-        v->units[v->unit_count].want_count++;
-        return 1;
-    }
-    if (s->level == 0)
+    if (!terrimpi_wanted(v, s, closest))
+        return s->level > 0 && terrimpi_visit_children(v, s, mask, terrimpi_gather_wants);
+    if (v->want_count == v->desc.max_impostors)
         return 0;
-    count = terrimpi_children(v, s, children);
-    for (i = 0; i < count; i++)
-        if (!terrimpi_gather_wants(v, &children[i], mask))
-            return 0;
+    memset(want, 0, sizeof *want);
+    want->site = *s;
+    want->closest = closest;
+    v->want_count++;
+    v->units[v->unit_count].want_count++;
     return 1;
 }
 
@@ -10025,40 +10032,22 @@ static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask,
     v->unit_count++;
 }
 
-/* Walks the tree down to where one of the cuts runs. */
-static void terrimpi_list_units(terrimp_view *v)
+/* Goes down to where one of the cuts runs, until all ground has its unit. */
+static int terrimpi_visit_units(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    struct {
-        terrimpi_site site;
-        int mask;
-    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1;
-    int impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
-    v->unit_count = v->leaf_count = v->want_count = 0;
-    stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
-    stack[0].mask = TERRIMP_PLANES_ALL;
-    while (depth > 0 && v->leaf_count < v->ground.draw_count) {
-        terrimpi_site children[4];
-        terrimp_box box;
-        float closest;
-        uint32_t i;
-        top = stack[--depth];
-        terrimpi_site_box(v, &top.site, &box);
-        if (top.mask)
-            top.mask = terrimp_frustum_test(&v->frustum, &box, top.mask);
-        if (top.mask == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        closest = terrimp_box_distance(&box, v->camera.eye);
-        if (terrimpi_leaf(v, top.site.node) != TERRIMPI_NO_LEAF ||
-            (impostors && terrimpi_wanted(v, &top.site, closest)))
-            terrimpi_add_unit(v, &top.site, top.mask, closest);
-        else if (top.site.level > 0)
-            for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
-                stack[depth].site = children[i];
-                stack[depth].mask = top.mask;
-                depth++;
-            }
-    }
+    terrimp_box box;
+    float closest;
+    if (v->leaf_count == v->ground.draw_count)
+        return 0;
+    mask = terrimpi_sight(v, s, mask, &box);
+    if (mask == TERRIMP_PLANES_OUTSIDE)
+        return 1;
+    closest = terrimp_box_distance(&box, v->camera.eye);
+    if (terrimpi_leaf(v, s->node) == TERRIMPI_NO_LEAF &&
+        (v->desc.mode < TERRIMP_MODE_IMPOSTOR || !terrimpi_wanted(v, s, closest)))
+        return terrimpi_visit_children(v, s, mask, terrimpi_visit_units);
+    terrimpi_add_unit(v, s, mask, closest);
+    return 1;
 }
 
 /* ---- what a picture would cost, and how long it would last ---- */
@@ -10976,7 +10965,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     view->stats.evictions = evictions;
     view->stats.atlas_failures = failures;
     terrimpi_follow(view, before.eye);
-    terrimpi_list_units(view);
+    view->unit_count = view->leaf_count = view->want_count = 0;
+    terrimpi_visit_tree(view, terrimpi_visit_units);
     for (i = 0; i < view->unit_count; i++)
         terrimpi_decide(view, &view->units[i], &spread, &drawn);
     terrimpi_schedule(view, spread, drawn);
