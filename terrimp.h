@@ -3159,33 +3159,50 @@ static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t cou
     return 1;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture)
+/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error. */
+static terrimp_result terrimpi_capture_fit(const terrimp_box *box, const float eye[3],
+                                           terrimp_capture *c)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
     static const float origin[3] = {0.0f, 0.0f, 0.0f};
-    terrimp_capture c;
     float corners[8][3];
     int i;
+    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
+    for (i = 0; i < 3; i++) {
+        c->eye[i] = eye[i];
+        c->forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
+    }
+    TERRIMPI_REFUSE(!terrimpi_normalize(c->forward), TERRIMP_E_INSIDE);
+    memcpy(c->up, c->forward[1] * c->forward[1] > 0.9999f ? minus_z : y_axis, sizeof c->up);
+    terrimpi_basis(c->forward, c->up, c->right);
+    for (i = 0; i < 8; i++)
+        terrimpi_box_corner(box, i, origin, corners[i]);
+    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
+    return terrimpi_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture)
+{
+    terrimp_capture c;
     TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
                     box->min[2] > box->max[2], TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
-    for (i = 0; i < 3; i++) {
-        c.eye[i] = eye[i];
-        c.forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
-    }
-    TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_INSIDE);
-    memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
-    terrimpi_basis(c.forward, c.up, c.right);
-    for (i = 0; i < 8; i++)
-        terrimpi_box_corner(box, i, origin, corners[i]);
-    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, corners[0], 8, 0.001f), TERRIMP_E_BEHIND);
+    TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
+}
+
+/* Fits the sides alone. */
+static int terrimpi_capture_tighten(terrimp_capture *c, const float *xyz, uint32_t count)
+{
+    float z_near = c->z_near, z_far = c->z_far;
+    int fits = terrimpi_fit_sides(c, xyz, count, 0.0f);
+    c->z_near = z_near;
+    c->z_far = z_far;
+    return fits;
 }
 
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
@@ -3195,9 +3212,7 @@ TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, con
     TERRIMPI_REFUSE(!capture || !xyz, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
     c = *capture;
-    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, xyz, count, 0.0f), TERRIMP_E_BEHIND);
-    c.z_near = capture->z_near;
-    c.z_far = capture->z_far;
+    TERRIMPI_REFUSE(!terrimpi_capture_tighten(&c, xyz, count), TERRIMP_E_BEHIND);
     *capture = c;
     return TERRIMP_OK;
 }
@@ -6496,11 +6511,23 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
 #define TERRIMPI_SPLITS 24u /* places of a split that are tried */
 #define TERRIMPI_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
 
+/* The size of a picture of width x height texels within limits; returns the scale. */
+static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
+                                   uint32_t size[2])
+{
+    float longest = terrimpi_max(width, height), reduce = 1.0f;
+    if (longest > (float)largest)
+        reduce = (float)largest / longest;
+    size[0] = terrimpi_clamp_u32(terrimpi_ceil_u32(width * reduce), smallest, largest);
+    size[1] = terrimpi_clamp_u32(terrimpi_ceil_u32(height * reduce), smallest, largest);
+    return reduce;
+}
+
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
                                                  uint32_t largest, uint32_t size[2], float *scale)
 {
-    float density, width, height, longest, reduce = 1.0f;
+    float density, width, height, reduce;
     TERRIMPI_REFUSE(!capture || !size, TERRIMP_E_NULL);
     density = pixel_factor * texels_per_px;
     width = (capture->tan_right - capture->tan_left) * density;
@@ -6509,11 +6536,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
     TERRIMPI_REFUSE(!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) ||
                     !(height > 0.0f) || largest < 1u || largest > 65536u ||
                     smallest > largest, TERRIMP_E_RANGE);
-    longest = terrimpi_max(width, height);
-    if (longest > (float)largest)
-        reduce = (float)largest / longest;
-    size[0] = terrimpi_clamp_u32(terrimpi_ceil_u32(width * reduce), smallest, largest);
-    size[1] = terrimpi_clamp_u32(terrimpi_ceil_u32(height * reduce), smallest, largest);
+    reduce = terrimpi_picture_size(width, height, smallest, largest, size);
     if (scale)
         *scale = reduce;
     return TERRIMP_OK;
@@ -6597,12 +6620,12 @@ static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float ca
                : TERRIMP_E_NOT_FINITE;
 }
 
-TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
-                                              const float eye[3], float *angle_rad)
+/* The functions of this room that a view calls check nothing; those of the API do. */
+static float terrimpi_view_angle(const terrimp_box *box, const float captured_eye[3],
+                                 const float eye[3])
 {
     float worst = 0.0f; /* grows with the angle: its sine up to 60 degrees, then 2 - its cosine */
     int i;
-    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
     for (i = 0; i < 8; i++) {
         float a[3], b[3], across[3], cosine;
         terrimpi_box_corner(box, i, captured_eye, a);
@@ -6614,10 +6637,14 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
         /* The cosine is blind to small angles, the sine to those around 90 degrees. */
         worst = terrimpi_max(worst, cosine > 0.5f ? terrimpi_length(across) : 2.0f - cosine);
     }
-    if (worst <= 1.0f)
-        *angle_rad = TERRIMP_ASINF(worst);
-    else
-        *angle_rad = TERRIMP_ACOSF(terrimpi_max(2.0f - worst, -1.0f));
+    return worst <= 1.0f ? TERRIMP_ASINF(worst) : TERRIMP_ACOSF(terrimpi_max(2.0f - worst, -1.0f));
+}
+
+TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
+                                              const float eye[3], float *angle_rad)
+{
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
+    *angle_rad = terrimpi_view_angle(box, captured_eye, eye);
     return TERRIMP_OK;
 }
 
@@ -6653,29 +6680,33 @@ static float terrimpi_largest_sine(const terrimp_box *box, const float eye[3], c
    sin(APB) = |AB| sin(BAP) / |BP|. With d the distance from B to the box, which holds P:
    |BP| >= d, |QB| >= d - error. The tangent of that angle times K is the distance in pixels at the
    middle of the screen. */
-TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
-                                                  const float captured_eye[3], const float eye[3],
-                                                  float pixel_factor, float *error_px)
+static float terrimpi_parallax_error(const terrimp_box *box, float error,
+                                     const float captured_eye[3], const float eye[3],
+                                     float pixel_factor)
 {
     float move[3], move_length, distance, sine;
-    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
-    TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
-    *error_px = 0.0f;
     if (!(move_length > 0.0f) || !(error > 0.0f))
-        return TERRIMP_OK;
+        return 0.0f;
     distance = terrimp_box_distance(box, eye);
     sine = 1.0f;
     if (distance > error)
         sine = error / (distance - error) *
                terrimpi_min(1.0f, move_length / distance *
                                       terrimpi_largest_sine(box, captured_eye, move, move_length));
-    if (sine < 0.999f)
-        *error_px = pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine);
-    else
-        *error_px = TERRIMPI_INFINITY;
+    return sine < 0.999f ? pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine)
+                         : TERRIMPI_INFINITY;
+}
+
+TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
+                                                  const float captured_eye[3], const float eye[3],
+                                                  float pixel_factor, float *error_px)
+{
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
+    TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
+    *error_px = terrimpi_parallax_error(box, error, captured_eye, eye, pixel_factor);
     return TERRIMP_OK;
 }
 
@@ -10112,10 +10143,9 @@ static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
 {
     terrimp_box box;
     terrimpi_site_box(v, s, &box);
-    *angle_rad = *parallax_px = 0.0f;
-    terrimp_view_angle(&box, captured_eye, v->camera.eye, angle_rad);
-    terrimp_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye, v->camera.eye,
-                           v->pixel_factor, parallax_px);
+    *angle_rad = terrimpi_view_angle(&box, captured_eye, v->camera.eye);
+    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye,
+                                           v->camera.eye, v->pixel_factor);
     return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
                         *parallax_px / v->desc.tolerance_px);
 }
@@ -10153,7 +10183,7 @@ static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
     terrimp_box box;
     float speed = terrimpi_speed(v), k = v->pixel_factor, texels, sine;
     terrimpi_site_box(v, &want->site, &box);
-    if (terrimp_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
+    if (terrimpi_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(v->terrain, want->site.node, &mesh);
     want->record = v->record_of[want->site.node];
@@ -10396,14 +10426,18 @@ static int terrimpi_slot_size(terrimp_view *v, const terrimpi_site *s, const ter
 {
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
+    float density = v->pixel_factor * v->desc.texels_per_px, width, height;
     terrimp_mesh_info mesh;
     terrimpi_mesh_place(v->terrain, s->node, &mesh);
     terrimpi_fill_mesh(v->terrain, s->node, v->mesh_xyz, v->mesh_indices);
-    if (terrimp_capture_fit(box, eye, capture) != TERRIMP_OK ||
-        terrimp_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count) != TERRIMP_OK ||
-        terrimp_impostor_size(capture, v->pixel_factor, v->desc.texels_per_px,
-                              TERRIMPI_SMALLEST_PICTURE, largest, size, NULL) != TERRIMP_OK)
+    if (terrimpi_capture_fit(box, eye, capture) != TERRIMP_OK ||
+        !terrimpi_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count))
         return 0;
+    width = (capture->tan_right - capture->tan_left) * density;
+    height = (capture->tan_up - capture->tan_down) * density;
+    if (!terrimpi_finite2(width, height)) /* the eye is almost beside a vertex */
+        return 0;
+    terrimpi_picture_size(width, height, TERRIMPI_SMALLEST_PICTURE, largest, size);
     size[0] += 2u * TERRIMPI_MARGIN;
     size[1] += 2u * TERRIMPI_MARGIN;
     return 1;
