@@ -4070,15 +4070,11 @@ static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, floa
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances)
+/* terrimp_geomip_distances of checked settings. */
+static void terrimpi_mip_distances(const terrimp_geomip *tree, int rule, float tolerance_px,
+                                   float morph_ratio, float pixel_factor, float *distances)
 {
     uint32_t level, node;
-    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
-    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++)
         for (node = tree->level_first[level]; node < tree->level_first[level + 1u]; node++)
             distances[node] =
@@ -4088,6 +4084,17 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
         float *d = &distances[terrimpi_mip_parent(tree, node)];
         *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
     }
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
+                                                    float tolerance_px, float morph_ratio,
+                                                    float pixel_factor, float *distances)
+{
+    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
+    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
+    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
     return TERRIMP_OK;
 }
 
@@ -4425,8 +4432,8 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
-    terrimp_geomip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
-                             v->distances);
+    terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
+                           v->distances);
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
@@ -4442,40 +4449,50 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
     return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
 }
 
+/* terrimp_geomip_select with resolved settings and camera. */
+static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_geomip_view *view,
+                                          const terrimp_camera *camera)
+{
+    terrimpi_mip_frame f;
+    float pixel_factor;
+    uint32_t level;
+    terrimp_camera_frustum(camera, &f.frustum);
+    terrimp_camera_pixel_factor(camera, &pixel_factor);
+    f.tree = tree;
+    f.view = view;
+    f.exact = view->rule == TERRIMP_GEOMIP_BOUND;
+    for (level = 0; level < tree->level_count; level++)
+        f.first[level] = tree->node_count;
+    terrimpi_mip_aim(&f, camera, view->tolerance_px / pixel_factor);
+    terrimpi_mip_refresh(&f, pixel_factor);
+    view->frame = view->frame + 1u == 0 ? 1u : view->frame + 1u; /* 0 is what fresh marks say */
+    terrimpi_mip_mark_errors(&f);
+    terrimpi_mip_balance(&f);
+    terrimpi_mip_collect(&f);
+    view->draw_count = view->draws_needed;
+    if (view->draws_needed <= view->draw_capacity)
+        return TERRIMP_OK;
+    view->draw_count = view->triangle_count = 0;
+    return TERRIMP_E_CAPACITY;
+}
+
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera)
 {
-    terrimpi_mip_frame f;
     terrimp_geomip_view v;
     terrimp_camera c;
-    float pixel_factor;
-    uint32_t level;
+    terrimp_result result;
     TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
     TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
-    terrimp_camera_frustum(&c, &f.frustum);
-    terrimp_camera_pixel_factor(&c, &pixel_factor);
-    f.tree = tree;
-    f.view = &v;
-    f.exact = v.rule == TERRIMP_GEOMIP_BOUND;
-    for (level = 0; level < tree->level_count; level++)
-        f.first[level] = tree->node_count;
-    terrimpi_mip_aim(&f, &c, v.tolerance_px / pixel_factor);
-    terrimpi_mip_refresh(&f, pixel_factor);
-    v.frame = v.frame + 1u == 0 ? 1u : v.frame + 1u; /* 0 is what fresh marks say */
-    terrimpi_mip_mark_errors(&f);
-    terrimpi_mip_balance(&f);
-    terrimpi_mip_collect(&f);
-    view->frame = v.frame;
-    memcpy(view->distances_for, v.distances_for, sizeof v.distances_for);
-    view->draws_needed = v.draws_needed;
-    view->draw_count = view->triangle_count = 0;
-    TERRIMPI_REFUSE(v.draws_needed > v.draw_capacity, TERRIMP_E_CAPACITY);
-    view->draw_count = v.draws_needed;
-    view->triangle_count = v.triangle_count;
-    return TERRIMP_OK;
+    result = terrimpi_mip_select(tree, &v, &c);
+    v.rule = view->rule;
+    v.tolerance_px = view->tolerance_px;
+    v.morph_ratio = view->morph_ratio;
+    *view = v;
+    return result;
 }
 
 /* ---- vertices and morphing ---- */
@@ -6561,18 +6578,12 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
-                                                  const terrimp_rect *slot, uint32_t atlas_width,
-                                                  uint32_t atlas_height, float matrix[16])
+static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrimp_rect *slot,
+                                    uint32_t atlas_width, uint32_t atlas_height, float matrix[16])
 {
     float view[16], projection[16];
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
-    TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
-                    atlas_height < 1u || slot->x > atlas_width ||
-                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
-                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
     terrimp_capture_matrices(capture, 0, view, projection);
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
@@ -6592,6 +6603,18 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
         }
         matrix[column * 4 + 3] = q;
     }
+}
+
+TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
+                                                  const terrimp_rect *slot, uint32_t atlas_width,
+                                                  uint32_t atlas_height, float matrix[16])
+{
+    TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
+                    atlas_height < 1u || slot->x > atlas_width ||
+                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
+                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
+    terrimpi_texture_matrix(capture, slot, atlas_width, atlas_height, matrix);
     return TERRIMP_OK;
 }
 
@@ -6855,20 +6878,15 @@ static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
     }
 }
 
-TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
-                                                 uint32_t vertex_count, const uint16_t *indices,
-                                                 uint32_t index_count, float reach, float overlap,
-                                                 terrimp_split *split)
+/* terrimp_capture_split of checked arguments. */
+static void terrimpi_capture_split(const terrimp_capture *capture, const float *xyz,
+                                   uint32_t vertex_count, const uint16_t *indices,
+                                   uint32_t index_count, float reach, float overlap,
+                                   terrimp_split *split)
 {
     float first = TERRIMPI_FLOAT_MAX, last = 0.0f, step;
     uint32_t i, k, best = 0;
     terrimpi_smear smear;
-    TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(reach) || !terrimpi_finite(overlap), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
-    for (i = 0; i < index_count; i++)
-        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
     for (i = 0; i < vertex_count; i++) {
         float depth = terrimpi_depth(capture, xyz + i * 3u);
         first = terrimpi_min(first, depth);
@@ -6884,10 +6902,25 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
             best = k;
     memset(split, 0, sizeof *split);
     if (!(smear.all > 0.0f))
-        return TERRIMP_OK;
+        return;
     split->distance = first + (float)(best + 1u) * step;
     split->gap = TERRIMP_SQRTF(smear.all / smear.seen);
     split->gap_left = TERRIMP_SQRTF(terrimpi_max(0.0f, smear.all - smear.saved[best]) / smear.seen);
+}
+
+TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
+                                                 uint32_t vertex_count, const uint16_t *indices,
+                                                 uint32_t index_count, float reach, float overlap,
+                                                 terrimp_split *split)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(reach) || !terrimpi_finite(overlap), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
+    for (i = 0; i < index_count; i++)
+        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
+    terrimpi_capture_split(capture, xyz, vertex_count, indices, index_count, reach, overlap, split);
     return TERRIMP_OK;
 }
 
@@ -9956,11 +9989,13 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
         terrimpi_list_chunks(v, v->ground.draws_needed);
     } else {
         terrimp_result result = TERRIMP_E_CAPACITY;
+        terrimp_camera camera;
+        TERRIMPI_TRY(terrimp_camera_resolve(&v->camera, &camera));
         v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
         while (result == TERRIMP_E_CAPACITY) {
             float tolerance = v->desc.ground_tolerance_px * v->ground_scale;
             v->ground.tolerance_px = terrimpi_min(tolerance, 1000.0f);
-            result = terrimp_geomip_select(&v->terrain->tree, &v->ground, &v->camera);
+            result = terrimpi_mip_select(&v->terrain->tree, &v->ground, &camera);
             if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f) {
                 v->outdated = 1; /* select has written over the list of the frame before */
                 return result;
@@ -9968,8 +10003,6 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
             if (result == TERRIMP_E_CAPACITY)
                 v->ground_scale *= 1.3f;
         }
-        if (result != TERRIMP_OK)
-            return result;
     }
     for (i = 0; i < v->ground.draw_count; i++)
         v->leaf_at[v->ground.draws[i].node] = i;
@@ -10453,7 +10486,7 @@ static int terrimpi_seats_suit(const terrimp_view *v, const terrimpi_record *rec
         return 0;
     for (i = 0; i < part_count; i++) {
         terrimp_rect rect;
-        terrimp_live_atlas_rect(&v->atlases[record->parts[i].atlas], record->parts[i].slot, &rect);
+        rect = v->atlases[record->parts[i].atlas].slots[record->parts[i].slot];
         if (rect.width * 10u < size[0] * 9u || rect.height * 10u < size[1] * 9u ||
             rect.width * 2u > size[0] * 3u || rect.height * 2u > size[1] * 3u)
             return 0;
@@ -10476,8 +10509,7 @@ static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_j
                 return 0;
             }
     for (i = 0; i < wanted; i++)
-        terrimp_live_atlas_rect(&v->atlases[job->parts[i].atlas], job->parts[i].slot,
-                                &job->rects[i]);
+        job->rects[i] = v->atlases[job->parts[i].atlas].slots[job->parts[i].slot];
     return 1;
 }
 
@@ -10501,11 +10533,11 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const t
     const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
     terrimp_split split;
-    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
-        terrimp_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
-                              3u * mesh->triangle_count, sine * want->closest,
-                              terrimpi_depth_error(v, node, capture, box), &split) != TERRIMP_OK)
+    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || !(sine * want->closest > 0.0f))
         return 0;
+    terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
+                           3u * mesh->triangle_count, sine * want->closest,
+                           terrimpi_depth_error(v, node, capture, box), &split);
     *distance = split.distance;
     return split.gap * sine * v->pixel_factor >
                TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
@@ -11031,8 +11063,8 @@ static void terrimpi_finish_job(terrimp_view *v, const terrimpi_job *job)
     record->cost = job->cost;
     memcpy(record->eye, job->captures[0].eye, sizeof record->eye);
     for (i = 0; i < job->part_count; i++)
-        terrimp_texture_matrix(&job->captures[i], &job->rects[i], v->desc.atlas_size,
-                               v->desc.atlas_size, record->texture_matrix[i]);
+        terrimpi_texture_matrix(&job->captures[i], &job->rects[i], v->desc.atlas_size,
+                                v->desc.atlas_size, record->texture_matrix[i]);
 }
 
 /* Makes a part of a picture, or a piece of one. */
