@@ -7302,6 +7302,27 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
     return ((size_t)desc->max_slots + terrimpi_live_holes(desc)) * sizeof(terrimp_rect);
 }
 
+static void terrimpi_live_reset(terrimp_live_atlas *atlas)
+{
+    uint32_t i;
+    for (i = 0; i < atlas->desc.max_slots; i++)
+        atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
+    atlas->holes[0] = terrimpi_live_whole(atlas);
+    atlas->hole_count = 1;
+    atlas->unused = atlas->slot_end = 0;
+    atlas->slot_count = atlas->texels_used = atlas->failures = 0;
+}
+
+/* Sets an atlas up, without its first reset. */
+static void terrimpi_live_init(terrimp_live_atlas *atlas, const terrimp_live_atlas_desc *desc,
+                               void *memory)
+{
+    atlas->desc = *desc;
+    atlas->slots = (terrimp_rect *)memory;
+    atlas->holes = atlas->slots + desc->max_slots;
+    atlas->max_holes = terrimpi_live_holes(desc);
+}
+
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes)
@@ -7310,24 +7331,16 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     TERRIMPI_REFUSE(!terrimpi_live_desc_ok(desc), TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)memory % 8u != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(bytes < terrimp_live_atlas_bytes(desc), TERRIMP_E_MEMORY);
-    atlas->desc = *desc;
-    atlas->slots = (terrimp_rect *)memory;
-    atlas->holes = atlas->slots + desc->max_slots;
-    atlas->max_holes = terrimpi_live_holes(desc);
-    return terrimp_live_atlas_reset(atlas);
+    terrimpi_live_init(atlas, desc, memory);
+    terrimpi_live_reset(atlas);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
 {
-    uint32_t i;
     TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    for (i = 0; i < atlas->desc.max_slots; i++)
-        atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
-    atlas->holes[0] = terrimpi_live_whole(atlas);
-    atlas->hole_count = 1;
-    atlas->unused = atlas->slot_end = 0;
-    atlas->slot_count = atlas->texels_used = atlas->failures = 0;
+    terrimpi_live_reset(atlas);
     return TERRIMP_OK;
 }
 
@@ -9671,7 +9684,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     for (i = 0; i < v->desc.atlas_count; i++) {
         void *memory = terrimpi_take(&l, slots, 1);
         if (memory)
-            terrimp_live_atlas_init(&v->atlases[i], &atlas, memory, slots);
+            terrimpi_live_init(&v->atlases[i], &atlas, memory);
     }
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
@@ -9912,7 +9925,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
     memset(view->record_of, 0xff, view->terrain->tree.node_count * sizeof *view->record_of);
     memset(view->records, 0, view->desc.max_impostors * sizeof *view->records);
     for (i = 0; i < view->desc.atlas_count; i++)
-        terrimp_live_atlas_reset(&view->atlases[i]);
+        terrimpi_live_reset(&view->atlases[i]);
     view->job_count = 0;
     view->open = 0;
     view->outdated = 1;
@@ -10578,7 +10591,10 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
         return 0;
     size[0] = job->rects[0].width;
     size[1] = job->rects[0].height;
-    terrimp_capture_pad(front, size, TERRIMPI_MARGIN);
+    terrimpi_pad(&front->tan_left, &front->tan_right, size[0] - 2u * TERRIMPI_MARGIN,
+                 TERRIMPI_MARGIN);
+    terrimpi_pad(&front->tan_down, &front->tan_up, size[1] - 2u * TERRIMPI_MARGIN,
+                 TERRIMPI_MARGIN);
     job->strip = terrimpi_strip_width(v, job, &box, size);
     /* The border lies in front of and behind the box that was fitted. */
     border = 1.5f * (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
