@@ -3261,6 +3261,11 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
                                           the cache is lost, and ACMR is 0.99 */
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
+#ifndef TERRIMP_NO_BOUND
+#define TERRIMPI_MIP_HAS_BOUND 1
+#else
+#define TERRIMPI_MIP_HAS_BOUND 0
+#endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
 /* Whether a side of a node, or a border of a tile, runs along x: Z0 and Z1 do. Of either pair the
@@ -4058,13 +4063,19 @@ static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
 }
 
+static int terrimpi_mip_rule_fits(int rule)
+{
+    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT &&
+           (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
+}
+
 /* Checks the settings that selection and distances share. */
 static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
     TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+    TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(rule) ||
                     !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
                     !terrimpi_within(morph_ratio, 1.0f, 4.0f), TERRIMP_E_RANGE);
     return TERRIMP_OK;
@@ -4128,6 +4139,9 @@ static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera
     tan_x += margin;
     tan_y += margin;
     memcpy(f->eye, camera->eye, sizeof f->eye);
+    f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
+    if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
+        return;
     memcpy(f->forward, camera->forward, sizeof f->forward);
     f->steep = f->forward[1];
     f->level = TERRIMP_SQRTF(f->forward[0] * f->forward[0] + f->forward[2] * f->forward[2]);
@@ -4146,7 +4160,6 @@ static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera
                tan_y * terrimpi_abs(terrimpi_dot(seen, camera->up));
     f->across = tan_x * terrimpi_abs(terrimpi_dot(aside, right)) +
                 tan_y * terrimpi_abs(terrimpi_dot(aside, camera->up));
-    f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
 }
 
 /* Square of the distance from the eye to the closest point of a box. */
@@ -4220,7 +4233,8 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_plac
             return 0.0f;
     }
     d2 = terrimpi_mip_distance2(&box, f->eye);
-    measure = f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2) : split2 / d2;
+    measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
+                                                 : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
 }
 
@@ -4460,7 +4474,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_ge
     terrimp_camera_pixel_factor(camera, &pixel_factor);
     f.tree = tree;
     f.view = view;
-    f.exact = view->rule == TERRIMP_GEOMIP_BOUND;
+    f.exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
     for (level = 0; level < tree->level_count; level++)
         f.first[level] = tree->node_count;
     terrimpi_mip_aim(&f, camera, view->tolerance_px / pixel_factor);
@@ -9465,7 +9479,11 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #define TERRIMPI_SEEN 0.4f        /* of the pixels of a picture, that the screen shows */
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
+#ifndef TERRIMP_NO_SPLIT
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
+#else
+#define TERRIMPI_PARTS 1u
+#endif
 #define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
 
@@ -9651,10 +9669,9 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                          d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
                              ? terrimpi_min_u32(chunks, 4096)
                              : chunks);
-    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
-                    d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
-                    !(d.fade_end > d.fade_start) || d.atlas_size < 64u || d.atlas_size > 32768u ||
-                    d.atlas_count > 16u || d.max_impostors > 65534u ||
+    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
+                    !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
+                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u || d.max_impostors > 65534u ||
                     d.max_captures > 1024u, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
@@ -10400,7 +10417,7 @@ static int terrimpi_cell_in_part(const terrimp_view *v, const terrimpi_job *job,
     terrimp_box box;
     float first = 0.0f, last = 0.0f;
     int i;
-    if (job->part_count == 1u)
+    if (TERRIMPI_PARTS == 1u || job->part_count == 1u)
         return 1;
     {
         terrimpi_site s = terrimpi_site_of(&v->terrain->tree, node);
@@ -10546,7 +10563,8 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const t
     const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
     terrimp_split split;
-    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO || !(sine * want->closest > 0.0f))
+    if (TERRIMPI_PARTS == 1u || v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
+        !(sine * want->closest > 0.0f))
         return 0;
     terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
                            3u * mesh->triangle_count, sine * want->closest,
@@ -10563,7 +10581,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
                                 terrimpi_job *job)
 {
     const terrimp_costs *costs = &v->desc.costs;
-    terrimp_capture *front = &job->captures[0], *back = &job->captures[1];
+    terrimp_capture *front = &job->captures[0], *back = &job->captures[TERRIMPI_PARTS - 1u];
     terrimp_box box;
     float eye[3], border, split = 0.0f;
     uint32_t size[2], i;
@@ -10586,7 +10604,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     job->in_pieces = v->desc.max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_split_at(v, want, &box, front, &split))
-        job->part_count = 2;
+        job->part_count = TERRIMPI_PARTS;
     if (!terrimpi_seat_job(v, size, job))
         return 0;
     size[0] = job->rects[0].width;
@@ -10602,9 +10620,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
              terrimpi_max(v->terrain->desc.field.spacing_x, v->terrain->desc.field.spacing_z);
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
-    *back = *front;
-    if (job->part_count == 2u) {
+    if (job->part_count > 1u) {
         float overlap = terrimpi_depth_error(v, want->site.node, front, &box);
+        *back = *front;
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
     }
