@@ -9911,13 +9911,20 @@ static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_
     return 0;
 }
 
-/* Gives back what a job has taken and not used. */
-static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
+/* Gives back seats of a job or of its record, unless the two have the same. */
+static void terrimpi_drop_unshared(terrimp_view *v, const terrimpi_job *job,
+                                   const terrimpi_seat *seats, uint32_t count)
 {
     const terrimpi_record *record = &v->records[job->record];
     if (record->part_count != job->part_count ||
         memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
-        terrimpi_drop_seats(v, job->parts, job->part_count);
+        terrimpi_drop_seats(v, seats, count);
+}
+
+/* Gives back what a job has taken and not used. */
+static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
+{
+    terrimpi_drop_unshared(v, job, job->parts, job->part_count);
 }
 
 /* The same for all jobs of a frame that is not rendered, but for a picture that has been begun. */
@@ -11023,14 +11030,12 @@ static void terrimpi_follow(terrimp_view *v, const float before[3])
 {
     float step[3];
     uint32_t i;
-    for (i = 0; i < 3u; i++)
+    for (i = 0; i < 3u; i++) {
         step[i] = v->camera.eye[i] - before[i];
-    if (v->frame <= 1u || terrimpi_length(step) > 0.5f * v->desc.fade_start)
-        memset(v->motion, 0, sizeof v->motion);
-    else
-        for (i = 0; i < 3u; i++)
-            v->motion[i] = 0.75f * v->motion[i] + 0.25f * step[i];
-    if (terrimpi_length(v->motion) < 1e-6f * v->desc.fade_start)
+        v->motion[i] = 0.75f * v->motion[i] + 0.25f * step[i];
+    }
+    if (v->frame <= 1u || terrimpi_length(step) > 0.5f * v->desc.fade_start ||
+        terrimpi_length(v->motion) < 1e-6f * v->desc.fade_start)
         memset(v->motion, 0, sizeof v->motion);
 }
 
@@ -11087,9 +11092,7 @@ static void terrimpi_finish_job(terrimp_view *v, const terrimpi_job *job)
         float frames = (float)record->drawn_count;
         v->stats.reuse += (frames - v->stats.reuse) * (v->stats.reuse > 0.0f ? 0.02f : 1.0f);
     }
-    if (record->part_count != job->part_count ||
-        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
-        terrimpi_drop_seats(v, record->parts, record->part_count);
+    terrimpi_drop_unshared(v, job, record->parts, record->part_count);
     record->part_count = job->part_count;
     memcpy(record->parts, job->parts, sizeof record->parts);
     record->drawn_count = 0;
