@@ -136,15 +136,19 @@
          TERRIMP_STATIC        functions are static: for one file alone (also before the API)
          TERRIMP_API           their linkage, when that is not enough (also before the API)
          TERRIMP_ASSERT(c)     instead of assert.h
-         TERRIMP_SQRTF and SINF, COSF, TANF, ASINF, ACOSF   all six, instead of math.h
+         TERRIMP_SQRTF and SINF, COSF, TANF, ASINF, ACOSF   all six, instead of math.h; and
+                               FABSF, if the machine has an instruction for it
          TERRIMP_MALLOC(bytes), TERRIMP_FREE(pointer)       instead of stdlib.h
          TERRIMP_NO_MALLOC     no create and destroy, no stdlib.h (also before the API)
          TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
                                before the API)
+         TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
+         TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
+         TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links about 29 KB of code at
-       -Os on a Cortex-M4, if its linker drops unused functions: -ffunction-sections for the
-       compiler, --gc-sections for the linker. Small state: 257 x 257 samples in chunks of 16 from
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on a
+       Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops unused
+       functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small state: 257 x 257 samples in chunks of 16 from
        a bake, 24 pictures and 64 ground nodes, take under 32 KiB in all.
 
    REFERENCES
@@ -3261,6 +3265,11 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
                                           the cache is lost, and ACMR is 0.99 */
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
+#ifndef TERRIMP_NO_MORPH
+#define TERRIMPI_MIP_MORPH_MOST 4.0f
+#else
+#define TERRIMPI_MIP_MORPH_MOST 1.0f
+#endif
 #ifndef TERRIMP_NO_BOUND
 #define TERRIMPI_MIP_HAS_BOUND 1
 #else
@@ -4077,7 +4086,7 @@ static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, floa
     TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(rule) ||
                     !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
-                    !terrimpi_within(morph_ratio, 1.0f, 4.0f), TERRIMP_E_RANGE);
+                    !terrimpi_within(morph_ratio, 1.0f, TERRIMPI_MIP_MORPH_MOST), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -4348,7 +4357,8 @@ static void terrimpi_mip_balance(terrimpi_mip_frame *f)
 static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_place p)
 {
     float ratio = f->view->morph_ratio, measure;
-    if (!(ratio > 1.0f) || p.level + 1u >= f->tree->level_count)
+    if (TERRIMPI_MIP_MORPH_MOST <= 1.0f || !(ratio > 1.0f) ||
+        p.level + 1u >= f->tree->level_count)
         return 0.0f;
     measure = terrimpi_mip_marked(
         f, terrimpi_mip_number(f->tree, p.level + 1u, p.x / 2u, p.z / 2u));
@@ -7423,14 +7433,12 @@ static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const 
     return best;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, uint32_t *slot)
+/* terrimp_live_atlas_alloc of checked arguments. */
+static terrimp_result terrimpi_live_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                          uint32_t height, uint32_t *slot)
 {
     uint32_t hole, handle;
     terrimp_rect taken, whole;
-    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
     hole = terrimpi_live_find(atlas, width, height);
     handle = atlas->unused;
     if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
@@ -7448,6 +7456,15 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     terrimpi_holes_cut(atlas, 0, &taken, &whole);
     *slot = handle;
     return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, uint32_t *slot)
+{
+    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
+    return terrimpi_live_alloc(atlas, width, height, slot);
 }
 
 /* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
@@ -7502,14 +7519,11 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2])
+/* terrimp_live_atlas_room of checked arguments. */
+static void terrimpi_live_room(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
+                               uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
-                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
         uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
@@ -7531,6 +7545,16 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
         best_x = best_y = 0;
     size[0] = best_x;
     size[1] = best_y;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2])
+{
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
+    terrimpi_live_room(atlas, width, height, size);
     return TERRIMP_OK;
 }
 
@@ -9630,7 +9654,7 @@ static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrim
         coarse = terrimpi_clamp(d->tolerance_px, 1.0f, 9.0f);
     terrimpi_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px), 0.05f,
                      100.0f, &result);
-    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, 4.0f, &result);
+    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, TERRIMPI_MIP_MORPH_MOST, &result);
     terrimpi_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
                      &result);
     terrimpi_setting(&d->fade_end, (d->mode == TERRIMP_MODE_AUTO ? 1.25f : 1.5f) * d->fade_start,
@@ -9891,8 +9915,8 @@ static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_
     uint32_t room[2], oldest;
     for (;;) {
         for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++)
-            if (terrimp_live_atlas_alloc(&v->atlases[seat->atlas], size[0], size[1],
-                                         &seat->slot) == TERRIMP_OK)
+            if (terrimpi_live_alloc(&v->atlases[seat->atlas], size[0], size[1], &seat->slot) ==
+                TERRIMP_OK)
                 return 1;
         oldest = terrimpi_oldest_record(v);
         if (oldest == TERRIMPI_NO_RECORD)
@@ -9903,10 +9927,10 @@ static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_
     v->stats.atlas_failures++;
     for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++) {
         terrimp_live_atlas *atlas = &v->atlases[seat->atlas];
-        if (terrimp_live_atlas_room(atlas, size[0], size[1], room) == TERRIMP_OK &&
-            room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
+        terrimpi_live_room(atlas, size[0], size[1], room);
+        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
             room[0] > 2u * TERRIMPI_MARGIN && room[1] > 2u * TERRIMPI_MARGIN)
-            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &seat->slot) == TERRIMP_OK;
+            return terrimpi_live_alloc(atlas, room[0], room[1], &seat->slot) == TERRIMP_OK;
     }
     return 0;
 }
