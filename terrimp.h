@@ -148,8 +148,9 @@
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on a
        Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops unused
-       functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small state: 257 x 257 samples in chunks of 16 from
-       a bake, 24 pictures and 64 ground nodes, take under 32 KiB in all.
+       functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small state:
+       257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take under
+       32 KiB in all.
 
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
@@ -9695,8 +9696,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                              : chunks);
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
-                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u || d.max_impostors > 65534u ||
-                    d.max_captures > 1024u, TERRIMP_E_RANGE);
+                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
+                    d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
