@@ -146,10 +146,10 @@
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on a
-       Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops unused
-       functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small state:
-       257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take under
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on
+       a Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops
+       unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
+       state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take under
        32 KiB in all.
 
    REFERENCES
