@@ -149,8 +149,8 @@
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on
        a Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
-       state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take under
-       32 KiB in all.
+       state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
+       under 32 KiB in all.
 
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
