@@ -136,16 +136,21 @@
          TERRIMP_STATIC        functions are static: for one file alone (also before the API)
          TERRIMP_API           their linkage, when that is not enough (also before the API)
          TERRIMP_ASSERT(c)     instead of assert.h
-         TERRIMP_SQRTF and SINF, COSF, TANF, ASINF, ACOSF   all six, instead of math.h
+         TERRIMP_SQRTF and SINF, COSF, TANF, ASINF, ACOSF   all six, instead of math.h; and
+                               FABSF, if the machine has an instruction for it
          TERRIMP_MALLOC(bytes), TERRIMP_FREE(pointer)       instead of stdlib.h
          TERRIMP_NO_MALLOC     no create and destroy, no stdlib.h (also before the API)
          TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
                                before the API)
+         TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
+         TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
+         TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links about 29 KB of code at
-       -Os on a Cortex-M4, if its linker drops unused functions: -ffunction-sections for the
-       compiler, --gc-sections for the linker. Small state: 257 x 257 samples in chunks of 16 from
-       a bake, 24 pictures and 64 ground nodes, take under 32 KiB in all.
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on
+       a Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops
+       unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
+       state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
+       under 32 KiB in all.
 
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
@@ -1817,6 +1822,10 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view);
 #define TERRIMP_TANF(x) tanf(x)
 #define TERRIMP_ASINF(x) asinf(x)
 #define TERRIMP_ACOSF(x) acosf(x)
+#define TERRIMP_FABSF(x) fabsf(x)
+#endif
+#ifndef TERRIMP_FABSF /* one instruction where there is one */
+#define TERRIMP_FABSF(x) ((x) < 0.0f ? -(x) : (x))
 #endif
 #ifndef TERRIMP_ASSERT
 #include <assert.h>
@@ -1901,7 +1910,7 @@ static int terrimpi_within_u32(uint32_t v, uint32_t low, uint32_t high)
 
 static float terrimpi_min(float a, float b) { return a < b ? a : b; }
 static float terrimpi_max(float a, float b) { return a > b ? a : b; }
-static float terrimpi_abs(float a) { return a < 0.0f ? -a : a; }
+static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
@@ -3157,33 +3166,50 @@ static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t cou
     return 1;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture)
+/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error. */
+static terrimp_result terrimpi_capture_fit(const terrimp_box *box, const float eye[3],
+                                           terrimp_capture *c)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
     static const float origin[3] = {0.0f, 0.0f, 0.0f};
-    terrimp_capture c;
     float corners[8][3];
     int i;
+    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
+    for (i = 0; i < 3; i++) {
+        c->eye[i] = eye[i];
+        c->forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
+    }
+    TERRIMPI_REFUSE(!terrimpi_normalize(c->forward), TERRIMP_E_INSIDE);
+    memcpy(c->up, c->forward[1] * c->forward[1] > 0.9999f ? minus_z : y_axis, sizeof c->up);
+    terrimpi_basis(c->forward, c->up, c->right);
+    for (i = 0; i < 8; i++)
+        terrimpi_box_corner(box, i, origin, corners[i]);
+    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
+    return terrimpi_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture)
+{
+    terrimp_capture c;
     TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
                     box->min[2] > box->max[2], TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
-    for (i = 0; i < 3; i++) {
-        c.eye[i] = eye[i];
-        c.forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
-    }
-    TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_INSIDE);
-    memcpy(c.up, c.forward[1] * c.forward[1] > 0.9999f ? minus_z : y_axis, sizeof c.up);
-    terrimpi_basis(c.forward, c.up, c.right);
-    for (i = 0; i < 8; i++)
-        terrimpi_box_corner(box, i, origin, corners[i]);
-    /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, corners[0], 8, 0.001f), TERRIMP_E_BEHIND);
+    TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
+}
+
+/* Fits the sides alone. */
+static int terrimpi_capture_tighten(terrimp_capture *c, const float *xyz, uint32_t count)
+{
+    float z_near = c->z_near, z_far = c->z_far;
+    int fits = terrimpi_fit_sides(c, xyz, count, 0.0f);
+    c->z_near = z_near;
+    c->z_far = z_far;
+    return fits;
 }
 
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
@@ -3193,9 +3219,7 @@ TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, con
     TERRIMPI_REFUSE(!capture || !xyz, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
     c = *capture;
-    TERRIMPI_REFUSE(!terrimpi_fit_sides(&c, xyz, count, 0.0f), TERRIMP_E_BEHIND);
-    c.z_near = capture->z_near;
-    c.z_far = capture->z_far;
+    TERRIMPI_REFUSE(!terrimpi_capture_tighten(&c, xyz, count), TERRIMP_E_BEHIND);
     *capture = c;
     return TERRIMP_OK;
 }
@@ -3244,6 +3268,16 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
                                           the cache is lost, and ACMR is 0.99 */
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
+#ifndef TERRIMP_NO_MORPH
+#define TERRIMPI_MIP_MORPH_MOST 4.0f
+#else
+#define TERRIMPI_MIP_MORPH_MOST 1.0f
+#endif
+#ifndef TERRIMP_NO_BOUND
+#define TERRIMPI_MIP_HAS_BOUND 1
+#else
+#define TERRIMPI_MIP_HAS_BOUND 0
+#endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
 /* Whether a side of a node, or a border of a tile, runs along x: Z0 and Z1 do. Of either pair the
@@ -4041,27 +4075,29 @@ static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
 }
 
+static int terrimpi_mip_rule_fits(int rule)
+{
+    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT &&
+           (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
+}
+
 /* Checks the settings that selection and distances share. */
 static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
     TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(rule < 0 || rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+    TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(rule) ||
                     !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
-                    !terrimpi_within(morph_ratio, 1.0f, 4.0f), TERRIMP_E_RANGE);
+                    !terrimpi_within(morph_ratio, 1.0f, TERRIMPI_MIP_MORPH_MOST), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances)
+/* terrimp_geomip_distances of checked settings. */
+static void terrimpi_mip_distances(const terrimp_geomip *tree, int rule, float tolerance_px,
+                                   float morph_ratio, float pixel_factor, float *distances)
 {
     uint32_t level, node;
-    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
-    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++)
         for (node = tree->level_first[level]; node < tree->level_first[level + 1u]; node++)
             distances[node] =
@@ -4071,6 +4107,17 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
         float *d = &distances[terrimpi_mip_parent(tree, node)];
         *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
     }
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
+                                                    float tolerance_px, float morph_ratio,
+                                                    float pixel_factor, float *distances)
+{
+    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
+    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
+    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
     return TERRIMP_OK;
 }
 
@@ -4104,6 +4151,9 @@ static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera
     tan_x += margin;
     tan_y += margin;
     memcpy(f->eye, camera->eye, sizeof f->eye);
+    f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
+    if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
+        return;
     memcpy(f->forward, camera->forward, sizeof f->forward);
     f->steep = f->forward[1];
     f->level = TERRIMP_SQRTF(f->forward[0] * f->forward[0] + f->forward[2] * f->forward[2]);
@@ -4122,7 +4172,6 @@ static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera
                tan_y * terrimpi_abs(terrimpi_dot(seen, camera->up));
     f->across = tan_x * terrimpi_abs(terrimpi_dot(aside, right)) +
                 tan_y * terrimpi_abs(terrimpi_dot(aside, camera->up));
-    f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
 }
 
 /* Square of the distance from the eye to the closest point of a box. */
@@ -4196,7 +4245,8 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_plac
             return 0.0f;
     }
     d2 = terrimpi_mip_distance2(&box, f->eye);
-    measure = f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2) : split2 / d2;
+    measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
+                                                 : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
 }
 
@@ -4310,7 +4360,8 @@ static void terrimpi_mip_balance(terrimpi_mip_frame *f)
 static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_place p)
 {
     float ratio = f->view->morph_ratio, measure;
-    if (!(ratio > 1.0f) || p.level + 1u >= f->tree->level_count)
+    if (TERRIMPI_MIP_MORPH_MOST <= 1.0f || !(ratio > 1.0f) ||
+        p.level + 1u >= f->tree->level_count)
         return 0.0f;
     measure = terrimpi_mip_marked(
         f, terrimpi_mip_number(f->tree, p.level + 1u, p.x / 2u, p.z / 2u));
@@ -4408,8 +4459,8 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
-    terrimp_geomip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
-                             v->distances);
+    terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
+                           v->distances);
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
@@ -4425,40 +4476,50 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
     return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
 }
 
+/* terrimp_geomip_select with resolved settings and camera. */
+static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_geomip_view *view,
+                                          const terrimp_camera *camera)
+{
+    terrimpi_mip_frame f;
+    float pixel_factor;
+    uint32_t level;
+    terrimp_camera_frustum(camera, &f.frustum);
+    terrimp_camera_pixel_factor(camera, &pixel_factor);
+    f.tree = tree;
+    f.view = view;
+    f.exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
+    for (level = 0; level < tree->level_count; level++)
+        f.first[level] = tree->node_count;
+    terrimpi_mip_aim(&f, camera, view->tolerance_px / pixel_factor);
+    terrimpi_mip_refresh(&f, pixel_factor);
+    view->frame = view->frame + 1u == 0 ? 1u : view->frame + 1u; /* 0 is what fresh marks say */
+    terrimpi_mip_mark_errors(&f);
+    terrimpi_mip_balance(&f);
+    terrimpi_mip_collect(&f);
+    view->draw_count = view->draws_needed;
+    if (view->draws_needed <= view->draw_capacity)
+        return TERRIMP_OK;
+    view->draw_count = view->triangle_count = 0;
+    return TERRIMP_E_CAPACITY;
+}
+
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera)
 {
-    terrimpi_mip_frame f;
     terrimp_geomip_view v;
     terrimp_camera c;
-    float pixel_factor;
-    uint32_t level;
+    terrimp_result result;
     TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
     TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
-    terrimp_camera_frustum(&c, &f.frustum);
-    terrimp_camera_pixel_factor(&c, &pixel_factor);
-    f.tree = tree;
-    f.view = &v;
-    f.exact = v.rule == TERRIMP_GEOMIP_BOUND;
-    for (level = 0; level < tree->level_count; level++)
-        f.first[level] = tree->node_count;
-    terrimpi_mip_aim(&f, &c, v.tolerance_px / pixel_factor);
-    terrimpi_mip_refresh(&f, pixel_factor);
-    v.frame = v.frame + 1u == 0 ? 1u : v.frame + 1u; /* 0 is what fresh marks say */
-    terrimpi_mip_mark_errors(&f);
-    terrimpi_mip_balance(&f);
-    terrimpi_mip_collect(&f);
-    view->frame = v.frame;
-    memcpy(view->distances_for, v.distances_for, sizeof v.distances_for);
-    view->draws_needed = v.draws_needed;
-    view->draw_count = view->triangle_count = 0;
-    TERRIMPI_REFUSE(v.draws_needed > v.draw_capacity, TERRIMP_E_CAPACITY);
-    view->draw_count = v.draws_needed;
-    view->triangle_count = v.triangle_count;
-    return TERRIMP_OK;
+    result = terrimpi_mip_select(tree, &v, &c);
+    v.rule = view->rule;
+    v.tolerance_px = view->tolerance_px;
+    v.morph_ratio = view->morph_ratio;
+    *view = v;
+    return result;
 }
 
 /* ---- vertices and morphing ---- */
@@ -6494,11 +6555,23 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
 #define TERRIMPI_SPLITS 24u /* places of a split that are tried */
 #define TERRIMPI_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
 
+/* The size of a picture of width x height texels within limits; returns the scale. */
+static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
+                                   uint32_t size[2])
+{
+    float longest = terrimpi_max(width, height), reduce = 1.0f;
+    if (longest > (float)largest)
+        reduce = (float)largest / longest;
+    size[0] = terrimpi_clamp_u32(terrimpi_ceil_u32(width * reduce), smallest, largest);
+    size[1] = terrimpi_clamp_u32(terrimpi_ceil_u32(height * reduce), smallest, largest);
+    return reduce;
+}
+
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
                                                  uint32_t largest, uint32_t size[2], float *scale)
 {
-    float density, width, height, longest, reduce = 1.0f;
+    float density, width, height, reduce;
     TERRIMPI_REFUSE(!capture || !size, TERRIMP_E_NULL);
     density = pixel_factor * texels_per_px;
     width = (capture->tan_right - capture->tan_left) * density;
@@ -6507,11 +6580,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
     TERRIMPI_REFUSE(!(pixel_factor > 0.0f) || !(texels_per_px > 0.0f) || !(width > 0.0f) ||
                     !(height > 0.0f) || largest < 1u || largest > 65536u ||
                     smallest > largest, TERRIMP_E_RANGE);
-    longest = terrimpi_max(width, height);
-    if (longest > (float)largest)
-        reduce = (float)largest / longest;
-    size[0] = terrimpi_clamp_u32(terrimpi_ceil_u32(width * reduce), smallest, largest);
-    size[1] = terrimpi_clamp_u32(terrimpi_ceil_u32(height * reduce), smallest, largest);
+    reduce = terrimpi_picture_size(width, height, smallest, largest, size);
     if (scale)
         *scale = reduce;
     return TERRIMP_OK;
@@ -6536,18 +6605,12 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
-                                                  const terrimp_rect *slot, uint32_t atlas_width,
-                                                  uint32_t atlas_height, float matrix[16])
+static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrimp_rect *slot,
+                                    uint32_t atlas_width, uint32_t atlas_height, float matrix[16])
 {
     float view[16], projection[16];
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
-    TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
-                    atlas_height < 1u || slot->x > atlas_width ||
-                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
-                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
     terrimp_capture_matrices(capture, 0, view, projection);
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
@@ -6567,6 +6630,18 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
         }
         matrix[column * 4 + 3] = q;
     }
+}
+
+TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
+                                                  const terrimp_rect *slot, uint32_t atlas_width,
+                                                  uint32_t atlas_height, float matrix[16])
+{
+    TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
+                    atlas_height < 1u || slot->x > atlas_width ||
+                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
+                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
+    terrimpi_texture_matrix(capture, slot, atlas_width, atlas_height, matrix);
     return TERRIMP_OK;
 }
 
@@ -6595,12 +6670,12 @@ static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float ca
                : TERRIMP_E_NOT_FINITE;
 }
 
-TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
-                                              const float eye[3], float *angle_rad)
+/* The functions of this room that a view calls check nothing; those of the API do. */
+static float terrimpi_view_angle(const terrimp_box *box, const float captured_eye[3],
+                                 const float eye[3])
 {
     float worst = 0.0f; /* grows with the angle: its sine up to 60 degrees, then 2 - its cosine */
     int i;
-    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
     for (i = 0; i < 8; i++) {
         float a[3], b[3], across[3], cosine;
         terrimpi_box_corner(box, i, captured_eye, a);
@@ -6612,10 +6687,14 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
         /* The cosine is blind to small angles, the sine to those around 90 degrees. */
         worst = terrimpi_max(worst, cosine > 0.5f ? terrimpi_length(across) : 2.0f - cosine);
     }
-    if (worst <= 1.0f)
-        *angle_rad = TERRIMP_ASINF(worst);
-    else
-        *angle_rad = TERRIMP_ACOSF(terrimpi_max(2.0f - worst, -1.0f));
+    return worst <= 1.0f ? TERRIMP_ASINF(worst) : TERRIMP_ACOSF(terrimpi_max(2.0f - worst, -1.0f));
+}
+
+TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
+                                              const float eye[3], float *angle_rad)
+{
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
+    *angle_rad = terrimpi_view_angle(box, captured_eye, eye);
     return TERRIMP_OK;
 }
 
@@ -6651,29 +6730,33 @@ static float terrimpi_largest_sine(const terrimp_box *box, const float eye[3], c
    sin(APB) = |AB| sin(BAP) / |BP|. With d the distance from B to the box, which holds P:
    |BP| >= d, |QB| >= d - error. The tangent of that angle times K is the distance in pixels at the
    middle of the screen. */
-TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
-                                                  const float captured_eye[3], const float eye[3],
-                                                  float pixel_factor, float *error_px)
+static float terrimpi_parallax_error(const terrimp_box *box, float error,
+                                     const float captured_eye[3], const float eye[3],
+                                     float pixel_factor)
 {
     float move[3], move_length, distance, sine;
-    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
-    TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
     terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
-    *error_px = 0.0f;
     if (!(move_length > 0.0f) || !(error > 0.0f))
-        return TERRIMP_OK;
+        return 0.0f;
     distance = terrimp_box_distance(box, eye);
     sine = 1.0f;
     if (distance > error)
         sine = error / (distance - error) *
                terrimpi_min(1.0f, move_length / distance *
                                       terrimpi_largest_sine(box, captured_eye, move, move_length));
-    if (sine < 0.999f)
-        *error_px = pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine);
-    else
-        *error_px = TERRIMPI_INFINITY;
+    return sine < 0.999f ? pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine)
+                         : TERRIMPI_INFINITY;
+}
+
+TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
+                                                  const float captured_eye[3], const float eye[3],
+                                                  float pixel_factor, float *error_px)
+{
+    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
+    TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
+    *error_px = terrimpi_parallax_error(box, error, captured_eye, eye, pixel_factor);
     return TERRIMP_OK;
 }
 
@@ -6822,20 +6905,15 @@ static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
     }
 }
 
-TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
-                                                 uint32_t vertex_count, const uint16_t *indices,
-                                                 uint32_t index_count, float reach, float overlap,
-                                                 terrimp_split *split)
+/* terrimp_capture_split of checked arguments. */
+static void terrimpi_capture_split(const terrimp_capture *capture, const float *xyz,
+                                   uint32_t vertex_count, const uint16_t *indices,
+                                   uint32_t index_count, float reach, float overlap,
+                                   terrimp_split *split)
 {
     float first = TERRIMPI_FLOAT_MAX, last = 0.0f, step;
     uint32_t i, k, best = 0;
     terrimpi_smear smear;
-    TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(reach) || !terrimpi_finite(overlap), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
-    for (i = 0; i < index_count; i++)
-        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
     for (i = 0; i < vertex_count; i++) {
         float depth = terrimpi_depth(capture, xyz + i * 3u);
         first = terrimpi_min(first, depth);
@@ -6851,10 +6929,25 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
             best = k;
     memset(split, 0, sizeof *split);
     if (!(smear.all > 0.0f))
-        return TERRIMP_OK;
+        return;
     split->distance = first + (float)(best + 1u) * step;
     split->gap = TERRIMP_SQRTF(smear.all / smear.seen);
     split->gap_left = TERRIMP_SQRTF(terrimpi_max(0.0f, smear.all - smear.saved[best]) / smear.seen);
+}
+
+TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
+                                                 uint32_t vertex_count, const uint16_t *indices,
+                                                 uint32_t index_count, float reach, float overlap,
+                                                 terrimp_split *split)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(reach) || !terrimpi_finite(overlap), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
+    for (i = 0; i < index_count; i++)
+        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
+    terrimpi_capture_split(capture, xyz, vertex_count, indices, index_count, reach, overlap, split);
     return TERRIMP_OK;
 }
 
@@ -7236,6 +7329,27 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
     return ((size_t)desc->max_slots + terrimpi_live_holes(desc)) * sizeof(terrimp_rect);
 }
 
+static void terrimpi_live_reset(terrimp_live_atlas *atlas)
+{
+    uint32_t i;
+    for (i = 0; i < atlas->desc.max_slots; i++)
+        atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
+    atlas->holes[0] = terrimpi_live_whole(atlas);
+    atlas->hole_count = 1;
+    atlas->unused = atlas->slot_end = 0;
+    atlas->slot_count = atlas->texels_used = atlas->failures = 0;
+}
+
+/* Sets an atlas up, without its first reset. */
+static void terrimpi_live_init(terrimp_live_atlas *atlas, const terrimp_live_atlas_desc *desc,
+                               void *memory)
+{
+    atlas->desc = *desc;
+    atlas->slots = (terrimp_rect *)memory;
+    atlas->holes = atlas->slots + desc->max_slots;
+    atlas->max_holes = terrimpi_live_holes(desc);
+}
+
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes)
@@ -7244,24 +7358,16 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     TERRIMPI_REFUSE(!terrimpi_live_desc_ok(desc), TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)memory % 8u != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(bytes < terrimp_live_atlas_bytes(desc), TERRIMP_E_MEMORY);
-    atlas->desc = *desc;
-    atlas->slots = (terrimp_rect *)memory;
-    atlas->holes = atlas->slots + desc->max_slots;
-    atlas->max_holes = terrimpi_live_holes(desc);
-    return terrimp_live_atlas_reset(atlas);
+    terrimpi_live_init(atlas, desc, memory);
+    terrimpi_live_reset(atlas);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
 {
-    uint32_t i;
     TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    for (i = 0; i < atlas->desc.max_slots; i++)
-        atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
-    atlas->holes[0] = terrimpi_live_whole(atlas);
-    atlas->hole_count = 1;
-    atlas->unused = atlas->slot_end = 0;
-    atlas->slot_count = atlas->texels_used = atlas->failures = 0;
+    terrimpi_live_reset(atlas);
     return TERRIMP_OK;
 }
 
@@ -7330,14 +7436,12 @@ static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const 
     return best;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, uint32_t *slot)
+/* terrimp_live_atlas_alloc of checked arguments. */
+static terrimp_result terrimpi_live_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                          uint32_t height, uint32_t *slot)
 {
     uint32_t hole, handle;
     terrimp_rect taken, whole;
-    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
     hole = terrimpi_live_find(atlas, width, height);
     handle = atlas->unused;
     if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
@@ -7355,6 +7459,15 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     terrimpi_holes_cut(atlas, 0, &taken, &whole);
     *slot = handle;
     return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, uint32_t *slot)
+{
+    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
+    return terrimpi_live_alloc(atlas, width, height, slot);
 }
 
 /* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
@@ -7409,14 +7522,11 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2])
+/* terrimp_live_atlas_room of checked arguments. */
+static void terrimpi_live_room(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
+                               uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
-                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < atlas->hole_count; i++) {
         const terrimp_rect *hole = &atlas->holes[i];
         uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
@@ -7438,6 +7548,16 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
         best_x = best_y = 0;
     size[0] = best_x;
     size[1] = best_y;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2])
+{
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
+    terrimpi_live_room(atlas, width, height, size);
     return TERRIMP_OK;
 }
 
@@ -7644,8 +7764,6 @@ typedef struct terrimpi_point {
 } terrimpi_point;
 
 struct terrimp_terrain {
-    terrimp_terrain_desc desc; /* resolved */
-    terrimp_geomip tree;
     uint32_t border_limit, vertex_limit, index_limit; /* of one surface; the last ones are kept */
     uint32_t vertex_stride, index_stride;  /* of the host's buffers */
     uint32_t mesh_triangle_count;          /* all nodes */
@@ -7656,6 +7774,8 @@ struct terrimp_terrain {
     terrimpi_mesh *meshes;                 /* [node_count] */
     terrimpi_point *points;                /* [node_count][vertex_limit] */
     uint8_t *corners;                      /* [node_count][index_limit] indices of the surface */
+    terrimp_terrain_desc desc; /* resolved */
+    terrimp_geomip tree;
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;           /* of create; release is NULL otherwise */
     size_t bytes;
@@ -7770,6 +7890,17 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
     p.cols = ((p.span_x - 1u) >> p.level) + 2u;
     p.rows = ((p.span_z - 1u) >> p.level) + 2u;
     return p;
+}
+
+/* Samples from the node's first one to a point of its mesh. */
+static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
+{
+    return terrimpi_min_u32((uint32_t)point->x << p->level, p->span_x);
+}
+
+static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
+{
+    return terrimpi_min_u32((uint32_t)point->z << p->level, p->span_z);
 }
 
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
@@ -8735,8 +8866,7 @@ static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, float 
     return terrimpi_min(height, terrimpi_max(range->low, height - depth));
 }
 
-/* Writes one node's vertices and indices with skirts, its whole share of the buffers; the floor's
-   when the node is node_count. */
+/* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
 static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
                                uint16_t *indices)
 {
@@ -8746,10 +8876,6 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
     terrimpi_patch p;
     uint32_t i, vertices, index_count;
     int upper;
-    if (node == t->tree.node_count) {
-        terrimpi_fill_floor(t, xyz, indices);
-        return;
-    }
     p = terrimpi_patch_of(t, node);
     vertices = mesh->vertex_count;
     index_count = 3u * mesh->triangle_count;
@@ -8792,7 +8918,10 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
     TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
                     index_capacity < index_count, TERRIMP_E_CAPACITY);
-    terrimpi_fill_mesh(terrain, node, xyz, indices);
+    if (is_floor)
+        terrimpi_fill_floor(terrain, xyz, indices);
+    else
+        terrimpi_fill_mesh(terrain, node, xyz, indices);
     return TERRIMP_OK;
 }
 
@@ -8807,9 +8936,11 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
     if (xyz_capacity / 3u < nodes * terrain->vertex_stride + terrimpi_floor_vertices(terrain) ||
         index_capacity < nodes * terrain->index_stride + terrimpi_floor_indices(terrain))
         return TERRIMP_E_CAPACITY;
-    for (node = 0; node <= nodes; node++)
+    for (node = 0; node < nodes; node++)
         terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + node * terrain->vertex_stride * 3u,
                            indices + node * terrain->index_stride);
+    terrimpi_fill_floor(terrain, xyz + nodes * terrain->vertex_stride * 3u,
+                        indices + nodes * terrain->index_stride);
     return TERRIMP_OK;
 }
 
@@ -9132,19 +9263,20 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const te
     const terrimpi_mesh *mesh = &t->meshes[node];
     const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
     const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    int64_t area, all = 0;
+    int64_t all = 0;
     uint32_t i, k, edges = 0, border = mesh->border_count;
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
-        int64_t x[3], z[3];
+        int32_t x[3], z[3];
+        int64_t area;
         for (k = 0; k < 3u; k++) {
             if (corners[k] >= mesh->vertex_count)
                 return 0;
-            x[k] = terrimpi_min_u32((uint32_t)points[corners[k]].x << p->level, p->span_x);
-            z[k] = terrimpi_min_u32((uint32_t)points[corners[k]].z << p->level, p->span_z);
+            x[k] = (int32_t)terrimpi_point_x(p, &points[corners[k]]);
+            z[k] = (int32_t)terrimpi_point_z(p, &points[corners[k]]);
         }
-        area = (z[1] - z[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (z[2] - z[0]);
+        area = (int64_t)(z[1] - z[0]) * (x[2] - x[0]) - (int64_t)(x[1] - x[0]) * (z[2] - z[0]);
         if (area <= 0)
             return 0;
         all += area;
@@ -9162,14 +9294,20 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
     const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
     const float most = TERRIMPI_FLOAT_MAX, slack = t->range_step; /* other machines round */
     terrimpi_patch p = terrimpi_patch_of(t, node);
+    float sizes[5];
     uint32_t i;
+    sizes[0] = ground->error;
+    sizes[1] = ground->rms;
+    sizes[2] = mesh->error;
+    sizes[3] = mesh->error_rms;
+    sizes[4] = mesh->upper_skirt;
+    for (i = 0; i < 5u; i++)
+        if (!terrimpi_within(sizes[i], 0.0f, most))
+            return 0;
     if (!terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
         !terrimpi_within(ground->low, mesh->low, mesh->high) ||
         !terrimpi_within(ground->high, ground->low, mesh->high) ||
-        !terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
-        !terrimpi_within(mesh->error, 0.0f, most) ||
-        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
-        !terrimpi_within(mesh->upper_skirt, 0.0f, t->desc.upper_skirts ? most : 0.0f))
+        (!t->desc.upper_skirts && mesh->upper_skirt > 0.0f))
         return 0;
     if (mesh->border_count < 4u || mesh->border_count > t->border_limit ||
         mesh->vertex_count < mesh->border_count || mesh->vertex_count > t->vertex_limit ||
@@ -9186,22 +9324,14 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
            terrimpi_corners_ok(t, node, &p);
 }
 
-/* Whether every node is held by its parent. */
-static int terrimpi_hierarchy_ok(const terrimp_terrain *t)
+/* Whether a node is held by its parent. */
+static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
-    uint32_t level, x, z;
-    for (level = 1; level < t->tree.level_count; level++)
-        for (z = 0; z < t->tree.level_z[level - 1u]; z++)
-            for (x = 0; x < t->tree.level_x[level - 1u]; x++) {
-                uint32_t child = terrimpi_mip_number(&t->tree, level - 1u, x, z);
-                uint32_t parent = terrimpi_mip_number(&t->tree, level, x / 2u, z / 2u);
-                const terrimp_geomip_node *c = &t->tree.nodes[child], *p = &t->tree.nodes[parent];
-                if (c->low < p->low || c->high > p->high || c->error > p->error ||
-                    t->meshes[child].low < t->meshes[parent].low ||
-                    t->meshes[child].high > t->meshes[parent].high)
-                    return 0;
-            }
-    return 1;
+    uint32_t parent = node + 1u < t->tree.node_count ? terrimpi_mip_parent(&t->tree, node) : node;
+    const terrimp_geomip_node *c = &t->tree.nodes[node], *p = &t->tree.nodes[parent];
+    return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
+           t->meshes[node].low >= t->meshes[parent].low &&
+           t->meshes[node].high <= t->meshes[parent].high;
 }
 
 /* Checks a whole block and fills in a terrain from it, all but the field. */
@@ -9219,12 +9349,11 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes, terrim
     terrimpi_bake_arrays_at(t, block);
     TERRIMPI_REFUSE(terrimpi_bake_hash(&bake, t) != bake.checksum, TERRIMP_E_BAKE);
     for (node = 0; node < t->tree.node_count; node++) {
-        if (!terrimpi_node_ok(t, node))
+        if (!terrimpi_node_ok(t, node) || !terrimpi_parent_ok(t, node))
             return TERRIMP_E_BAKE;
         triangles += t->meshes[node].triangle_count;
     }
-    return terrimpi_hierarchy_ok(t) && triangles == t->mesh_triangle_count ? TERRIMP_OK
-                                                                           : TERRIMP_E_BAKE;
+    return triangles == t->mesh_triangle_count ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
@@ -9389,7 +9518,11 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #define TERRIMPI_SEEN 0.4f        /* of the pixels of a picture, that the screen shows */
 #define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
 #define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
+#ifndef TERRIMP_NO_SPLIT
 #define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
+#else
+#define TERRIMPI_PARTS 1u
+#endif
 #define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
 
@@ -9462,21 +9595,8 @@ typedef struct terrimpi_item {
 
 struct terrimp_view {
     const terrimp_terrain *terrain;
-    terrimp_view_desc desc;     /* resolved */
-    terrimp_camera camera;      /* resolved, of the last update */
-    terrimp_frustum frustum;
-    float pixel_factor;
-    float depth_bias;
-    float motion[3];            /* [wu] a frame, smoothed */
-    float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
     uint32_t frame;             /* updates so far */
     uint32_t unit_count, leaf_count, want_count, job_count, item_count;
-    uint32_t next_record;       /* where the search for a free record goes on */
-    int outdated;               /* what this frame would draw has been forgotten */
-    int open;                   /* `opened` is a picture of which pieces are missing */
-    terrimpi_job opened;
-    terrimp_stats stats;
-    terrimp_geomip_view ground;
     terrimp_live_atlas *atlases;   /* [atlas_count] */
     uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
     uint16_t *record_of;           /* [node_count] */
@@ -9492,6 +9612,19 @@ struct terrimp_view {
     terrimpi_job *jobs;            /* [max_captures] */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
+    uint32_t next_record;       /* where the search for a free record goes on */
+    int outdated;               /* what this frame would draw has been forgotten */
+    int open;                   /* `opened` is a picture of which pieces are missing */
+    terrimp_geomip_view ground;
+    terrimp_view_desc desc;     /* resolved */
+    float pixel_factor;
+    float depth_bias;
+    float motion[3];            /* [wu] a frame, smoothed */
+    float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
+    terrimp_camera camera;      /* resolved, of the last update */
+    terrimp_frustum frustum;
+    terrimp_stats stats;
+    terrimpi_job opened;
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
@@ -9536,7 +9669,7 @@ static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrim
         coarse = terrimpi_clamp(d->tolerance_px, 1.0f, 9.0f);
     terrimpi_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px), 0.05f,
                      100.0f, &result);
-    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, 4.0f, &result);
+    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, TERRIMPI_MIP_MORPH_MOST, &result);
     terrimpi_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
                      &result);
     terrimpi_setting(&d->fade_end, (d->mode == TERRIMP_MODE_AUTO ? 1.25f : 1.5f) * d->fade_start,
@@ -9575,11 +9708,10 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                          d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
                              ? terrimpi_min_u32(chunks, 4096)
                              : chunks);
-    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
-                    d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
-                    !(d.fade_end > d.fade_start) || d.atlas_size < 64u || d.atlas_size > 32768u ||
-                    d.atlas_count > 16u || d.max_impostors > 65534u ||
-                    d.max_captures > 1024u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
+                    !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
+                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
+                    d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -9608,7 +9740,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     for (i = 0; i < v->desc.atlas_count; i++) {
         void *memory = terrimpi_take(&l, slots, 1);
         if (memory)
-            terrimp_live_atlas_init(&v->atlases[i], &atlas, memory, slots);
+            terrimpi_live_init(&v->atlases[i], &atlas, memory);
     }
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
@@ -9703,6 +9835,36 @@ static void terrimpi_site_box(const terrimp_view *v, const terrimpi_site *s, ter
     terrimpi_node_box(v->terrain, s->level, s->x, s->z, box);
 }
 
+/* A node's box, and which of the planes in `mask` its parts have to be tested against. */
+static int terrimpi_sight(const terrimp_view *v, const terrimpi_site *s, int mask, terrimp_box *box)
+{
+    terrimpi_site_box(v, s, box);
+    return mask ? terrimp_frustum_test(&v->frustum, box, mask) : 0;
+}
+
+/* Does something with a node, of which the planes in `mask` may cut a part off, and goes on to its
+   children. Returns 0 to end the walk. */
+typedef int (*terrimpi_visit)(terrimp_view *v, const terrimpi_site *s, int mask);
+
+static int terrimpi_visit_children(terrimp_view *v, const terrimpi_site *s, int mask,
+                                   terrimpi_visit visit)
+{
+    terrimpi_site children[4];
+    uint32_t i, count = s->level > 0 ? terrimpi_children(v, s, children) : 0;
+    for (i = 0; i < count; i++)
+        if (!visit(v, &children[i], mask))
+            return 0;
+    return 1;
+}
+
+/* Visits the root. */
+static void terrimpi_visit_tree(terrimp_view *v, terrimpi_visit visit)
+{
+    terrimpi_site root = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u,
+                                          0, 0);
+    visit(v, &root, TERRIMP_PLANES_ALL);
+}
+
 /* ---- pictures and their slots ---- */
 
 static void terrimpi_drop_seats(terrimp_view *v, const terrimpi_seat *seats, uint32_t count)
@@ -9768,8 +9930,8 @@ static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_
     uint32_t room[2], oldest;
     for (;;) {
         for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++)
-            if (terrimp_live_atlas_alloc(&v->atlases[seat->atlas], size[0], size[1],
-                                         &seat->slot) == TERRIMP_OK)
+            if (terrimpi_live_alloc(&v->atlases[seat->atlas], size[0], size[1], &seat->slot) ==
+                TERRIMP_OK)
                 return 1;
         oldest = terrimpi_oldest_record(v);
         if (oldest == TERRIMPI_NO_RECORD)
@@ -9780,21 +9942,28 @@ static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_
     v->stats.atlas_failures++;
     for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++) {
         terrimp_live_atlas *atlas = &v->atlases[seat->atlas];
-        if (terrimp_live_atlas_room(atlas, size[0], size[1], room) == TERRIMP_OK &&
-            room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
+        terrimpi_live_room(atlas, size[0], size[1], room);
+        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
             room[0] > 2u * TERRIMPI_MARGIN && room[1] > 2u * TERRIMPI_MARGIN)
-            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &seat->slot) == TERRIMP_OK;
+            return terrimpi_live_alloc(atlas, room[0], room[1], &seat->slot) == TERRIMP_OK;
     }
     return 0;
+}
+
+/* Gives back seats of a job or of its record, unless the two have the same. */
+static void terrimpi_drop_unshared(terrimp_view *v, const terrimpi_job *job,
+                                   const terrimpi_seat *seats, uint32_t count)
+{
+    const terrimpi_record *record = &v->records[job->record];
+    if (record->part_count != job->part_count ||
+        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
+        terrimpi_drop_seats(v, seats, count);
 }
 
 /* Gives back what a job has taken and not used. */
 static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
 {
-    const terrimpi_record *record = &v->records[job->record];
-    if (record->part_count != job->part_count ||
-        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
-        terrimpi_drop_seats(v, job->parts, job->part_count);
+    terrimpi_drop_unshared(v, job, job->parts, job->part_count);
 }
 
 /* The same for all jobs of a frame that is not rendered, but for a picture that has been begun. */
@@ -9819,7 +9988,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
     memset(view->record_of, 0xff, view->terrain->tree.node_count * sizeof *view->record_of);
     memset(view->records, 0, view->desc.max_impostors * sizeof *view->records);
     for (i = 0; i < view->desc.atlas_count; i++)
-        terrimp_live_atlas_reset(&view->atlases[i]);
+        terrimpi_live_reset(&view->atlases[i]);
     view->job_count = 0;
     view->open = 0;
     view->outdated = 1;
@@ -9856,44 +10025,30 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 
 /* ---- the ground cut ---- */
 
-/* Lists all chunks in sight at full resolution, front to back, when there is a list. Returns how
-   many there are. */
-static uint32_t terrimpi_list_chunks(terrimp_view *v, terrimp_geomip_draw *list)
+/* Counts the chunks in sight in draws_needed, and lists the first draw_count of them, front to
+   back, at full resolution. */
+static int terrimpi_visit_chunks(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    struct {
-        terrimpi_site site;
-        int mask;
-    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1, count = 0;
-    stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
-    stack[0].mask = TERRIMP_PLANES_ALL;
-    while (depth > 0) {
-        terrimpi_site children[4];
-        terrimp_box box;
-        uint32_t i;
-        top = stack[--depth];
-        terrimpi_site_box(v, &top.site, &box);
-        if (top.mask)
-            top.mask = terrimp_frustum_test(&v->frustum, &box, top.mask);
-        if (top.mask == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        if (top.site.level == 0) {
-            if (list) {
-                memset(&list[count], 0, sizeof *list);
-                list[count].node = top.site.node;
-                list[count].x = top.site.x;
-                list[count].z = top.site.z;
-            }
-            count++;
-            continue;
-        }
-        for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
-            stack[depth].site = children[i];
-            stack[depth].mask = top.mask;
-            depth++;
-        }
+    terrimp_geomip_view *g = &v->ground;
+    terrimp_box box;
+    mask = terrimpi_sight(v, s, mask, &box);
+    if (mask == TERRIMP_PLANES_OUTSIDE)
+        return 1;
+    if (s->level == 0 && g->draws_needed++ < g->draw_count) {
+        terrimp_geomip_draw *draw = &g->draws[g->draws_needed - 1u];
+        memset(draw, 0, sizeof *draw);
+        draw->node = s->node;
+        draw->x = s->x;
+        draw->z = s->z;
     }
-    return count;
+    return terrimpi_visit_children(v, s, mask, terrimpi_visit_chunks);
+}
+
+static void terrimpi_list_chunks(terrimp_view *v, uint32_t count)
+{
+    v->ground.draw_count = count;
+    v->ground.draws_needed = 0;
+    terrimpi_visit_tree(v, terrimpi_visit_chunks);
 }
 
 /* Makes the ground cut; where max_ground is too small, at a larger tolerance. */
@@ -9901,16 +10056,22 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
 {
     uint32_t i;
     if (v->desc.mode == TERRIMP_MODE_FULL || v->desc.mode == TERRIMP_MODE_IMPOSTOR) {
-        if (terrimpi_list_chunks(v, NULL) > v->desc.max_ground) /* the frame before stays */
+        uint32_t before = v->ground.draw_count;
+        terrimpi_list_chunks(v, 0);
+        if (v->ground.draws_needed > v->desc.max_ground) { /* the frame before stays */
+            v->ground.draw_count = before;
             return TERRIMP_E_CAPACITY;
-        v->ground.draw_count = terrimpi_list_chunks(v, v->ground.draws);
+        }
+        terrimpi_list_chunks(v, v->ground.draws_needed);
     } else {
         terrimp_result result = TERRIMP_E_CAPACITY;
+        terrimp_camera camera;
+        TERRIMPI_TRY(terrimp_camera_resolve(&v->camera, &camera));
         v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
         while (result == TERRIMP_E_CAPACITY) {
             float tolerance = v->desc.ground_tolerance_px * v->ground_scale;
             v->ground.tolerance_px = terrimpi_min(tolerance, 1000.0f);
-            result = terrimp_geomip_select(&v->terrain->tree, &v->ground, &v->camera);
+            result = terrimpi_mip_select(&v->terrain->tree, &v->ground, &camera);
             if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f) {
                 v->outdated = 1; /* select has written over the list of the frame before */
                 return result;
@@ -9918,8 +10079,6 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
             if (result == TERRIMP_E_CAPACITY)
                 v->ground_scale *= 1.3f;
         }
-        if (result != TERRIMP_OK)
-            return result;
     }
     for (i = 0; i < v->ground.draw_count; i++)
         v->leaf_at[v->ground.draws[i].node] = i;
@@ -9955,60 +10114,41 @@ static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float 
 }
 
 /* Adds the ground draws below a node to the last unit. */
-static void terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    terrimpi_site children[4];
     terrimp_box box;
-    uint32_t i, count, leaf = terrimpi_leaf(v, s->node);
+    uint32_t leaf = terrimpi_leaf(v, s->node);
     if (leaf != TERRIMPI_NO_LEAF) {
         v->leaves[v->leaf_count++] = leaf;
         v->units[v->unit_count].leaf_count++;
-        return;
+        return 1;
     }
-    if (s->level == 0)
-        return;
-    if (mask) {
-        terrimpi_site_box(v, s, &box);
-        mask = terrimp_frustum_test(&v->frustum, &box, mask);
-        if (mask == TERRIMP_PLANES_OUTSIDE)
-            return;
-    }
-    count = terrimpi_children(v, s, children);
-    for (i = 0; i < count; i++)
-        terrimpi_gather_leaves(v, &children[i], mask);
+    if (mask && s->level > 0)
+        mask = terrimpi_sight(v, s, mask, &box);
+    return mask == TERRIMP_PLANES_OUTSIDE ||
+           terrimpi_visit_children(v, s, mask, terrimpi_gather_leaves);
 }
 
 /* Adds the impostors wanted below a node to the last unit. Returns 0 when a part of it that is in
    sight cannot be one. */
 static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    terrimpi_site children[4];
+    terrimpi_want *want = &v->wants[v->want_count];
     terrimp_box box;
     float closest;
-    uint32_t i, count;
-    terrimpi_site_box(v, s, &box);
-    if (mask)
-        mask = terrimp_frustum_test(&v->frustum, &box, mask);
+    mask = terrimpi_sight(v, s, mask, &box);
     if (mask == TERRIMP_PLANES_OUTSIDE)
         return 1;
     closest = terrimp_box_distance(&box, v->camera.eye);
-    if (terrimpi_wanted(v, s, closest)) {
-        terrimpi_want *want = &v->wants[v->want_count];
-        if (v->want_count == v->desc.max_impostors)
-            return 0;
-        memset(want, 0, sizeof *want);
-        want->site = *s;
-        want->closest = closest;
-        v->want_count++;
-        v->units[v->unit_count].want_count++;
-        return 1;
-    }
-    if (s->level == 0)
+    if (!terrimpi_wanted(v, s, closest))
+        return s->level > 0 && terrimpi_visit_children(v, s, mask, terrimpi_gather_wants);
+    if (v->want_count == v->desc.max_impostors)
         return 0;
-    count = terrimpi_children(v, s, children);
-    for (i = 0; i < count; i++)
-        if (!terrimpi_gather_wants(v, &children[i], mask))
-            return 0;
+    memset(want, 0, sizeof *want);
+    want->site = *s;
+    want->closest = closest;
+    v->want_count++;
+    v->units[v->unit_count].want_count++;
     return 1;
 }
 
@@ -10032,40 +10172,22 @@ static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask,
     v->unit_count++;
 }
 
-/* Walks the tree down to where one of the cuts runs. */
-static void terrimpi_list_units(terrimp_view *v)
+/* Goes down to where one of the cuts runs, until all ground has its unit. */
+static int terrimpi_visit_units(terrimp_view *v, const terrimpi_site *s, int mask)
 {
-    struct {
-        terrimpi_site site;
-        int mask;
-    } stack[3u * TERRIMP_GEOMIP_LEVELS + 1u], top;
-    uint32_t depth = 1;
-    int impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
-    v->unit_count = v->leaf_count = v->want_count = 0;
-    stack[0].site = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u, 0, 0);
-    stack[0].mask = TERRIMP_PLANES_ALL;
-    while (depth > 0 && v->leaf_count < v->ground.draw_count) {
-        terrimpi_site children[4];
-        terrimp_box box;
-        float closest;
-        uint32_t i;
-        top = stack[--depth];
-        terrimpi_site_box(v, &top.site, &box);
-        if (top.mask)
-            top.mask = terrimp_frustum_test(&v->frustum, &box, top.mask);
-        if (top.mask == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        closest = terrimp_box_distance(&box, v->camera.eye);
-        if (terrimpi_leaf(v, top.site.node) != TERRIMPI_NO_LEAF ||
-            (impostors && terrimpi_wanted(v, &top.site, closest)))
-            terrimpi_add_unit(v, &top.site, top.mask, closest);
-        else if (top.site.level > 0)
-            for (i = terrimpi_children(v, &top.site, children); i-- > 0;) {
-                stack[depth].site = children[i];
-                stack[depth].mask = top.mask;
-                depth++;
-            }
-    }
+    terrimp_box box;
+    float closest;
+    if (v->leaf_count == v->ground.draw_count)
+        return 0;
+    mask = terrimpi_sight(v, s, mask, &box);
+    if (mask == TERRIMP_PLANES_OUTSIDE)
+        return 1;
+    closest = terrimp_box_distance(&box, v->camera.eye);
+    if (terrimpi_leaf(v, s->node) == TERRIMPI_NO_LEAF &&
+        (v->desc.mode < TERRIMP_MODE_IMPOSTOR || !terrimpi_wanted(v, s, closest)))
+        return terrimpi_visit_children(v, s, mask, terrimpi_visit_units);
+    terrimpi_add_unit(v, s, mask, closest);
+    return 1;
 }
 
 /* ---- what a picture would cost, and how long it would last ---- */
@@ -10130,10 +10252,9 @@ static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
 {
     terrimp_box box;
     terrimpi_site_box(v, s, &box);
-    *angle_rad = *parallax_px = 0.0f;
-    terrimp_view_angle(&box, captured_eye, v->camera.eye, angle_rad);
-    terrimp_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye, v->camera.eye,
-                           v->pixel_factor, parallax_px);
+    *angle_rad = terrimpi_view_angle(&box, captured_eye, v->camera.eye);
+    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye,
+                                           v->camera.eye, v->pixel_factor);
     return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
                         *parallax_px / v->desc.tolerance_px);
 }
@@ -10171,7 +10292,7 @@ static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
     terrimp_box box;
     float speed = terrimpi_speed(v), k = v->pixel_factor, texels, sine;
     terrimpi_site_box(v, &want->site, &box);
-    if (terrimp_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
+    if (terrimpi_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(v->terrain, want->site.node, &mesh);
     want->record = v->record_of[want->site.node];
@@ -10266,21 +10387,39 @@ static uint32_t terrimpi_farthest(uint32_t count, int eye, uint32_t k)
     }
 }
 
-/* The source nodes of a picture: a block of them, with one more on each side for the border. */
-typedef struct terrimpi_block {
-    uint32_t x, z, wide, deep; /* without the border */
-} terrimpi_block;
+/* The source nodes of a picture along x or z, and one more on each side for the border. */
+typedef struct terrimpi_cells {
+    uint32_t first, count; /* without the border */
+} terrimpi_cells;
 
-static terrimpi_block terrimpi_source_block(const terrimp_geomip *tree, const terrimpi_site *s,
-                                            uint32_t source)
+/* `nodes` is how many the source level has. */
+static terrimpi_cells terrimpi_source_cells(const terrimpi_job *job, uint32_t at, uint32_t nodes)
 {
-    uint32_t shift = s->level - source;
-    terrimpi_block b;
-    b.x = s->x << shift;
-    b.z = s->z << shift;
-    b.wide = terrimpi_min_u32(1u << shift, tree->level_x[source] - b.x);
-    b.deep = terrimpi_min_u32(1u << shift, tree->level_z[source] - b.z);
-    return b;
+    uint32_t shift = job->site.level - job->source;
+    terrimpi_cells c;
+    c.first = at << shift;
+    c.count = terrimpi_min_u32(1u << shift, nodes - c.first);
+    return c;
+}
+
+static terrimpi_cells terrimpi_cells_x(const terrimp_view *v, const terrimpi_job *job)
+{
+    return terrimpi_source_cells(job, job->site.x, v->terrain->tree.level_x[job->source]);
+}
+
+static terrimpi_cells terrimpi_cells_z(const terrimp_view *v, const terrimpi_job *job)
+{
+    return terrimpi_source_cells(job, job->site.z, v->terrain->tree.level_z[job->source]);
+}
+
+/* The k-th cell along x or z, from back to front, for an eye that is `eye` cells from the
+   terrain's edge. *place: 0 and 2 are the border's, before and behind the block. */
+static uint32_t terrimpi_cell_along(terrimpi_cells c, float eye, uint32_t k, uint32_t *place)
+{
+    int eye_cell = (int)terrimpi_clamp(eye - (float)c.first + 1.0f, -1.0f, 99.0f);
+    uint32_t cell = terrimpi_farthest(c.count + 2u, eye_cell, k);
+    *place = cell == 0 ? 0u : cell == c.count + 1u ? 2u : 1u;
+    return c.first + cell - 1u; /* wraps below 0, and is then too large */
 }
 
 /* Cell k of a job, cells ordered from back to front: its node and the pattern to draw, the whole
@@ -10290,37 +10429,29 @@ static int terrimpi_cell(const terrimp_view *v, const terrimpi_job *job, uint32_
 {
     const terrimp_terrain *t = v->terrain;
     const terrimp_heightfield *field = &t->desc.field;
-    terrimpi_block b = terrimpi_source_block(&t->tree, &job->site, job->source);
-    uint32_t quads = t->desc.chunk_quads, column, row, x, z, direction, which = 0;
+    const float *eye = job->captures[0].eye;
+    terrimpi_cells across = terrimpi_cells_x(v, job);
+    uint32_t quads = t->desc.chunk_quads, x, z, dx, dz, direction, which = 0;
     float step = (float)(quads << job->source);
-    int eye_x = (int)terrimpi_clamp((job->captures[0].eye[0] - field->origin_x) /
-                                        (step * field->spacing_x) - (float)b.x + 1.0f,
-                                    -1.0f, 99.0f);
-    int eye_z = (int)terrimpi_clamp((job->captures[0].eye[2] - field->origin_z) /
-                                        (step * field->spacing_z) - (float)b.z + 1.0f,
-                                    -1.0f, 99.0f);
-    row = terrimpi_farthest(b.deep + 2u, eye_z, k / (b.wide + 2u));
-    column = terrimpi_farthest(b.wide + 2u, eye_x, k % (b.wide + 2u));
-    x = b.x + column - 1u; /* wraps below 0, and is then too large */
-    z = b.z + row - 1u;
+    x = terrimpi_cell_along(across, (eye[0] - field->origin_x) / (step * field->spacing_x),
+                            k % (across.count + 2u), &dx);
+    z = terrimpi_cell_along(terrimpi_cells_z(v, job),
+                            (eye[2] - field->origin_z) / (step * field->spacing_z),
+                            k / (across.count + 2u), &dz);
     if (x >= t->tree.level_x[job->source] || z >= t->tree.level_z[job->source])
         return 0;
-    if (column == 0 || row == 0 || column == b.wide + 1u || row == b.deep + 1u) {
-        uint32_t dx = column == 0 ? 0u : column == b.wide + 1u ? 2u : 1u;
-        uint32_t dz = row == 0 ? 0u : row == b.deep + 1u ? 2u : 1u;
-        direction = dz * 3u + dx;
-        which = terrimpi_strip_pattern(quads, job->strip, direction > 4u ? direction - 1u
-                                                                          : direction);
-    }
+    direction = dz * 3u + dx;
+    if (direction != 4u)
+        which = terrimpi_strip_pattern(quads, job->strip,
+                                       direction > 4u ? direction - 1u : direction);
     *pattern = terrimpi_find_pattern(quads, which);
-    *node = terrimpi_site_at(&t->tree, job->source, x, z).node;
+    *node = terrimpi_mip_number(&t->tree, job->source, x, z);
     return 1;
 }
 
 static uint32_t terrimpi_cell_count(const terrimp_view *v, const terrimpi_job *job)
 {
-    terrimpi_block block = terrimpi_source_block(&v->terrain->tree, &job->site, job->source);
-    return (block.wide + 2u) * (block.deep + 2u);
+    return (terrimpi_cells_x(v, job).count + 2u) * (terrimpi_cells_z(v, job).count + 2u);
 }
 
 /* Whether a cell's node reaches into the clip distances of a part. */
@@ -10332,7 +10463,7 @@ static int terrimpi_cell_in_part(const terrimp_view *v, const terrimpi_job *job,
     terrimp_box box;
     float first = 0.0f, last = 0.0f;
     int i;
-    if (job->part_count == 1u)
+    if (TERRIMPI_PARTS == 1u || job->part_count == 1u)
         return 1;
     {
         terrimpi_site s = terrimpi_site_of(&v->terrain->tree, node);
@@ -10404,14 +10535,18 @@ static int terrimpi_slot_size(terrimp_view *v, const terrimpi_site *s, const ter
 {
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
+    float density = v->pixel_factor * v->desc.texels_per_px, width, height;
     terrimp_mesh_info mesh;
     terrimpi_mesh_place(v->terrain, s->node, &mesh);
     terrimpi_fill_mesh(v->terrain, s->node, v->mesh_xyz, v->mesh_indices);
-    if (terrimp_capture_fit(box, eye, capture) != TERRIMP_OK ||
-        terrimp_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count) != TERRIMP_OK ||
-        terrimp_impostor_size(capture, v->pixel_factor, v->desc.texels_per_px,
-                              TERRIMPI_SMALLEST_PICTURE, largest, size, NULL) != TERRIMP_OK)
+    if (terrimpi_capture_fit(box, eye, capture) != TERRIMP_OK ||
+        !terrimpi_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count))
         return 0;
+    width = (capture->tan_right - capture->tan_left) * density;
+    height = (capture->tan_up - capture->tan_down) * density;
+    if (!terrimpi_finite2(width, height)) /* the eye is almost beside a vertex */
+        return 0;
+    terrimpi_picture_size(width, height, TERRIMPI_SMALLEST_PICTURE, largest, size);
     size[0] += 2u * TERRIMPI_MARGIN;
     size[1] += 2u * TERRIMPI_MARGIN;
     return 1;
@@ -10427,7 +10562,7 @@ static int terrimpi_seats_suit(const terrimp_view *v, const terrimpi_record *rec
         return 0;
     for (i = 0; i < part_count; i++) {
         terrimp_rect rect;
-        terrimp_live_atlas_rect(&v->atlases[record->parts[i].atlas], record->parts[i].slot, &rect);
+        rect = v->atlases[record->parts[i].atlas].slots[record->parts[i].slot];
         if (rect.width * 10u < size[0] * 9u || rect.height * 10u < size[1] * 9u ||
             rect.width * 2u > size[0] * 3u || rect.height * 2u > size[1] * 3u)
             return 0;
@@ -10450,8 +10585,7 @@ static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_j
                 return 0;
             }
     for (i = 0; i < wanted; i++)
-        terrimp_live_atlas_rect(&v->atlases[job->parts[i].atlas], job->parts[i].slot,
-                                &job->rects[i]);
+        job->rects[i] = v->atlases[job->parts[i].atlas].slots[job->parts[i].slot];
     return 1;
 }
 
@@ -10475,11 +10609,12 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const t
     const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
     terrimp_split split;
-    if (v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
-        terrimp_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
-                              3u * mesh->triangle_count, sine * want->closest,
-                              terrimpi_depth_error(v, node, capture, box), &split) != TERRIMP_OK)
+    if (TERRIMPI_PARTS == 1u || v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
+        !(sine * want->closest > 0.0f))
         return 0;
+    terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
+                           3u * mesh->triangle_count, sine * want->closest,
+                           terrimpi_depth_error(v, node, capture, box), &split);
     *distance = split.distance;
     return split.gap * sine * v->pixel_factor >
                TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
@@ -10492,7 +10627,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
                                 terrimpi_job *job)
 {
     const terrimp_costs *costs = &v->desc.costs;
-    terrimp_capture *front = &job->captures[0], *back = &job->captures[1];
+    terrimp_capture *front = &job->captures[0], *back = &job->captures[TERRIMPI_PARTS - 1u];
     terrimp_box box;
     float eye[3], border, split = 0.0f;
     uint32_t size[2], i;
@@ -10515,12 +10650,15 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     job->in_pieces = v->desc.max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_split_at(v, want, &box, front, &split))
-        job->part_count = 2;
+        job->part_count = TERRIMPI_PARTS;
     if (!terrimpi_seat_job(v, size, job))
         return 0;
     size[0] = job->rects[0].width;
     size[1] = job->rects[0].height;
-    terrimp_capture_pad(front, size, TERRIMPI_MARGIN);
+    terrimpi_pad(&front->tan_left, &front->tan_right, size[0] - 2u * TERRIMPI_MARGIN,
+                 TERRIMPI_MARGIN);
+    terrimpi_pad(&front->tan_down, &front->tan_up, size[1] - 2u * TERRIMPI_MARGIN,
+                 TERRIMPI_MARGIN);
     job->strip = terrimpi_strip_width(v, job, &box, size);
     /* The border lies in front of and behind the box that was fitted. */
     border = 1.5f * (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
@@ -10528,9 +10666,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
              terrimpi_max(v->terrain->desc.field.spacing_x, v->terrain->desc.field.spacing_z);
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
-    *back = *front;
-    if (job->part_count == 2u) {
+    if (job->part_count > 1u) {
         float overlap = terrimpi_depth_error(v, want->site.node, front, &box);
+        *back = *front;
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
     }
@@ -10722,14 +10860,19 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- what is drawn ---- */
 
-/* The eye of the picture that a record will have when impostors are drawn; NULL: it has none. */
-static const float *terrimpi_picture_eye(const terrimp_view *v, uint32_t record)
+/* The picture that a record will have when impostors are drawn: the eye of its capture, NULL when
+   there is none, and its parts. */
+static const float *terrimpi_picture(const terrimp_view *v, uint32_t index, uint32_t *part_count)
 {
-    uint32_t i;
-    for (i = 0; i < v->job_count; i++)
-        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
-            return v->jobs[i].captures[0].eye;
-    return v->records[record].part_count > 0 ? v->records[record].eye : NULL;
+    const terrimpi_record *record = &v->records[index];
+    const terrimpi_job *job;
+    for (job = v->jobs; job < v->jobs + v->job_count; job++)
+        if (job->record == index && job->cell_to == job->cell_count) {
+            *part_count = job->part_count;
+            return job->captures[0].eye;
+        }
+    *part_count = record->part_count;
+    return record->part_count > 0 ? record->eye : NULL;
 }
 
 /* Puts a node's impostor on the list of this frame, once, if it has a picture that is good. */
@@ -10740,13 +10883,14 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     terrimpi_record *record;
     const float *eye;
     float angle, parallax;
+    uint32_t parts;
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
     if (record->listed == v->frame)
         return 1;
     s = terrimpi_site_of(&v->terrain->tree, node);
-    eye = terrimpi_picture_eye(v, index);
+    eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
     record->listed = record->seen = v->frame;
@@ -10796,13 +10940,25 @@ static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
     return 0;
 }
 
+/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
+static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrimp_pattern *found)
+{
+    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
+    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST,
+                         v->ground.draws[draw].pattern, found);
+}
+
 /* Shows a unit's ground. */
 static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
 {
+    terrimp_pattern pattern;
     uint32_t i;
-    for (i = 0; i < unit->leaf_count; i++) {
+    for (i = 0; i < unit->leaf_count && alpha != 0.0f; i++) {
         uint32_t leaf = v->leaves[unit->first_leaf + i];
         v->shown[leaf] = alpha;
+        terrimpi_ground_pattern(v, leaf, &pattern);
+        v->stats.ground++;
+        v->stats.triangles += pattern.triangle_count;
         if (alpha < 0.0f) {
             v->items[v->item_count].index = leaf;
             v->items[v->item_count++].is_impostor = 0;
@@ -10847,8 +11003,14 @@ static void terrimpi_settle(terrimp_view *v)
             terrimpi_site s = terrimpi_site_of(&v->terrain->tree,
                                                v->records[v->items[i].index].node);
             float angle, parallax;
+            terrimp_mesh_info mesh;
             terrimp_box box;
-            terrimpi_judge(v, terrimpi_picture_eye(v, v->items[i].index), &s, &angle, &parallax);
+            uint32_t parts;
+            terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
+                           &parallax);
+            terrimpi_mesh_place(v->terrain, s.node, &mesh);
+            v->stats.triangles += mesh.index_count / 3u * parts;
+            v->stats.draws += parts;
             v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
             v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
             terrimpi_site_box(v, &s, &box);
@@ -10871,48 +11033,15 @@ static int terrimpi_floor_wanted(const terrimp_view *v)
            v->camera.eye[2] <= box.max[2] && v->camera.eye[1] >= box.min[1];
 }
 
-/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
-static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t pattern,
-                                    terrimp_pattern *found)
-{
-    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
-    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST, pattern, found);
-}
-
-/* In how many parts a record will be drawn. */
-static uint32_t terrimpi_parts_of(const terrimp_view *v, uint32_t record)
-{
-    uint32_t i;
-    for (i = 0; i < v->job_count; i++)
-        if (v->jobs[i].record == record && v->jobs[i].cell_to == v->jobs[i].cell_count)
-            return v->jobs[i].part_count;
-    return v->records[record].part_count;
-}
-
 /* The rest of the statistics. */
 static void terrimpi_count_frame(terrimp_view *v)
 {
     const terrimp_terrain *t = v->terrain;
     terrimp_stats *s = &v->stats;
-    terrimp_live_atlas_stats atlas;
     float tan_x, tan_y;
     uint32_t i, u;
     s->visible = v->unit_count;
     s->ground_tolerance_px = v->ground.tolerance_px;
-    for (i = 0; i < v->ground.draw_count; i++)
-        if (v->shown[i] != 0.0f) {
-            terrimp_pattern pattern;
-            terrimpi_ground_pattern(v, v->ground.draws[i].pattern, &pattern);
-            s->ground++;
-            s->triangles += pattern.triangle_count;
-        }
-    for (i = 0; i < v->item_count; i++)
-        if (v->items[i].is_impostor) {
-            terrimp_mesh_info mesh;
-            terrimpi_mesh_place(t, v->records[v->items[i].index].node, &mesh);
-            s->triangles += mesh.index_count / 3u * terrimpi_parts_of(v, v->items[i].index);
-            s->draws += terrimpi_parts_of(v, v->items[i].index);
-        }
     s->draws += s->ground;
     if (terrimpi_floor_wanted(v)) {
         s->draws++;
@@ -10930,10 +11059,9 @@ static void terrimpi_count_frame(terrimp_view *v)
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
     s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
-        if (terrimp_live_atlas_query(&v->atlases[i], &atlas) == TERRIMP_OK) {
-            s->texels_used += atlas.texels_used;
-            s->texels_free += atlas.texels_free;
-        }
+        s->texels_used += v->atlases[i].texels_used;
+    s->texels_free = v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+                     s->texels_used;
 }
 
 /* Follows the eye's motion; a jump is none. */
@@ -10941,14 +11069,12 @@ static void terrimpi_follow(terrimp_view *v, const float before[3])
 {
     float step[3];
     uint32_t i;
-    for (i = 0; i < 3u; i++)
+    for (i = 0; i < 3u; i++) {
         step[i] = v->camera.eye[i] - before[i];
-    if (v->frame <= 1u || terrimpi_length(step) > 0.5f * v->desc.fade_start)
-        memset(v->motion, 0, sizeof v->motion);
-    else
-        for (i = 0; i < 3u; i++)
-            v->motion[i] = 0.75f * v->motion[i] + 0.25f * step[i];
-    if (terrimpi_length(v->motion) < 1e-6f * v->desc.fade_start)
+        v->motion[i] = 0.75f * v->motion[i] + 0.25f * step[i];
+    }
+    if (v->frame <= 1u || terrimpi_length(step) > 0.5f * v->desc.fade_start ||
+        terrimpi_length(v->motion) < 1e-6f * v->desc.fade_start)
         memset(v->motion, 0, sizeof v->motion);
 }
 
@@ -10956,10 +11082,9 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 {
     terrimp_camera resolved, before;
     terrimp_frustum frustum;
-    terrimp_stats stats;
     terrimp_result result;
-    float spread = 0.0f, drawn = 0.0f;
-    uint32_t i;
+    float reuse, spread = 0.0f, drawn = 0.0f;
+    uint32_t i, evictions, failures;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     before = view->camera;
@@ -10976,13 +11101,16 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     view->frame++;
     view->outdated = 0;
     terrimpi_cancel_jobs(view);
-    stats = view->stats;
+    reuse = view->stats.reuse; /* these go on */
+    evictions = view->stats.evictions;
+    failures = view->stats.atlas_failures;
     memset(&view->stats, 0, sizeof view->stats);
-    view->stats.reuse = stats.reuse;
-    view->stats.evictions = stats.evictions;
-    view->stats.atlas_failures = stats.atlas_failures;
+    view->stats.reuse = reuse;
+    view->stats.evictions = evictions;
+    view->stats.atlas_failures = failures;
     terrimpi_follow(view, before.eye);
-    terrimpi_list_units(view);
+    view->unit_count = view->leaf_count = view->want_count = 0;
+    terrimpi_visit_tree(view, terrimpi_visit_units);
     for (i = 0; i < view->unit_count; i++)
         terrimpi_decide(view, &view->units[i], &spread, &drawn);
     terrimpi_schedule(view, spread, drawn);
@@ -11003,9 +11131,7 @@ static void terrimpi_finish_job(terrimp_view *v, const terrimpi_job *job)
         float frames = (float)record->drawn_count;
         v->stats.reuse += (frames - v->stats.reuse) * (v->stats.reuse > 0.0f ? 0.02f : 1.0f);
     }
-    if (record->part_count != job->part_count ||
-        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
-        terrimpi_drop_seats(v, record->parts, record->part_count);
+    terrimpi_drop_unshared(v, job, record->parts, record->part_count);
     record->part_count = job->part_count;
     memcpy(record->parts, job->parts, sizeof record->parts);
     record->drawn_count = 0;
@@ -11013,8 +11139,8 @@ static void terrimpi_finish_job(terrimp_view *v, const terrimpi_job *job)
     record->cost = job->cost;
     memcpy(record->eye, job->captures[0].eye, sizeof record->eye);
     for (i = 0; i < job->part_count; i++)
-        terrimp_texture_matrix(&job->captures[i], &job->rects[i], v->desc.atlas_size,
-                               v->desc.atlas_size, record->texture_matrix[i]);
+        terrimpi_texture_matrix(&job->captures[i], &job->rects[i], v->desc.atlas_size,
+                                v->desc.atlas_size, record->texture_matrix[i]);
 }
 
 /* Makes a part of a picture, or a piece of one. */
@@ -11119,7 +11245,7 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     const terrimp_geomip_draw *draw = &v->ground.draws[index];
     terrimp_ground_command command;
     terrimp_pattern pattern;
-    terrimpi_ground_pattern(v, draw->pattern, &pattern);
+    terrimpi_ground_pattern(v, index, &pattern);
     memset(&command, 0, sizeof command);
     command.node = draw->node;
     command.level = draw->level;

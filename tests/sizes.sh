@@ -2,13 +2,15 @@
 # Prints the size of the library's code and tables at -Os, without libc and libm, for Cortex-M4,
 # Cortex-M0 and the machine it runs on. The run-time part is TERRIMP_NO_BUILD: terrains come from
 # bakes. What a host does not call is left out by its linker: two hosts are shown, one that only
-# opens, updates and renders, and one that fills its buffers and asks for statistics too.
+# opens, updates and renders, and one that fills its buffers and asks for statistics too. The first
+# is shown again without the options that a small machine may leave out, and judged.
 # Fails when the run-time part needs double or divides 64 bits on a machine that has neither.
 
 cd "$(dirname "$0")/.." || exit 1
 work=build/test/sizes
 mkdir -p $work
 flags="-std=c99 -Os -DNDEBUG -DTERRIMP_NO_MALLOC -ffunction-sections -fdata-sections -I."
+leave_out="-DTERRIMP_NO_SPLIT -DTERRIMP_NO_BOUND -DTERRIMP_NO_MORPH"
 aim=24576
 draws="terrimp_terrain_open_bytes terrimp_terrain_open terrimp_view_bytes terrimp_view_init
        terrimp_view_update terrimp_view_render"
@@ -56,6 +58,9 @@ machine() # name, prefix, flags, "judged" or ""
     linked "$2" "$object" $draws || exit 1
     row "$1" "run time, a host that opens, updates, renders" $work/part.o "$4"
     largest "$2" $work/part.o
+    $compile -DTERRIMP_NO_BUILD $leave_out -o $work/small.o || exit 1
+    linked "$2" $work/small.o $draws || exit 1
+    row "$1" "the same without splits, BOUND, morphing" $work/part.o "$4"
     [ -z "$2" ] || needs_nothing_heavy "$1" "$2" "$object"
 }
 

@@ -10,6 +10,28 @@
 
 static double block[1 << 12], memory[1 << 8];
 
+/* What has been left out is refused, all else is not. */
+static int refuses_what_is_left_out(const terrimp_terrain *terrain)
+{
+    terrimp_result bound = TERRIMP_OK, morph = TERRIMP_OK;
+    terrimp_view_desc desc, out;
+#ifdef TERRIMP_NO_BOUND
+    bound = TERRIMP_E_RANGE;
+#endif
+#ifdef TERRIMP_NO_MORPH
+    morph = TERRIMP_E_RANGE;
+#endif
+    memset(&desc, 0, sizeof desc);
+    desc.ground_rule = TERRIMP_GEOMIP_BOUND;
+    if (terrimp_view_desc_resolve(terrain, &desc, &out) != bound)
+        return 0;
+    desc.ground_rule = TERRIMP_GEOMIP_DISTANCE;
+    if (terrimp_view_desc_resolve(terrain, &desc, &out) != TERRIMP_OK)
+        return 0;
+    desc.morph_ratio = 1.5f;
+    return terrimp_view_desc_resolve(terrain, &desc, &out) == morph;
+}
+
 int main(void)
 {
     static uint8_t heights[19 * 11];
@@ -31,5 +53,7 @@ int main(void)
         return 2;
     if (terrimp_terrain_get_info(terrain, &info) || info.chunks_x != 5 || info.chunks_z != 3)
         return 3;
+    if (!refuses_what_is_left_out(terrain))
+        return 4;
     return use_terrimp();
 }
