@@ -1,4 +1,4 @@
-/* terrimp.h - v0.3.0 - draws large heightfield terrain with terrain impostors - MIT licence
+/* terrimp.h - v0.4.0 - draws large heightfield terrain with terrain impostors - MIT licence
 
    Distant terrain is drawn as pictures of itself: a node of a quadtree is rendered in full detail
    into a slot of a texture atlas, and for many frames after that a coarse mesh of under a hundred
@@ -168,9 +168,9 @@
 #include <stdint.h>
 
 #define TERRIMP_VERSION_MAJOR 0
-#define TERRIMP_VERSION_MINOR 3
+#define TERRIMP_VERSION_MINOR 4
 #define TERRIMP_VERSION_PATCH 0
-#define TERRIMP_VERSION "0.3.0"
+#define TERRIMP_VERSION "0.4.0"
 
 /* Linkage of every public function. TERRIMP_STATIC makes them private to one file. */
 #ifndef TERRIMP_API
@@ -1605,7 +1605,7 @@ typedef struct terrimp_view_desc {
                                [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
                                ground fades over the impostors [Limits: > fade_start]
-                               [Default 0 -> 1.5 * fade_start; in AUTO 1.25] */
+                               [Default 0 -> 1.5 * fade_start; in AUTO 1.1] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
                                much times the root of tolerance_px, but 5 to 15 degrees] */
@@ -9672,7 +9672,7 @@ static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrim
     terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, TERRIMPI_MIP_MORPH_MOST, &result);
     terrimpi_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
                      &result);
-    terrimpi_setting(&d->fade_end, (d->mode == TERRIMP_MODE_AUTO ? 1.25f : 1.5f) * d->fade_start,
+    terrimpi_setting(&d->fade_end, (d->mode == TERRIMP_MODE_AUTO ? 1.1f : 1.5f) * d->fade_start,
                      0.0f, most, &result);
     terrimpi_setting(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse), 0.001f, 1.5f, &result);
     terrimpi_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
@@ -11345,6 +11345,9 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
 #endif /* TERRIMP_IMPLEMENTATION */
 
 /* VERSION HISTORY
+   0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of
+          no_upper_skirts; the fade band of AUTO is narrower; three options that small machines may
+          leave out: TERRIMP_NO_SPLIT, TERRIMP_NO_BOUND, TERRIMP_NO_MORPH
    0.3.0  in mode AUTO the tolerance rules sharpness, view angle and fade; captures that are too
           large for a frame are made in pieces; terrimp_capture_split counts what comes into sight,
           and takes how far the eye moves and how far the parts overlap. Gone, as others do the

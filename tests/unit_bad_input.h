@@ -1074,7 +1074,7 @@ static void view_descriptors_are_refused(void)
             case 2: bad.ground_rule = -1; break;
             case 3: bad.ground_rule = TERRIMP_GEOMIP_RULE_COUNT; break;
             case 4: bad.fade_start = bad.fade_end = 5.0f; break;
-            case 5: bad.fade_start = 3e38f; break; /* the default of fade_end overflows */
+            case 5: bad.fade_start = 3.3e38f; break; /* the default of fade_end overflows */
             case 6: bad.atlas_size = 63; break;
             case 7: bad.atlas_size = 32769; break;
             case 8: bad.atlas_count = 17; break;
