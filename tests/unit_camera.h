@@ -480,6 +480,49 @@ static void capture_fit_holds_every_corner_and_touches_every_side(void)
     CHECK(fitted > 25000);
 }
 
+static void capture_tighten_touches_the_points_and_keeps_the_rest(void)
+{
+    int i, k, n, fitted = 0;
+    for (i = 0; i < 20000; i++) {
+        terrimp_box box;
+        terrimp_capture c, before;
+        float eye[3], points[12][3];
+        double least[2] = {0, 0}, most[2] = {0, 0}, point[3], at[3], slope = 1.0, slack[2];
+        int count = (int)random_range(1, 12);
+        random_sight(i % 8, &box, eye);
+        if (terrimp_capture_fit(&box, eye, &c) != TERRIMP_OK)
+            continue;
+        fitted++;
+        before = c;
+        for (n = 0; n < count; n++) {
+            oracle_point_in(&box, point);
+            for (k = 0; k < 3; k++)
+                points[n][k] = terrimpi_clamp((float)point[k], box.min[k], box.max[k]);
+            oracle_widen(points[n], point);
+            capture_coordinates(&c, point, at);
+            slope = fmax(slope, sqrt(1.0 + at[0] * at[0] + at[1] * at[1]));
+            for (k = 0; k < 2; k++) {
+                least[k] = n == 0 || at[k] < least[k] ? at[k] : least[k];
+                most[k] = n == 0 || at[k] > most[k] ? at[k] : most[k];
+            }
+        }
+        CHECK(terrimp_capture_tighten(&c, points[0], (uint32_t)count) == TERRIMP_OK);
+        CHECK(least[0] >= (double)c.tan_left && most[0] <= (double)c.tan_right);
+        CHECK(least[1] >= (double)c.tan_down && most[1] <= (double)c.tan_up);
+        CHECK(c.tan_right > c.tan_left && c.tan_up > c.tan_down);
+        for (k = 0; k < 2; k++)
+            slack[k] = slope * 4e-6 * (fmax(fabs(least[k]), fabs(most[k])) + 0.2);
+        CHECK(least[0] - (double)c.tan_left < slack[0] && (double)c.tan_right - most[0] < slack[0]);
+        CHECK(least[1] - (double)c.tan_down < slack[1] && (double)c.tan_up - most[1] < slack[1]);
+        c.tan_left = before.tan_left;
+        c.tan_right = before.tan_right;
+        c.tan_down = before.tan_down;
+        c.tan_up = before.tan_up;
+        CHECK(memcmp(&c, &before, sizeof c) == 0);
+    }
+    CHECK(fitted > 12000);
+}
+
 static void capture_axes_are_orthonormal_and_aim_at_the_middle(void)
 {
     int i, k;
@@ -617,6 +660,7 @@ static void camera_tests(void)
     RUN(frustum_masks_give_children_the_full_answer);
     RUN(box_distances_agree_with_brute_force);
     RUN(capture_fit_holds_every_corner_and_touches_every_side);
+    RUN(capture_tighten_touches_the_points_and_keeps_the_rest);
     RUN(capture_axes_are_orthonormal_and_aim_at_the_middle);
     RUN(capture_matrices_clip_no_corner);
     RUN(capture_fit_tells_inside_from_spanning);
