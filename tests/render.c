@@ -16,6 +16,7 @@
 #include "examples/host/image.h"
 #include "examples/host/lightmap.h"
 #include "examples/host/procedural.h"
+#include "examples/host/tour.h"
 
 #include <math.h>
 #include <string.h>
@@ -291,28 +292,7 @@ static uint8_t *open_picture(const scene *s)
 /* A camera that sees the whole terrain. */
 static terrimp_camera camera_at(const scene *s, const flight_pose *pose)
 {
-    terrimp_camera camera;
-    int i;
-    memset(&camera, 0, sizeof camera);
-    for (i = 0; i < 3; i++) {
-        camera.eye[i] = pose->eye[i];
-        camera.forward[i] = pose->target[i] - pose->eye[i];
-    }
-    camera.fov_y_rad = s->fov;
-    camera.width_px = (uint32_t)s->width;
-    camera.height_px = (uint32_t)s->height;
-    camera.z_far = terrimp_box_farthest(&s->info.box, camera.eye) * 1.2f;
-    camera.z_near = camera.z_far / 8192.0f;
-    return camera;
-}
-
-/* Its clip distances become those that an update asks for, like a host's would be. */
-static terrimp_camera tighten(terrimp_camera camera, const terrimp_stats *stats)
-{
-    camera.z_near = fmaxf(camera.z_near, stats->z_near);
-    if (stats->z_far > camera.z_near)
-        camera.z_far = stats->z_far * 1.01f;
-    return camera;
+    return tour_camera_at(pose, &s->info.box, s->fov, (uint32_t)s->width, (uint32_t)s->height);
 }
 
 /* Updates the view for a pose. Returns the camera to draw with. */
@@ -322,7 +302,8 @@ static terrimp_camera aim(const scene *s, terrimp_view *view, const flight_pose 
     terrimp_camera camera = camera_at(s, pose);
     need_ok(terrimp_view_update(view, &camera));
     need_ok(terrimp_view_get_stats(view, stats));
-    return tighten(camera, stats);
+    tour_tighten(&camera, stats);
+    return camera;
 }
 
 /* Stands between a view and its callbacks: notes what passes, and may hold captures back. */
@@ -1098,7 +1079,7 @@ static terrimp_stats draw_geomip(scene *s, gl_geomip *g, const flight_pose *pose
     need_ok(gl_geomip_update(g, &camera, &stats));
     /* The selection measures to the closest point, wherever on the screen that is. */
     stats.z_near *= cosf(0.5f * s->fov) * 0.7f;
-    camera = tighten(camera, &stats);
+    tour_tighten(&camera, &stats);
     need_ok(gl_terrain_begin(&s->gl, &camera, sky));
     need_ok(gl_geomip_draw(g));
     gl_terrain_end(&s->gl);

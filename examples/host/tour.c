@@ -74,9 +74,9 @@ int tour_plan(tour *t)
     return 1;
 }
 
-terrimp_camera tour_camera(const tour *t, const terrimp_box *box, size_t frame)
+terrimp_camera tour_camera_at(const flight_pose *pose, const terrimp_box *box, float fov_y_rad,
+                              uint32_t width, uint32_t height)
 {
-    const flight_pose *pose = &t->flight.poses[frame];
     terrimp_camera camera;
     int i;
     memset(&camera, 0, sizeof camera);
@@ -84,12 +84,18 @@ terrimp_camera tour_camera(const tour *t, const terrimp_box *box, size_t frame)
         camera.eye[i] = pose->eye[i];
         camera.forward[i] = pose->target[i] - pose->eye[i];
     }
-    camera.fov_y_rad = t->desc.fov_y_rad;
-    camera.width_px = t->desc.width;
-    camera.height_px = t->desc.height;
+    camera.fov_y_rad = fov_y_rad;
+    camera.width_px = width;
+    camera.height_px = height;
     camera.z_far = terrimp_box_farthest(box, camera.eye) * 1.2f;
     camera.z_near = camera.z_far * (1.0f / 8192.0f);
     return camera;
+}
+
+terrimp_camera tour_camera(const tour *t, const terrimp_box *box, size_t frame)
+{
+    return tour_camera_at(&t->flight.poses[frame], box, t->desc.fov_y_rad, t->desc.width,
+                          t->desc.height);
 }
 
 void tour_tighten(terrimp_camera *camera, const terrimp_stats *now)

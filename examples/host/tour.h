@@ -35,6 +35,10 @@ int tour_load(tour *t, const tour_desc *desc);
 /* Plans the flight over t->field, which may also have been set by hand. Returns the same. */
 int tour_plan(tour *t);
 
+/* A camera in a pose that sees all of a box. */
+terrimp_camera tour_camera_at(const flight_pose *pose, const terrimp_box *box, float fov_y_rad,
+                              uint32_t width, uint32_t height);
+
 /* The camera of a frame. Its clip distances hold a box: that of all that is drawn. */
 terrimp_camera tour_camera(const tour *t, const terrimp_box *box, size_t frame);
 
