@@ -172,9 +172,12 @@
 #define TERRIMP_VERSION_PATCH 0
 #define TERRIMP_VERSION "0.4.0"
 
-/* Linkage of every public function. TERRIMP_STATIC makes them private to one file. */
+/* Linkage of every public function. TERRIMP_STATIC makes them private to one file, where those
+   that are not called are no fault. */
 #ifndef TERRIMP_API
-#ifdef TERRIMP_STATIC
+#if defined(TERRIMP_STATIC) && defined(__GNUC__)
+#define TERRIMP_API static __attribute__((unused))
+#elif defined(TERRIMP_STATIC)
 #define TERRIMP_API static
 #else
 #define TERRIMP_API extern
@@ -3023,50 +3026,54 @@ static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x,
     *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
 }
 
-/* The frustum of a camera, as that of a capture. */
-static terrimp_result terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
+/* The frustum of a resolved camera, as that of a capture. */
+static void terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
 {
-    terrimp_camera c;
-    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
-    memcpy(out->eye, c.eye, sizeof c.eye);
-    memcpy(out->up, c.up, sizeof c.up);
-    memcpy(out->forward, c.forward, sizeof c.forward);
-    terrimpi_cross(c.forward, c.up, out->right);
-    out->z_near = c.z_near;
-    out->z_far = c.z_far;
-    terrimpi_camera_tangents(&c, &out->tan_right, &out->tan_up);
+    memcpy(out->eye, camera->eye, sizeof out->eye);
+    memcpy(out->up, camera->up, sizeof out->up);
+    memcpy(out->forward, camera->forward, sizeof out->forward);
+    terrimpi_cross(camera->forward, camera->up, out->right);
+    out->z_near = camera->z_near;
+    out->z_far = camera->z_far;
+    terrimpi_camera_tangents(camera, &out->tan_right, &out->tan_up);
     out->tan_left = -out->tan_right;
     out->tan_down = -out->tan_up;
-    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16])
 {
+    terrimp_camera resolved;
     terrimp_capture c;
     TERRIMPI_REFUSE(!view || !projection, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_camera_capture(camera, &c));
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
+    terrimpi_camera_capture(&resolved, &c);
     return terrimp_capture_matrices(&c, camera->depth_zero_to_one, view, projection);
+}
+
+/* terrimp_camera_pixel_factor of a resolved camera. */
+static float terrimpi_camera_pixel_factor(const terrimp_camera *camera)
+{
+    float tan_x, tan_y;
+    terrimpi_camera_tangents(camera, &tan_x, &tan_y);
+    return (float)camera->height_px / (2.0f * tan_y);
 }
 
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
 {
     terrimp_camera c;
-    float tan_x, tan_y;
     TERRIMPI_REFUSE(!factor, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
-    terrimpi_camera_tangents(&c, &tan_x, &tan_y);
-    *factor = (float)c.height_px / (2.0f * tan_y);
+    *factor = terrimpi_camera_pixel_factor(&c);
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
-                                                  terrimp_frustum *frustum)
+/* terrimp_camera_frustum of a resolved camera. */
+static void terrimpi_camera_frustum(const terrimp_camera *camera, terrimp_frustum *frustum)
 {
     terrimp_capture c;
     int i;
-    TERRIMPI_REFUSE(!frustum, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_camera_capture(camera, &c));
+    terrimpi_camera_capture(camera, &c);
     memset(frustum, 0, sizeof *frustum);
     for (i = 0; i < 3; i++) {
         frustum->eye[i] = c.eye[i];
@@ -3079,6 +3086,15 @@ TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
     }
     frustum->plane[4][3] = -c.z_near;
     frustum->plane[5][3] = c.z_far;
+}
+
+TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
+                                                  terrimp_frustum *frustum)
+{
+    terrimp_camera c;
+    TERRIMPI_REFUSE(!frustum, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    terrimpi_camera_frustum(&c, frustum);
     return TERRIMP_OK;
 }
 
@@ -4481,10 +4497,9 @@ static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_ge
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
-    float pixel_factor;
+    float pixel_factor = terrimpi_camera_pixel_factor(camera);
     uint32_t level;
-    terrimp_camera_frustum(camera, &f.frustum);
-    terrimp_camera_pixel_factor(camera, &pixel_factor);
+    terrimpi_camera_frustum(camera, &f.frustum);
     f.tree = tree;
     f.view = view;
     f.exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
@@ -11090,8 +11105,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     before = view->camera;
     frustum = view->frustum;
     view->camera = resolved;
-    terrimp_camera_frustum(&resolved, &view->frustum);
-    terrimp_camera_pixel_factor(&resolved, &view->pixel_factor);
+    terrimpi_camera_frustum(&resolved, &view->frustum);
+    view->pixel_factor = terrimpi_camera_pixel_factor(&resolved);
     result = terrimpi_cut_ground(view);
     if (result != TERRIMP_OK) {
         view->camera = before;

@@ -26,8 +26,7 @@ builds_and_runs()
     $command -I. "$@" -o $work/program -lm && $work/program
 }
 
-# ways "name" "compiler and flags": every way to include and configure the library. A library that
-# is private to a file and half used has unused functions, and this is no fault.
+# ways "name" "compiler and flags": every way to include and configure the library.
 ways()
 {
     freestanding=-ffreestanding
@@ -39,15 +38,14 @@ ways()
     check "$1: after macros like windows.h" builds_and_runs "$2" windows.c
     check "$1: without malloc"              builds_and_runs "$2" no_malloc.c
     check "$1: as without a system"         builds_and_runs "$2 $freestanding" bare.c
-    check "$1: without building, from a bake" \
-        builds_and_runs "$2 -Wno-unused-function" no_build.c bake_maker.c
+    check "$1: without building, from a bake" builds_and_runs "$2" no_build.c bake_maker.c
     check "$1: the same without options for small machines" \
-        builds_and_runs "$2 -Wno-unused-function -DTERRIMP_NO_SPLIT -DTERRIMP_NO_BOUND
-                         -DTERRIMP_NO_MORPH" no_build.c bake_maker.c
+        builds_and_runs "$2 -DTERRIMP_NO_SPLIT -DTERRIMP_NO_BOUND -DTERRIMP_NO_MORPH" \
+        no_build.c bake_maker.c
     check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c
-    check "$1: private to each of two files" \
-        builds_and_runs "$2 -Wno-unused-function" static_a.c static_b.c
-    check "$1: every macro replaced" builds_and_runs "$2 -Wno-unused-function" custom.c
+    check "$1: private to each of two files" builds_and_runs "$2" static_a.c static_b.c
+    check "$1: every macro replaced" \
+        builds_and_runs "$2 -Wno-unused-function" custom.c
 }
 
 # standards "compiler and flags" "optimisation" standards...
@@ -70,6 +68,7 @@ compilers() # C compiler, C++ compiler
     fi
     standards "$1 $c_strict" -O0 c99 c11 c17
     standards "$1 $c_strict" -O2 c99 ${check_every:+c11 c17}
+    standards "$1 $c_strict" -O3 c99
     standards "$1 $c_strict" -Os c99
     ways "$1 c99" "$1 -O0 -std=c99 $c_strict"
 
