@@ -1,7 +1,8 @@
 /* A machine without an operating system: no malloc, no assert.h, all memory in static arrays. A
    terrain of 65 x 65 u8 samples is built, and two frames of it are drawn.
    Compiled for such a machine it is linked without startup files, and its entry tells a debugger
-   or emulator by semihosting how it ended; everywhere else it is a program like any other. */
+   or emulator by semihosting how it ended and how much stack it took; everywhere else it is a
+   program like any other. */
 #include <stdint.h>
 
 static int broken_asserts;
@@ -16,6 +17,58 @@ static int broken_asserts;
 static uint8_t samples[SIDE][SIDE];
 static uint64_t terrain_memory[32768 / 8], view_memory[65536 / 8], scratch[131072 / 8];
 static uint32_t captures, impostors, grounds;
+
+#if defined(__arm__) && !defined(__linux__)
+#define BARE_METAL
+
+/* What lies below the stack is painted, and later looked at for how far down the paint is gone:
+   nothing else writes there on a machine without interrupts. */
+#define PAINT 0xa5a5a5a5u
+#define PAINTED_WORDS 4096
+
+static volatile uint32_t *painted;
+
+static void paint_stack(void)
+{
+    uint32_t *top, i;
+    __asm__ volatile("mov %0, sp" : "=r"(top));
+    painted = top - PAINTED_WORDS;
+    for (i = 0; i < PAINTED_WORDS; i++)
+        painted[i] = PAINT;
+}
+
+/* Bytes of stack used since it was painted. */
+static uint32_t stack_used(void)
+{
+    uint32_t i = 0;
+    while (i < PAINTED_WORDS && painted[i] == PAINT)
+        i++;
+    return (PAINTED_WORDS - i) * 4u;
+}
+
+/* Semihosting's call 4 writes a string. */
+static void print(const char *text)
+{
+    __asm__ volatile("movs r0, #4\n mov r1, %0\n bkpt 0xab" : : "r"(text) : "r0", "r1", "memory");
+}
+
+static void print_bytes(const char *name, uint32_t value)
+{
+    char text[12];
+    uint32_t at = sizeof text;
+    text[--at] = 0;
+    do
+        text[--at] = (char)('0' + value % 10u);
+    while ((value /= 10u) > 0);
+    print(name);
+    print(text + at);
+    print(" bytes\n");
+}
+#else
+static void paint_stack(void) { }
+static uint32_t stack_used(void) { return 0; }
+static void print_bytes(const char *name, uint32_t value) { (void)name, (void)value; }
+#endif
 
 static void on_capture(void *user, const terrimp_capture_command *command)
 {
@@ -78,27 +131,46 @@ static int draw_frames(terrimp_view *view)
 }
 
 /* 0, or the number of the step that failed. */
-int main(void)
+static int draw_in_mode(terrimp_terrain *terrain, int mode)
 {
-    terrimp_terrain *terrain = make_terrain();
     terrimp_view *view = NULL;
     terrimp_view_desc desc;
-    if (terrain == NULL)
-        return 1;
     memset(&desc, 0, sizeof desc);
-    desc.mode = TERRIMP_MODE_IMPOSTOR;
+    desc.mode = mode;
     desc.atlas_size = 256;
     desc.max_impostors = 16;
     if (terrimp_view_init(terrain, &desc, view_memory, sizeof view_memory, &view) != TERRIMP_OK)
         return 2;
-    if (!draw_frames(view))
-        return 3;
-    if (grounds == 0 || impostors == 0 || captures == 0)
-        return 4;
-    return broken_asserts == 0 ? 0 : 5;
+    return draw_frames(view) ? 0 : 3;
 }
 
-#if defined(__arm__) && !defined(__linux__)
+int main(void)
+{
+    terrimp_terrain *terrain;
+    uint32_t building, drawing;
+    int failure;
+    paint_stack();
+    terrain = make_terrain();
+    building = stack_used();
+    if (terrain == NULL)
+        return 1;
+    paint_stack();
+    failure = draw_in_mode(terrain, TERRIMP_MODE_AUTO);
+    if (!failure)
+        failure = draw_in_mode(terrain, TERRIMP_MODE_IMPOSTOR);
+    drawing = stack_used();
+    if (failure)
+        return failure;
+    if (grounds == 0 || impostors == 0 || captures == 0)
+        return 4;
+    print_bytes("     stack for building: ", building);
+    print_bytes("     stack for a frame:  ", drawing);
+    if (building > 8192 || drawing > 4096)
+        return 5;
+    return broken_asserts == 0 ? 0 : 6;
+}
+
+#ifdef BARE_METAL
 /* Where the machine starts. Semihosting's call 0x18 ends the emulator; 0x20026: all went well. */
 void bare_entry(void);
 void bare_entry(void)
