@@ -63,6 +63,25 @@ unit_tests_pass() # emulator, compiler and flags...
     return $code
 }
 
+# Every machine makes a bake, and opens those of all others when they are made.
+makes_bake() # name, emulator, compiler and flags...
+{
+    program=$work/abroad-$1
+    bake=$work/$1.bake
+    emulator=$2
+    shift 2
+    "$@" -I. tests/compile/bake_abroad.c -lm -o $program && $emulator $program make $bake &&
+        echo "$emulator $program" >> $work/openers && echo $bake >> $work/bakes
+}
+
+bakes_travel()
+{
+    while read -r opener; do
+        check "$(wc -l < $work/bakes) machines' bakes on ${opener##*abroad-}" \
+            $opener open $(cat $work/bakes) < /dev/null
+    done < $work/openers
+}
+
 # machine name "what it shows" "compiler and flags" "emulator, or none" ["more sources"]
 # Programs are linked statically, so that nothing of the machine need be installed but the compiler.
 machine()
@@ -78,6 +97,7 @@ machine()
         builds_and_runs "$4" $3 -std=c99 -static $strict tests/compile/plain.c
     check "$1: all memory in static arrays" \
         builds_and_runs "$4" $3 -std=c99 -static tests/compile/bare.c
+    check "$1: makes a bake" makes_bake "$1" "$4" $3 -std=c99 -static
     check "$1: unit tests, $2" unit_tests_pass "$4" $3 -static tests/unit.c $5
 }
 
@@ -122,5 +142,8 @@ if wanted bare; then
     check "Cortex-M0 and M4: the run-time part needs no double and no 64-bit division" \
         sh tests/sizes.sh
 fi
+rm -f $work/openers $work/bakes
+check "$(uname -m): makes a bake" makes_bake "$(uname -m)" "" "${CC:-cc}" -std=c99
 machines
+bakes_travel
 check_report
