@@ -2797,14 +2797,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield 
 
    Above each quad the ray is cut where it crosses the quad's border and its diagonal. Over such a
    piece the gap between ray and surface is linear, so the two meet where the gap changes its sign.
-   Neighbouring pieces share their cut and, by terrimpi_quad_height, the gap there: no ray slips
-   through between two triangles. */
+   The side of the surface on which a piece ends is handed on to the next and not found anew there,
+   where it could be rounded to the other: no ray slips through between two triangles. */
 
 /* A point of the ray above one quad. */
 typedef struct terrimpi_ray_point {
     float t;    /* [wu] from the start of the walk */
     float y;
     float u, v; /* place in the quad */
+    int above;  /* the surface: 1, or -1 for below; 0 while it is not known */
 } terrimpi_ray_point;
 
 /* The part of a ray above the field. */
@@ -2874,17 +2875,20 @@ static terrimpi_ray_point terrimpi_ray_at(const terrimpi_ray *ray, const terrimp
     point.y = ray->start[1] + t * ray->way[1];
     point.u = terrimpi_fraction(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
     point.v = terrimpi_fraction(ray->start[2] + t * ray->way[2], quad->z0, quad->z1);
+    point.above = 0;
     return point;
 }
 
-/* Does the piece a..b, all above one triangle, meet it? Then *t is where. */
+/* Does the piece a..b, all above one triangle, meet it? Then *t is where. Else b knows its side. */
 static int terrimpi_ray_meets(const terrimpi_ray *ray, const terrimpi_quad *quad, int side,
-                              const terrimpi_ray_point *a, const terrimpi_ray_point *b, float *t)
+                              const terrimpi_ray_point *a, terrimpi_ray_point *b, float *t)
 {
     float gap_a = a->y - terrimpi_quad_height(quad, side, a->u, a->v);
     float gap_b = b->y - terrimpi_quad_height(quad, side, b->u, b->v);
+    int above = a->above != 0 ? a->above : (gap_a > 0.0f) - (gap_a < 0.0f);
     float slope[2], closing;
-    if ((gap_a > 0.0f && gap_b > 0.0f) || (gap_a < 0.0f && gap_b < 0.0f))
+    b->above = (gap_b > 0.0f) - (gap_b < 0.0f);
+    if (above != 0 && above == b->above)
         return 0;
     terrimpi_quad_slope(quad, side, slope);
     closing = slope[0] * ray->way[0] + slope[1] * ray->way[2] - ray->way[1];
@@ -2894,7 +2898,7 @@ static int terrimpi_ray_meets(const terrimpi_ray *ray, const terrimpi_quad *quad
 
 /* The first meeting within one quad, between two points of the ray on its border. */
 static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
-                             const terrimpi_ray_point *a, const terrimpi_ray_point *b, int *side,
+                             const terrimpi_ray_point *a, terrimpi_ray_point *b, int *side,
                              float *t)
 {
     float off_a = a->v - a->u, off_b = b->v - b->u, s;
@@ -2902,7 +2906,8 @@ static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
     float low = terrimpi_min(terrimpi_min(h[0], h[1]), terrimpi_min(h[2], h[3]));
     float high = terrimpi_max(terrimpi_max(h[0], h[1]), terrimpi_max(h[2], h[3]));
     terrimpi_ray_point cut;
-    if (terrimpi_min(a->y, b->y) > high || terrimpi_max(a->y, b->y) < low)
+    b->above = terrimpi_min(a->y, b->y) > high ? 1 : terrimpi_max(a->y, b->y) < low ? -1 : 0;
+    if (b->above != 0 && (a->above == 0 || a->above == b->above))
         return 0;
     *side = terrimpi_quad_side(0.0f, off_a + off_b);
     if (!((off_a > 0.0f && off_b < 0.0f) || (off_a < 0.0f && off_b > 0.0f)))

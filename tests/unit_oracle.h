@@ -9,6 +9,14 @@
 
 static const double oracle_pi = 3.14159265358979323846;
 
+/* Whether two numbers are one and the same float. Where registers are wider than a float, such as
+   the x87's, == alone compares digits of constants and products that no float keeps. */
+static int same_float(float a, float b)
+{
+    volatile float stored_a = a, stored_b = b;
+    return stored_a == stored_b;
+}
+
 static double oracle_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

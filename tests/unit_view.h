@@ -1128,8 +1128,8 @@ static void view_defaults_are_those_of_the_table(void)
         CHECK(out.mode == TERRIMP_MODE_AUTO && out.ground_rule == TERRIMP_GEOMIP_PICTURE);
         CHECK(out.tolerance_px == 1.0f && out.ground_tolerance_px == 0.5f);
         CHECK(out.morph_ratio == 1.0f && out.impostor_px == 320.0f);
-        CHECK(out.fade_start == 2.0f * 64.0f * 5.0f && out.fade_end == 1.1f * out.fade_start);
-        CHECK(out.max_angle_rad == 0.0873f && out.texels_per_px == 2.0f);
+        CHECK(out.fade_start == 2.0f * 64.0f * 5.0f && same_float(out.fade_end, 1.1f * out.fade_start));
+        CHECK(same_float(out.max_angle_rad, 0.0873f) && out.texels_per_px == 2.0f);
         CHECK(out.atlas_size == 4096 && out.atlas_count == 1 && out.max_impostors == 1024);
         CHECK(out.max_ground == 2 && out.max_captures == 64);
         CHECK(out.max_capture_texels == 0 && out.max_capture_triangles == 0);
@@ -1140,7 +1140,7 @@ static void view_defaults_are_those_of_the_table(void)
         d.fade_start = 10.0f;
         d.tolerance_px = 0.06f;
         CHECK(terrimp_view_desc_resolve(l.terrain, &d, &d) == TERRIMP_OK);
-        CHECK(d.fade_end == 1.1f * 10.0f && d.ground_tolerance_px == 0.05f);
+        CHECK(d.fade_end == 11.0f && same_float(d.ground_tolerance_px, 0.05f));
     }
     land_free(&l);
 }
@@ -1784,7 +1784,7 @@ static void scarce_ground_is_coarser_ground(void)
             flight_update(f, &camera);
             flight_render(f);
         }
-        CHECK(f->stats.ground_tolerance_px == 0.1f);
+        CHECK(same_float(f->stats.ground_tolerance_px, 0.1f));
         flight_close(f);
     }
     land_free(&l);
