@@ -643,13 +643,15 @@ static void hf_height_is_right_at_distant_origins(void)
         uint32_t i = 0, j = 0;
         if (round % 20 == 0) {
             hf_random(&f, random_range(2, 24), random_range(2, 24));
-            f.view.origin_x = random_float(-1.0f, 1.0f) * 4.0e6f;
-            f.view.origin_z = random_float(-1.0f, 1.0f) * 4.0e6f;
-            f.view.spacing_x = random_float(0.6f, 3.0f);
-            f.view.spacing_z = random_float(0.6f, 3.0f);
+            f.view.origin_x = terrimpi_float(random_float(-1.0f, 1.0f) * 4.0e6f);
+            f.view.origin_z = terrimpi_float(random_float(-1.0f, 1.0f) * 4.0e6f);
+            f.view.spacing_x = terrimpi_float(random_float(0.6f, 3.0f));
+            f.view.spacing_z = terrimpi_float(random_float(0.6f, 3.0f));
         }
-        x = f.view.origin_x + random_float(0.0f, (float)(f.view.width - 1)) * f.view.spacing_x;
-        z = f.view.origin_z + random_float(0.0f, (float)(f.view.depth - 1)) * f.view.spacing_z;
+        x = random_float(0.0f, (float)(f.view.width - 1)) * f.view.spacing_x;
+        z = random_float(0.0f, (float)(f.view.depth - 1)) * f.view.spacing_z;
+        x = terrimpi_float(f.view.origin_x + x);
+        z = terrimpi_float(f.view.origin_z + z);
         while (i + 2 < f.view.width
                && terrimpi_float(f.view.origin_x + (float)(i + 1) * f.view.spacing_x) < x)
             ++i;

@@ -1128,7 +1128,8 @@ static void view_defaults_are_those_of_the_table(void)
         CHECK(out.mode == TERRIMP_MODE_AUTO && out.ground_rule == TERRIMP_GEOMIP_PICTURE);
         CHECK(out.tolerance_px == 1.0f && out.ground_tolerance_px == 0.5f);
         CHECK(out.morph_ratio == 1.0f && out.impostor_px == 320.0f);
-        CHECK(out.fade_start == 2.0f * 64.0f * 5.0f && same_float(out.fade_end, 1.1f * out.fade_start));
+        CHECK(out.fade_start == 2.0f * 64.0f * 5.0f);
+        CHECK(same_float(out.fade_end, 1.1f * out.fade_start));
         CHECK(same_float(out.max_angle_rad, 0.0873f) && out.texels_per_px == 2.0f);
         CHECK(out.atlas_size == 4096 && out.atlas_count == 1 && out.max_impostors == 1024);
         CHECK(out.max_ground == 2 && out.max_captures == 64);
