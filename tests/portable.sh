@@ -101,9 +101,32 @@ machine()
     check "$1: unit tests, $2" unit_tests_pass "$4" $3 -static tests/unit.c $5
 }
 
+# Sizes and indices that fit 64 bits may not fit 32: the fuzzers' corpus, undefined behaviour ends
+# the program.
+corpus_in_32_bits()
+{
+    compiler="i686-linux-gnu-gcc -O2 -std=gnu99 -static -Wno-unused-function
+              -fsanitize=undefined -fsanitize-undefined-trap-on-error"
+    if ! have "${compiler%% *}"; then
+        skip "x87, the fuzzers' corpus: ${compiler%% *} is not installed"
+        return
+    fi
+    for corpus in tests/corpus/*/; do
+        corpus=${corpus%/}
+        fuzzer=fuzz_${corpus##*/}
+        check "x87: the corpus of $fuzzer" replays $fuzzer $corpus
+    done
+}
+
+replays() # fuzzer, corpus
+{
+    $compiler -DTERRIMP_STATIC -I. "tests/$1.c" -lm -o $work/fuzzer && $work/fuzzer "$2"/*
+}
+
 machines()
 {
     machine x87 "80-bit registers, as C99 has them" "i686-linux-gnu-gcc -O2 -std=c99" ""
+    ! wanted x87 || corpus_in_32_bits
     machine x87-gnu "80-bit registers, rounded at the compiler's whim" \
         "i686-linux-gnu-gcc -O2 -std=gnu99" ""
     machine arm "32 bits, hard float" "arm-linux-gnueabihf-gcc -O2 -std=c99" qemu-arm
