@@ -1,4 +1,4 @@
-/* terrimp.h - v0.4.0 - draws large heightfield terrain with terrain impostors - MIT licence
+/* terrimp.h - v0.4.1 - draws large heightfield terrain with terrain impostors - MIT licence
 
    Distant terrain is drawn as pictures of itself: a node of a quadtree is rendered in full detail
    into a slot of a texture atlas, and for many frames after that a coarse mesh of under a hundred
@@ -170,8 +170,8 @@
 
 #define TERRIMP_VERSION_MAJOR 0
 #define TERRIMP_VERSION_MINOR 4
-#define TERRIMP_VERSION_PATCH 0
-#define TERRIMP_VERSION "0.4.0"
+#define TERRIMP_VERSION_PATCH 1
+#define TERRIMP_VERSION "0.4.1"
 
 /* Linkage of every public function. TERRIMP_STATIC makes them private to one file, where those
    that are not called are no fault. */
@@ -11366,6 +11366,8 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
 #endif /* TERRIMP_IMPLEMENTATION */
 
 /* VERSION HISTORY
+   0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
+          warnings of what is not called, -O3 without any
    0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of
           no_upper_skirts; the fade band of AUTO is narrower; three options that small machines may
           leave out: TERRIMP_NO_SPLIT, TERRIMP_NO_BOUND, TERRIMP_NO_MORPH
