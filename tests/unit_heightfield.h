@@ -648,10 +648,10 @@ static void hf_height_is_right_at_distant_origins(void)
             f.view.spacing_x = terrimpi_float(random_float(0.6f, 3.0f));
             f.view.spacing_z = terrimpi_float(random_float(0.6f, 3.0f));
         }
-        x = random_float(0.0f, (float)(f.view.width - 1)) * f.view.spacing_x;
-        z = random_float(0.0f, (float)(f.view.depth - 1)) * f.view.spacing_z;
-        x = terrimpi_float(f.view.origin_x + x);
-        z = terrimpi_float(f.view.origin_z + z);
+        x = terrimpi_float(f.view.origin_x +
+                           random_float(0.0f, (float)(f.view.width - 1)) * f.view.spacing_x);
+        z = terrimpi_float(f.view.origin_z +
+                           random_float(0.0f, (float)(f.view.depth - 1)) * f.view.spacing_z);
         while (i + 2 < f.view.width
                && terrimpi_float(f.view.origin_x + (float)(i + 1) * f.view.spacing_x) < x)
             ++i;

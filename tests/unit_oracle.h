@@ -13,8 +13,7 @@ static const double oracle_pi = 3.14159265358979323846;
    the x87's, == alone compares digits of constants and products that no float keeps. */
 static int same_float(float a, float b)
 {
-    volatile float stored_a = a, stored_b = b;
-    return stored_a == stored_b;
+    return terrimpi_float(a) == terrimpi_float(b);
 }
 
 static double oracle_dot(const double a[3], const double b[3])

@@ -44,8 +44,7 @@ ways()
         no_build.c bake_maker.c
     check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c
     check "$1: private to each of two files" builds_and_runs "$2" static_a.c static_b.c
-    check "$1: every macro replaced" \
-        builds_and_runs "$2 -Wno-unused-function" custom.c
+    check "$1: every macro replaced" builds_and_runs "$2 -Wno-unused-function" custom.c
 }
 
 # standards "compiler and flags" "optimisation" standards...
