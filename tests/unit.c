@@ -26,6 +26,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_atlas.h"
 #include "unit_terrain.h"
 #include "unit_view.h"
+#include "unit_sorted.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
 
@@ -40,6 +41,7 @@ int main(void)
     terrain_tests();
     bake_tests();
     view_tests();
+    sorted_tests();
     bad_input_tests();
     return check_report();
 }
