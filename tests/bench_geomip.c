@@ -47,7 +47,7 @@ static uint16_t *rough_terrain(void)
 
 /* A circle over the middle of the terrain, 60 units above the highest ground below, looking ahead
    and somewhat down. */
-static terrimp_camera camera_at(const terrimp_geomip *tree, int frame)
+static terrimp_camera camera_at(const terrimp_quadtree *tree, int frame)
 {
     terrimp_camera c;
     float turn = 6.2831853f * (float)frame / FRAMES, height = 0.0f;
@@ -67,7 +67,7 @@ static terrimp_camera camera_at(const terrimp_geomip *tree, int frame)
     return c;
 }
 
-static void bench_rule(const terrimp_geomip *tree, terrimp_geomip_view *view, const char *name)
+static void bench_rule(const terrimp_quadtree *tree, terrimp_geomip_view *view, const char *name)
 {
     double median = 1e9, draws = 0.0, triangles = 0.0;
     uint32_t most = 0;
@@ -98,7 +98,7 @@ static void bench_terrain(const char *name, uint16_t *samples, float scale, uint
     static const char *const rules[] = {"", "picture", "bound", "distance"};
     static const float tolerances[] = {1.0f, 4.0f};
     terrimp_heightfield field;
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view;
     float *scratch;
     double start, fit_ms;
@@ -109,7 +109,7 @@ static void bench_terrain(const char *name, uint16_t *samples, float scale, uint
     field.width = field.depth = SIDE;
     field.format = TERRIMP_FORMAT_U16;
     field.height_scale = scale;
-    if (terrimp_geomip_init(&field, quads, &tree) != TERRIMP_OK)
+    if (terrimp_quadtree_init(&field, quads, &tree) != TERRIMP_OK)
         exit(2);
     tree.nodes = allocate(tree.node_count, sizeof *tree.nodes);
     tree.fits = allocate(tree.fit_count, sizeof *tree.fits);

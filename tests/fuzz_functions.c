@@ -251,12 +251,12 @@ static void use_patterns(void)
     }
 }
 
-static void draw_node(const terrimp_geomip *tree, const terrimp_geomip_draw *draw)
+static void draw_node(const terrimp_quadtree *tree, const terrimp_geomip_draw *draw)
 {
     size_t count = (size_t)(tree->chunk_quads + 1u) * (tree->chunk_quads + 1u);
     terrimp_geomip_vertex *vertices = (terrimp_geomip_vertex *)fuzz_take(count * sizeof *vertices);
     float *xyz = (float *)fuzz_take(count * 3u * sizeof *xyz);
-    FUZZ_CHECK(terrimp_geomip_fill_vertices(tree, draw->node, xyz, vertices) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_vertices(tree, draw->node.number, xyz, vertices) == TERRIMP_OK);
     FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, TERRIMP_FORM_LIST, draw, vertices, xyz + 1,
                                     3) == TERRIMP_OK);
     FUZZ_CHECK(fuzz_finite(xyz, count * 3u));
@@ -264,7 +264,7 @@ static void draw_node(const terrimp_geomip *tree, const terrimp_geomip_draw *dra
     free(vertices);
 }
 
-static void select_nodes(const terrimp_geomip *tree)
+static void select_nodes(const terrimp_quadtree *tree)
 {
     terrimp_geomip_view view;
     terrimp_box node;
@@ -282,10 +282,12 @@ static void select_nodes(const terrimp_geomip *tree)
     for (frame = fuzz_below(4) + 1u; frame-- > 0; change_camera())
         if (terrimp_geomip_select(tree, &view, &camera) == TERRIMP_OK) {
             FUZZ_CHECK(view.draw_count <= view.draw_capacity);
-            for (i = 0; i < view.draw_count; i++)
-                FUZZ_CHECK(view.draws[i].node < tree->node_count &&
+            for (i = 0; i < view.draw_count; i++) {
+                uint32_t number = view.draws[i].node.number;
+                FUZZ_CHECK(number < tree->node_count &&
                            view.draws[i].pattern < TERRIMP_PATTERN_COUNT &&
-                           terrimp_geomip_box(tree, view.draws[i].node, &node) == TERRIMP_OK);
+                           terrimp_geomip_box(tree, number, &node) == TERRIMP_OK);
+            }
             if (view.draw_count > 0)
                 draw_node(tree, view.draws + fuzz_u8() % view.draw_count);
         }
@@ -298,11 +300,11 @@ static void select_nodes(const terrimp_geomip *tree)
 
 static void use_geomip(void)
 {
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_weights *weights;
     float *scratch;
     uint32_t quads = fuzz_u8() & 15u ? 4u + 2u * fuzz_below(8) : fuzz_size(130);
-    if (terrimp_geomip_init(&field, quads, &tree) != TERRIMP_OK)
+    if (terrimp_quadtree_init(&field, quads, &tree) != TERRIMP_OK)
         return;
     tree.nodes = (terrimp_geomip_node *)fuzz_take(tree.node_count * sizeof *tree.nodes);
     scratch = (float *)fuzz_take(tree.scratch_count * sizeof *scratch);

@@ -1305,7 +1305,7 @@ static void geomip_functions_refuse(void)
 {
     terrimp_heightfield bad;
     mip_scene s;
-    terrimp_geomip out;
+    terrimp_quadtree out;
     terrimp_box box;
     terrimp_geomip_weights weights[25];
     terrimp_geomip_vertex vertices[25];
@@ -1317,7 +1317,7 @@ static void geomip_functions_refuse(void)
     mip_make(&s, TERRIMP_FORM_LIST, 33, 33, 4);
     bad = s.tree.field;
     bad.width = 1;
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_geomip_init(&bad, 4, &out));
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_quadtree_init(&bad, 4, &out));
     REFUSES(TERRIMP_E_NULL, box, terrimp_geomip_box(NULL, 0, &box));
     REFUSES(TERRIMP_E_RANGE, box, terrimp_geomip_box(&s.tree, s.tree.node_count, &box));
     GIVES(TERRIMP_E_NULL, terrimp_geomip_fit(NULL, s.scratch));

@@ -292,7 +292,7 @@ static void patterns_refuse_bad_sizes(void)
 typedef struct mip_scene {
     int form; /* FITTED: with fits; else LIST */
     float *heights, *scratch;
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view;
 } mip_scene;
 
@@ -321,7 +321,7 @@ static void mip_make(mip_scene *s, int form, uint32_t width, uint32_t depth, uin
     field.spacing_x = 1.5f;
     field.spacing_z = 1.25f;
     field.origin_x = -31.0f;
-    CHECK(terrimp_geomip_init(&field, quads, &s->tree) == TERRIMP_OK);
+    CHECK(terrimp_quadtree_init(&field, quads, &s->tree) == TERRIMP_OK);
     s->tree.nodes = (terrimp_geomip_node *)malloc(s->tree.node_count * sizeof *s->tree.nodes);
     s->scratch = (float *)malloc(s->tree.scratch_count * sizeof(float));
     if (form == TERRIMP_FORM_FITTED)
@@ -354,8 +354,8 @@ static float mip_sample(const mip_scene *s, uint32_t x, uint32_t z)
 static void mip_vertex(const mip_scene *s, const terrimp_geomip_draw *draw, uint32_t i, uint32_t j,
                        uint32_t at[2])
 {
-    uint64_t x = ((uint64_t)draw->x * s->tree.chunk_quads + i) << draw->level;
-    uint64_t z = ((uint64_t)draw->z * s->tree.chunk_quads + j) << draw->level;
+    uint64_t x = ((uint64_t)draw->node.x * s->tree.chunk_quads + i) << draw->node.level;
+    uint64_t z = ((uint64_t)draw->node.z * s->tree.chunk_quads + j) << draw->node.level;
     at[0] = x < s->tree.field.width ? (uint32_t)x : s->tree.field.width - 1u;
     at[1] = z < s->tree.field.depth ? (uint32_t)z : s->tree.field.depth - 1u;
 }
@@ -413,15 +413,15 @@ static void mip_miss(mip_drawn *d, uint32_t x, uint32_t z, float height)
     d->seen++;
 }
 
-static terrimp_geomip_draw mip_draw_of(const terrimp_geomip *tree, uint32_t node)
+static terrimp_geomip_draw mip_draw_of(const terrimp_quadtree *tree, uint32_t node)
 {
     terrimp_geomip_draw draw;
     memset(&draw, 0, sizeof draw);
-    draw.node = node;
-    while (node >= tree->level_first[draw.level + 1u])
-        draw.level++;
-    draw.x = (node - tree->level_first[draw.level]) % tree->level_x[draw.level];
-    draw.z = (node - tree->level_first[draw.level]) / tree->level_x[draw.level];
+    draw.node.number = node;
+    while (node >= tree->level_first[draw.node.level + 1u])
+        draw.node.level++;
+    draw.node.x = (node - tree->level_first[draw.node.level]) % tree->level_x[draw.node.level];
+    draw.node.z = (node - tree->level_first[draw.node.level]) / tree->level_x[draw.node.level];
     return draw;
 }
 
@@ -429,7 +429,7 @@ static terrimp_geomip_draw mip_draw_of(const terrimp_geomip *tree, uint32_t node
 static void mip_heights(const mip_scene *s, const terrimp_geomip_draw *draw, float *heights)
 {
     static terrimp_geomip_vertex vertices[65 * 65 + 4 * 31];
-    CHECK(terrimp_geomip_fill_vertices(&s->tree, draw->node, NULL, vertices) == TERRIMP_OK);
+    CHECK(terrimp_geomip_fill_vertices(&s->tree, draw->node.number, NULL, vertices) == TERRIMP_OK);
     CHECK(terrimp_geomip_morph(s->tree.chunk_quads, s->form, draw, vertices, heights, 1) ==
           TERRIMP_OK);
 }
@@ -456,11 +456,11 @@ static float mip_largest_miss(const mip_scene *s, uint32_t node, uint32_t patter
 static float mip_miss_beyond(const mip_scene *s, const terrimp_geomip_draw *draw, uint32_t side,
                              const uint16_t *indices)
 {
-    const terrimp_geomip *t = &s->tree;
-    uint32_t along, fine = draw->level - 1u;
+    const terrimp_quadtree *t = &s->tree;
+    uint32_t along, fine = draw->node.level - 1u;
     float worst = 0.0f, miss;
     for (along = 0; along < 2u; along++) {
-        uint32_t x = draw->x * 2u, z = draw->z * 2u;
+        uint32_t x = draw->node.x * 2u, z = draw->node.z * 2u;
         x += side == TERRIMP_SIDE_X0 ? (uint32_t)-1 : side == TERRIMP_SIDE_X1 ? 2u : along;
         z += side == TERRIMP_SIDE_Z0 ? (uint32_t)-1 : side == TERRIMP_SIDE_Z1 ? 2u : along;
         if (x >= t->level_x[fine] || z >= t->level_z[fine])
@@ -475,12 +475,12 @@ static float mip_miss_beyond(const mip_scene *s, const terrimp_geomip_draw *draw
 /* Largest error of the children; each is at most the parent's, and lies in its range of heights. */
 static float mip_error_of_children(const mip_scene *s, const terrimp_geomip_draw *draw)
 {
-    const terrimp_geomip *t = &s->tree;
-    const terrimp_geomip_node *parent = &t->nodes[draw->node];
-    uint32_t k, fine = draw->level - 1u;
+    const terrimp_quadtree *t = &s->tree;
+    const terrimp_geomip_node *parent = &t->nodes[draw->node.number];
+    uint32_t k, fine = draw->node.level - 1u;
     float worst = 0.0f;
     for (k = 0; k < 4u; k++) {
-        uint32_t x = draw->x * 2u + (k & 1u), z = draw->z * 2u + (k >> 1);
+        uint32_t x = draw->node.x * 2u + (k & 1u), z = draw->node.z * 2u + (k >> 1);
         const terrimp_geomip_node *child =
             &t->nodes[t->level_first[fine] + z * t->level_x[fine] + x];
         if (x >= t->level_x[fine] || z >= t->level_z[fine])
@@ -605,7 +605,7 @@ static void fits_bring_the_surface_closer(void)
     mip_make(&s, TERRIMP_FORM_FITTED, 257, 257, 8);
     for (level = 1; level < 4u; level++) {
         double fitted = 0.0, plain = 0.0;
-        terrimp_geomip tree = s.tree;
+        terrimp_quadtree tree = s.tree;
         for (node = tree.level_first[level]; node < tree.level_first[level + 1u]; node++)
             fitted += (double)tree.nodes[node].rms * (double)tree.nodes[node].rms;
         tree.fits = NULL;
@@ -655,17 +655,18 @@ static void mip_random_settings(mip_scene *s)
 /* Level that each finest chunk is drawn at; 255 where it is not. */
 static uint8_t *mip_levels(const mip_scene *s)
 {
-    const terrimp_geomip *t = &s->tree;
+    const terrimp_quadtree *t = &s->tree;
     uint8_t *levels = (uint8_t *)malloc(t->level_first[1]);
     uint32_t k, x, z;
     memset(levels, 255, t->level_first[1]);
     for (k = 0; k < s->view.draw_count; k++) {
-        const terrimp_geomip_draw *d = &s->view.draws[k];
-        CHECK(d->node == t->level_first[d->level] + d->z * t->level_x[d->level] + d->x);
-        for (z = d->z << d->level; z < (d->z + 1u) << d->level && z < t->level_z[0]; z++)
-            for (x = d->x << d->level; x < (d->x + 1u) << d->level && x < t->level_x[0]; x++) {
+        const terrimp_node *n = &s->view.draws[k].node;
+        uint32_t end_x = (n->x + 1u) << n->level, end_z = (n->z + 1u) << n->level;
+        CHECK(n->number == t->level_first[n->level] + n->z * t->level_x[n->level] + n->x);
+        for (z = n->z << n->level; z < end_z && z < t->level_z[0]; z++)
+            for (x = n->x << n->level; x < end_x && x < t->level_x[0]; x++) {
                 CHECK(levels[z * t->level_x[0] + x] == 255); /* nothing is drawn twice */
-                levels[z * t->level_x[0] + x] = (uint8_t)d->level;
+                levels[z * t->level_x[0] + x] = (uint8_t)n->level;
             }
     }
     return levels;
@@ -675,10 +676,10 @@ static uint8_t *mip_levels(const mip_scene *s)
 static void mip_check_border(const mip_scene *s, const uint8_t *levels,
                              const terrimp_geomip_draw *d, int side)
 {
-    const terrimp_geomip *t = &s->tree;
-    uint32_t along, count = 1u << d->level, coarse = d->pattern >> side & 1u;
+    const terrimp_quadtree *t = &s->tree;
+    uint32_t along, count = 1u << d->node.level, coarse = d->pattern >> side & 1u;
     for (along = 0; along < count; along++) {
-        uint32_t x = d->x << d->level, z = d->z << d->level;
+        uint32_t x = d->node.x << d->node.level, z = d->node.z << d->node.level;
         uint8_t level;
         x += side == TERRIMP_SIDE_X0 ? (uint32_t)-1 : side == TERRIMP_SIDE_X1 ? count : along;
         z += side == TERRIMP_SIDE_Z0 ? (uint32_t)-1 : side == TERRIMP_SIDE_Z1 ? count : along;
@@ -690,8 +691,8 @@ static void mip_check_border(const mip_scene *s, const uint8_t *levels,
         level = levels[z * t->level_x[0] + x];
         if (level == 255)
             continue;
-        CHECK(level <= d->level + 1u && level + 1u >= d->level);
-        CHECK(coarse == (level > d->level));
+        CHECK(level <= d->node.level + 1u && level + 1u >= d->node.level);
+        CHECK(coarse == (level > d->node.level));
     }
 }
 
@@ -799,7 +800,7 @@ static void mip_measure_screen(mip_scene *s, const terrimp_camera *camera, const
         mip_heights(s, draw, heights);
         mip_triangles(indices, s->tree.chunk_quads, s->form, draw->pattern, mip_draw_triangle, &d);
         *worst = d.worst > *worst ? d.worst : *worst;
-        if (draw->level > 0 && draw->pattern == 0 && draw->morph == 0.0f && d.worst > 0.01f) {
+        if (draw->node.level > 0 && draw->pattern == 0 && draw->morph == 0.0f && d.worst > 0.01f) {
             CHECK(d.worst <= draw->error_px * 1.001f + 0.01f);
             *share = d.worst / draw->error_px > *share ? d.worst / draw->error_px : *share;
         }
@@ -966,7 +967,7 @@ static void the_same_frame_is_selected_twice_alike(void)
     CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
     CHECK(count == s.view.draw_count && memcmp(first, s.view.draws, count * sizeof *first) == 0);
     for (i = 1; i < count; i++) { /* an earlier node does not lie behind a later one */
-        const terrimp_geomip_draw *a = &s.view.draws[i - 1u], *b = &s.view.draws[i];
+        const terrimp_node *a = &s.view.draws[i - 1u].node, *b = &s.view.draws[i].node;
         uint32_t ax = (a->x + 1u) << a->level, az = (a->z + 1u) << a->level;
         CHECK(ax <= b->x << b->level || az <= b->z << b->level || a->level > b->level ||
               (b->x + 1u) << b->level > a->x << a->level);
@@ -989,7 +990,7 @@ static void bad_geomip_input_is_refused(void)
 {
     mip_scene s;
     terrimp_camera camera, good;
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view kept;
     float xyz[3] = {0, 0, 0}, distances[1];
     mip_make(&s, 0, 65, 65, 8);
@@ -1034,11 +1035,11 @@ static void bad_geomip_input_is_refused(void)
     CHECK(terrimp_geomip_select(NULL, &s.view, &good) == TERRIMP_E_NULL);
     CHECK(terrimp_geomip_select(&s.tree, NULL, &good) == TERRIMP_E_NULL);
     CHECK(terrimp_geomip_select(&s.tree, &s.view, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_geomip_init(&s.tree.field, 7, &tree) == TERRIMP_E_RANGE);
-    CHECK(terrimp_geomip_init(&s.tree.field, 2, &tree) == TERRIMP_E_RANGE);
-    CHECK(terrimp_geomip_init(NULL, 8, &tree) == TERRIMP_E_NULL);
-    CHECK(terrimp_geomip_init(&s.tree.field, 8, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_geomip_init(&s.tree.field, 8, &tree) == TERRIMP_OK && tree.nodes == NULL);
+    CHECK(terrimp_quadtree_init(&s.tree.field, 7, &tree) == TERRIMP_E_RANGE);
+    CHECK(terrimp_quadtree_init(&s.tree.field, 2, &tree) == TERRIMP_E_RANGE);
+    CHECK(terrimp_quadtree_init(NULL, 8, &tree) == TERRIMP_E_NULL);
+    CHECK(terrimp_quadtree_init(&s.tree.field, 8, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_quadtree_init(&s.tree.field, 8, &tree) == TERRIMP_OK && tree.nodes == NULL);
     CHECK(terrimp_geomip_build(&tree, s.scratch) == TERRIMP_E_NULL);
     CHECK(terrimp_geomip_build_node(&s.tree, s.tree.node_count, s.scratch) == TERRIMP_E_RANGE);
     CHECK(terrimp_geomip_fill_vertices(&s.tree, s.tree.node_count, xyz, NULL) == TERRIMP_E_RANGE);
@@ -1094,8 +1095,8 @@ static void nodes_meet_exactly_at_any_fraction(void)
                 between += draw->morph > 0.0f && draw->morph < 1.0f;
                 for (v = 0; v < terrimp_pattern_vertex_count(quads, form); v++) {
                     uint32_t at = mip_grid(quads, v);
-                    uint32_t x = (draw->x * quads + at % (quads + 1u)) << draw->level;
-                    uint32_t z = (draw->z * quads + at / (quads + 1u)) << draw->level;
+                    uint32_t x = (draw->node.x * quads + at % (quads + 1u)) << draw->node.level;
+                    uint32_t z = (draw->node.z * quads + at / (quads + 1u)) << draw->node.level;
                     float *height = &met[z * side + x]; /* of the lattice, that has no far edge */
                     if (!used[v])
                         continue;
@@ -1132,13 +1133,11 @@ static void mip_check_children(int form)
         terrimp_geomip_draw child = mip_draw_of(&s.tree, node), parent;
         static uint8_t used[65 * 65 + 4 * 31];
         mip_drawn d;
-        parent = mip_draw_of(&s.tree, s.tree.level_first[child.level + 1u] +
-                                          child.z / 2u * s.tree.level_x[child.level + 1u] +
-                                          child.x / 2u);
+        parent = mip_draw_of(&s.tree, terrimpi_tree_parent(&s.tree, &child.node).number);
         child.morph = 1.0f;
         pattern = 0;
         for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-            uint32_t at = side < 2 ? child.z : child.x;
+            uint32_t at = side < 2 ? child.node.z : child.node.x;
             child.side[side] = 1.0f;
             parent.side[side] = random_float(0.0f, 1.0f);
             if ((at & 1u) == ((uint32_t)side & 1u)) { /* an outer side: the parent's too */
@@ -1235,8 +1234,8 @@ static void nodes_have_ceased_to_morph_when_they_split(void)
         CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
         for (node = 0; node + 1u < s.tree.node_count; node++) {
             terrimp_geomip_draw n = mip_draw_of(&s.tree, node);
-            uint32_t above = s.tree.level_first[n.level + 1u] +
-                             n.z / 2u * s.tree.level_x[n.level + 1u] + n.x / 2u;
+            uint32_t above = s.tree.level_first[n.node.level + 1u] +
+                             n.node.z / 2u * s.tree.level_x[n.node.level + 1u] + n.node.x / 2u;
             CHECK(s.view.distances[above] >= s.view.distances[node] * ratio2 * 0.9999f);
             if (s.view.marks[node].frame != s.view.frame || s.view.marks[node].measure < 1.0f)
                 continue;

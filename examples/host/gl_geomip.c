@@ -27,7 +27,7 @@ static size_t vertex_count(const gl_geomip *g)
 /* What the tree and its view keep; close frees it. */
 static int allocate(gl_geomip *g)
 {
-    const terrimp_geomip *t = &g->tree;
+    const terrimp_quadtree *t = &g->tree;
     size_t nodes = t->node_count, vertices = vertex_count(g);
     g->tree.nodes = malloc(nodes * sizeof *t->nodes);
     g->tree.fits = malloc((t->fit_count + 1u) * sizeof *t->fits);
@@ -94,7 +94,7 @@ static terrimp_result fill_weights(gl_geomip *g)
 static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t chunk_quads)
 {
     terrimp_result result =
-        terrimp_geomip_init(field, chunk_quads ? chunk_quads : 32, &g->tree);
+        terrimp_quadtree_init(field, chunk_quads ? chunk_quads : 32, &g->tree);
     if (result == TERRIMP_OK && !allocate(g))
         result = TERRIMP_E_MEMORY;
     if (result == TERRIMP_OK)
@@ -216,7 +216,7 @@ terrimp_result gl_geomip_update(gl_geomip *g, const terrimp_camera *camera, terr
     for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
         terrimp_box box;
         float distance;
-        result = terrimp_geomip_box(&g->tree, g->view.draws[i].node, &box);
+        result = terrimp_geomip_box(&g->tree, g->view.draws[i].node.number, &box);
         distance = terrimp_box_distance(&box, camera->eye);
         closest = distance < closest ? distance : closest;
         distance = terrimp_box_farthest(&box, camera->eye);
@@ -235,13 +235,13 @@ static void draw_node(const gl_geomip *g, const gl_program *p, const terrimp_geo
 {
     const terrimp_pattern *pattern = &g->patterns[draw->pattern];
     if (p == &g->line)
-        glUniform3fv(p->tint, 1, gl_geomip_colour(draw->level));
+        glUniform3fv(p->tint, 1, gl_geomip_colour(draw->node.level));
     if (is_morphing(g)) {
         glUniform1f(p->morph, draw->morph);
         glUniform4fv(p->side, 1, draw->side);
         glUniform4fv(p->side_coarse, 1, draw->side_coarse);
     }
-    glBindVertexArray(g->arrays[draw->node]);
+    glBindVertexArray(g->arrays[draw->node.number]);
     glDrawElements(GL_TRIANGLES, (GLsizei)pattern->index_count, GL_UNSIGNED_SHORT,
                    (const void *)(uintptr_t)(pattern->first_index * sizeof(uint16_t)));
 }
@@ -259,8 +259,8 @@ static terrimp_result draw_all(gl_geomip *g, const gl_program *p)
     glBindTexture(GL_TEXTURE_2D, g->gl->lightmap);
     for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
         const terrimp_geomip_draw *draw = &g->view.draws[i];
-        if (!g->arrays[draw->node])
-            result = make_node(g, draw->node);
+        if (!g->arrays[draw->node.number])
+            result = make_node(g, draw->node.number);
         if (result == TERRIMP_OK)
             draw_node(g, p, draw);
     }
