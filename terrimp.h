@@ -503,16 +503,9 @@ typedef struct terrimp_quadtree {
     uint32_t level_first[TERRIMP_QUADTREE_LEVELS + 1u]; /* number of a level's first node */
     uint32_t level_x[TERRIMP_QUADTREE_LEVELS], level_z[TERRIMP_QUADTREE_LEVELS]; /* its nodes */
     struct terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
-    uint32_t scratch_count;            /* floats that building a node needs */
-    float *fits;                /* [fit_count] the caller's: vertices above level 0 get the heights
-                                   that fit the samples best by least squares, which want
-                                   FORM_FITTED; pictures are 1 to 2 dB closer to the full mesh,
-                                   BOUND needs half the triangles. NULL: all stand on samples */
-    uint32_t fit_count;         /* a third of the samples; 0: there is but one level */
-    uint32_t fit_first[TERRIMP_QUADTREE_LEVELS + 1u]; /* private: where a level's fits begin */
 } terrimp_quadtree;
 
-/* Lays the quadtree out; nodes and fits are left NULL for the caller to set.
+/* Lays the quadtree out; nodes is left NULL for the caller to set.
 
    chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
                 fewer triangles, for the same picture
@@ -538,13 +531,6 @@ TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *fiel
 typedef enum terrimp_form { /* of the index buffer */
     TERRIMP_FORM_LIST = 0, /* triangle lists */
     TERRIMP_FORM_STRIP,    /* each pattern is one triangle strip */
-    TERRIMP_FORM_STITCHED, /* lists for morphing without any pop: odd vertices of coarse borders
-                              are kept, on the neighbour's edge, and triangles of no area close what
-                              rounding could open (a rasteriser was seen to leave one pixel in ten
-                              million open beside them). LIST leaves none open, but to leave a
-                              vertex out shows where the triangles beside it have not morphed */
-    TERRIMP_FORM_FITTED,   /* lists for trees with fits, morphing or not: coarse borders stand on
-                              vertices of their own, at the neighbour's heights */
     TERRIMP_FORM_COUNT
 } terrimp_form;
 
@@ -552,11 +538,6 @@ typedef struct terrimp_pattern {
     uint32_t first_index, index_count; /* in the index buffer */
     uint32_t triangle_count; /* without those of no area */
 } terrimp_pattern;
-
-/* Vertices of a node: the grid, column i of row j being vertex j * (chunk_quads + 1) + i. With
-   FORM_FITTED there follow, for each side in turn, those between its ends that a coarse border
-   consists of, chunk_quads / 2 - 1 a side. Returns 0 when an argument is outside its limits. */
-TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form);
 
 /* The place of a pattern.
 
@@ -634,7 +615,9 @@ typedef struct terrimp_geomip_view {
                            not morph] */
     float hysteresis;   /* without morphing: a split node stays split until its error is below
                            tolerance / (1 + hysteresis) [Limits: 0..1] */
-    float *distances;             /* (required) [node_count] */
+    float *distances;             /* (required) [node_count] squares of those at which nodes stop
+                                     being drawn as they are, 1e30 at most; de Boer's D_n^2 for the
+                                     level above. Remade when what they depend on has changed */
     terrimp_geomip_mark *marks;   /* (required) [node_count] zero before the first frame */
     terrimp_geomip_draw *draws;   /* (required) [draw_capacity] out: front to back */
     uint32_t draw_capacity;
@@ -645,19 +628,6 @@ typedef struct terrimp_geomip_view {
     uint32_t frame;               /* private */
 } terrimp_geomip_view;
 
-/* The distance at which each node stops being drawn as it is, squared: de Boer's D_n^2 for its
-   parent's level. Called by select when settings, screen or field of view have changed; here for
-   hosts that select by themselves.
-
-   pixel_factor  K [Limits: > 0]
-   distances     [node_count] out: D^2, at most 1e30. A parent's D is at least morph_ratio times
-                 that of each child.
-   Errors        E_NULL; E_RANGE; E_NOT_FINITE
-   Source        de Boer 2000, equations 1, 1a to 1c and 2 */
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_quadtree *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances);
-
 /* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
    level, those outside of the camera's view are left out.
 
@@ -665,7 +635,7 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_quadtree *tree
    Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
               before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
    Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
-   Source     de Boer 2000, sections 2.2 and 2.3.1 */
+   Source     de Boer 2000, sections 2.2 and 2.3.1, equations 1 to 2 */
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera);
@@ -675,9 +645,8 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
 /* A node's vertex: what it moves by when its factors are 1. */
 typedef struct terrimp_geomip_vertex {
     float height;    /* [wu] */
-    float move;      /* [wu] to the parent's shape; for even vertices on a border without fits, for
-                        corners, and for those of coarse borders: from there to the shape of the
-                        parent's parent */
+    float move;      /* [wu] to the parent's shape; for even vertices on a border, from there to the
+                        shape of the parent's parent */
     float beside[2]; /* [wu] what is added to move where the border vertices that an odd vertex
                         stands between move themselves: those of a border along x, along z */
 } terrimp_geomip_vertex;
@@ -693,12 +662,10 @@ typedef struct terrimp_geomip_weights {
     uint8_t self, unused[3];
 } terrimp_geomip_weights;
 
-/* Fills the vertices of a node of any level, row by row; in a tree with fits those of coarse
-   borders follow.
+/* Fills the vertices of a node of any level, row by row.
 
-   xyz        [terrimp_pattern_vertex_count][3] out: unmorphed positions [wu]; NULL: not wanted;
-              (chunk_quads + 1)^2 without fits
-   vertices   [as many] out; NULL: not wanted
+   xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
    Errors     E_NULL (also when both are NULL); E_RANGE */
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
@@ -706,24 +673,22 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *
 
 /* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
 
-   form       terrimp_form
-   weights    [terrimp_pattern_vertex_count] out */
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
+   weights    [(chunk_quads + 1)^2] out */
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
                                                        terrimp_geomip_weights *weights);
 
 /* Morphs a node's vertices on the CPU, for hosts without shaders. Vertices that neighbours share
    come out equal, bit for bit.
 
-   form       terrimp_form; FITTED exactly when the tree has fits
    draw       from select
-   vertices   [terrimp_pattern_vertex_count] of that node
+   vertices   [(chunk_quads + 1)^2] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
    Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride);
@@ -1701,18 +1666,10 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 
 /* --- heights and errors of the ground --- */
 
-/* Fills in the fits, if there are any; before any node is built: the L2 projection on linear finite
-   elements, as in any book on these.
-
-   scratch    [scratch_count]
-   Errors     E_NULL
-   Cost       O(samples); about 0.35 s for 4097 x 4097 */
-TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_quadtree *tree, float *scratch);
-
-/* Finds heights, error and rms of one node, from samples and fits alone: different nodes may be
+/* Finds heights, error and rms of one node, from samples alone: different nodes may be
    built at the same time by threads with scratch arrays of their own.
 
-   scratch    [scratch_count]
+   scratch    [field.width + 2 * chunk_quads + 2]
    Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
    Cost       O(samples of the node) */
 TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
@@ -1721,7 +1678,7 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tre
 /* Ends the building: parents hold what their children hold. Errors: E_NULL. */
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Fits, builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes. Errors: those of build_node.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
@@ -2067,6 +2024,14 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
 
 /* Whether a side runs along x. */
 static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
+
+/* Twice the area of a triangle of samples (x, z); positive when it is counter-clockwise from above:
+   when its normal has y > 0. */
+static int64_t terrimpi_twice_area(const uint32_t a[2], const uint32_t b[2], const uint32_t c[2])
+{
+    return ((int64_t)b[1] - a[1]) * ((int64_t)c[0] - a[0]) -
+           ((int64_t)b[0] - a[0]) * ((int64_t)c[1] - a[1]);
+}
 
 /* Where point k of a lattice of every 2^level-th sample lies; beyond the last sample, on it. */
 static uint32_t terrimpi_lattice(uint32_t k, uint32_t level, uint32_t last)
@@ -3052,12 +3017,6 @@ TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *fiel
     }
     t.level_count = level + 1u;
     t.node_count = t.level_first[t.level_count];
-    t.scratch_count = 5u * t.field.width + 2u * (t.chunk_quads + 1u);
-    for (level = 1; level < t.level_count; level++)
-        t.fit_first[level + 1u] =
-            t.fit_first[level] + (((t.field.width - 1u) >> level) + 1u) *
-                                     (((t.field.depth - 1u) >> level) + 1u);
-    t.fit_count = t.fit_first[t.level_count];
     *tree = t;
     return TERRIMP_OK;
 }
@@ -3231,8 +3190,6 @@ static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_vi
    that both get the same floats. */
 
 #define TERRIMPI_MIP_COLUMN 14u      /* 14 + 2 vertices: what a cache of 16 can hold of two rows */
-#define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
-                                          the cache is lost, and ACMR is 0.99 */
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
 #ifndef TERRIMP_NO_MORPH
 #define TERRIMPI_MIP_MORPH_MOST 4.0f
@@ -3253,33 +3210,15 @@ static int terrimpi_mip_form_fits(uint32_t quads, int form)
     return terrimpi_tree_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
 }
 
-static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
+static uint32_t terrimpi_mip_columns(uint32_t quads)
 {
-    uint32_t most = TERRIMPI_MIP_COLUMN;
-    if (form == TERRIMP_FORM_STITCHED)
-        most = TERRIMPI_MIP_STITCH_COLUMN;
-    return (quads + most - 1u) / most;
-}
-
-/* Vertices that a coarse border has between its ends. */
-static uint32_t terrimpi_mip_border_vertices(uint32_t quads)
-{
-    return quads / 2u - 1u;
-}
-
-TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form)
-{
-    uint32_t grid = (chunk_quads + 1u) * (chunk_quads + 1u);
-    if (!terrimpi_mip_form_fits(chunk_quads, form))
-        return 0;
-    return form == TERRIMP_FORM_FITTED
-               ? grid + 4u * terrimpi_mip_border_vertices(chunk_quads) : grid;
+    return (quads + TERRIMPI_MIP_COLUMN - 1u) / TERRIMPI_MIP_COLUMN;
 }
 
 /* First quad of a column: columns are as equally wide as can be. */
-static uint32_t terrimpi_mip_column(uint32_t quads, int form, uint32_t column)
+static uint32_t terrimpi_mip_column(uint32_t quads, uint32_t column)
 {
-    return quads * column / terrimpi_mip_columns(quads, form);
+    return quads * column / terrimpi_mip_columns(quads);
 }
 
 static uint32_t terrimpi_mip_coarse_sides(uint32_t pattern)
@@ -3296,13 +3235,11 @@ static uint32_t terrimpi_mip_triangles(uint32_t quads, uint32_t pattern)
 static uint32_t terrimpi_mip_indices(uint32_t quads, int form, uint32_t pattern)
 {
     uint32_t column, ahead = 0, triangles = terrimpi_mip_triangles(quads, pattern);
-    if (form == TERRIMP_FORM_STITCHED) /* plus one for each odd border vertex, not minus one */
-        triangles += quads * terrimpi_mip_coarse_sides(pattern);
     if (form == TERRIMP_FORM_STRIP) /* each row: its zigzag and two indices to join the next */
-        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads, form)) - 1u;
-    for (column = 0; column < terrimpi_mip_columns(quads, form); column++)
-        ahead += (terrimpi_mip_column(quads, form, column + 1u) -
-                  terrimpi_mip_column(quads, form, column) + 2u) / 2u;
+        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads)) - 1u;
+    for (column = 0; column < terrimpi_mip_columns(quads); column++)
+        ahead += (terrimpi_mip_column(quads, column + 1u) -
+                  terrimpi_mip_column(quads, column) + 2u) / 2u;
     return 3u * (triangles + ahead);
 }
 
@@ -3317,8 +3254,7 @@ TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, 
         first += terrimpi_mip_indices(chunk_quads, form, i);
     found->first_index = first;
     found->index_count = terrimpi_mip_indices(chunk_quads, form, pattern);
-    found->triangle_count =
-        terrimpi_mip_triangles(chunk_quads, form == TERRIMP_FORM_STITCHED ? 0 : pattern);
+    found->triangle_count = terrimpi_mip_triangles(chunk_quads, pattern);
     return TERRIMP_OK;
 }
 
@@ -3337,31 +3273,20 @@ typedef struct terrimpi_mip_writer {
     uint16_t *start, *out;
 } terrimpi_mip_writer;
 
-static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
-{
-    return (int)(w->pattern >> side & 1u);
-}
-
 /* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
    towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
-   edge. In fitted patterns coarse sides have vertices of their own between their ends. */
+   edge. */
 static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
 {
-    uint32_t row = w->quads + 1u, border = terrimpi_mip_border_vertices(w->quads);
-    uint32_t own = row * row; /* the first of the side's own vertices */
     int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++, own += border) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         int along_x = terrimpi_along_x(side), last = side & 1;
         uint32_t *along = along_x ? &i : &j;
-        if (w->form == TERRIMP_FORM_STITCHED || !terrimpi_mip_coarse(w, side) ||
-            (along_x ? j : i) != (last ? w->quads : 0u))
-            continue;
-        if (*along & 1u)
+        if ((w->pattern >> side & 1u) && (along_x ? j : i) == (last ? w->quads : 0u) &&
+            (*along & 1u))
             *along = last ? *along - 1u : *along + 1u;
-        if (w->form == TERRIMP_FORM_FITTED && *along != 0 && *along != w->quads)
-            return (uint16_t)(own + *along / 2u - 1u);
     }
-    return (uint16_t)(j * row + i);
+    return (uint16_t)(j * (w->quads + 1u) + i);
 }
 
 static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b, uint16_t c)
@@ -3371,22 +3296,6 @@ static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b
     *w->out++ = a;
     *w->out++ = b;
     *w->out++ = c;
-}
-
-/* After quad (i, j): what stitches its borders to a neighbour's edge, two quads long. */
-static void terrimpi_mip_stitch(terrimpi_mip_writer *w, uint32_t i, uint32_t j)
-{
-    uint16_t at = (uint16_t)(j * (w->quads + 1u) + i), row = (uint16_t)(w->quads + 1u);
-    if (i == 0 && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        terrimpi_mip_triangle(w, (uint16_t)(at + row), at, (uint16_t)(at - row));
-    at = (uint16_t)(at + 1u);
-    if (i + 1u == w->quads && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        terrimpi_mip_triangle(w, (uint16_t)(at - row), at, (uint16_t)(at + row));
-    if (j == 0 && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        terrimpi_mip_triangle(w, (uint16_t)(at - 1u), at, (uint16_t)(at + 1u));
-    at = (uint16_t)(at + row);
-    if (j + 1u == w->quads && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        terrimpi_mip_triangle(w, (uint16_t)(at + 1u), at, (uint16_t)(at - 1u));
 }
 
 /* A column of quads as a list. Rows run from +x to -x, so that a quad's diagonal needs no vertex
@@ -3407,8 +3316,6 @@ static void terrimpi_mip_list_column(terrimpi_mip_writer *w, uint32_t from, uint
             uint16_t c = terrimpi_mip_index(w, i + 1u, j + 1u);
             terrimpi_mip_triangle(w, a, c, terrimpi_mip_index(w, i + 1u, j));
             terrimpi_mip_triangle(w, a, b, c);
-            if (w->form == TERRIMP_FORM_STITCHED)
-                terrimpi_mip_stitch(w, i, j);
         }
 }
 
@@ -3433,9 +3340,9 @@ static void terrimpi_mip_fill_pattern(terrimpi_mip_writer *w)
 {
     uint32_t column, j;
     w->start = w->out;
-    for (column = 0; column < terrimpi_mip_columns(w->quads, w->form); column++) {
-        uint32_t from = terrimpi_mip_column(w->quads, w->form, column);
-        uint32_t to = terrimpi_mip_column(w->quads, w->form, column + 1u);
+    for (column = 0; column < terrimpi_mip_columns(w->quads); column++) {
+        uint32_t from = terrimpi_mip_column(w->quads, column);
+        uint32_t to = terrimpi_mip_column(w->quads, column + 1u);
         if (w->form != TERRIMP_FORM_STRIP) {
             terrimpi_mip_list_column(w, from, to);
             continue;
@@ -3493,36 +3400,7 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint
     return TERRIMP_OK;
 }
 
-/* ---- fits ---- */
-
-/* What is minimised is the integral of the squared difference of two surfaces, that of the samples
-   and that of a level. Its normal equations have seven terms each: the products of a vertex's hat
-   function with its own and its six neighbours'. The right-hand sides, here called loads, are the
-   products of the hats with the surface of the samples. As every hat is a sum of hats of the next
-   finer level, so is a load of finer loads. Gauss and Seidel's method then gains a digit in two
-   sweeps.
-
-   Some vertices stay on their samples: those at the terrain's edge, beside which the sums would be
-   special, and those at the corners and half-way points of nodes. A corner is shared with a node
-   that no side is shared with, whose level a pattern does not tell: so it stands where it stands in
-   all levels that can meet there. */
-
-#define TERRIMPI_MIP_SWEEPS 4u
-
-/* Columns of a level's lattice without what is off it at the far edges. */
-static uint32_t terrimpi_mip_cols(const terrimp_quadtree *t, uint32_t level)
-{
-    return ((t->field.width - 1u) >> level) + 1u;
-}
-
-/* Height of a level's lattice at sample (x, z), which belongs to that lattice. */
-static float terrimpi_mip_stand(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z)
-{
-    uint32_t between = (1u << level) - 1u;
-    if (!t->fits || level == 0 || level >= t->level_count || ((x | z) & between) != 0)
-        return terrimpi_sample(&t->field, x, z); /* or at the far edges, off the lattice */
-    return t->fits[t->fit_first[level] + (z >> level) * terrimpi_mip_cols(t, level) + (x >> level)];
-}
+/* ---- heights ---- */
 
 /* Height on the edge from a to b, k of n steps along it; exact at its ends. */
 static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
@@ -3536,7 +3414,7 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
     uint32_t i = x >> level, j = z >> level;
     uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
     uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
-    float a = terrimpi_mip_stand(t, level, x0, z0), d = terrimpi_mip_stand(t, level, x1, z1);
+    float a = terrimpi_sample(&t->field, x0, z0), d = terrimpi_sample(&t->field, x1, z1);
     float b, c, u, v;
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
@@ -3545,8 +3423,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
                                                                   diagonal */
         return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
                          : terrimpi_mip_between(a, d, right, wide);
-    b = terrimpi_mip_stand(t, level, x1, z0);
-    c = terrimpi_mip_stand(t, level, x0, z1);
+    b = terrimpi_sample(&t->field, x1, z0);
+    c = terrimpi_sample(&t->field, x0, z1);
     if (right == 0)
         return terrimpi_mip_between(a, c, down, deep);
     if (down == 0)
@@ -3589,7 +3467,6 @@ static int terrimpi_mip_rule_fits(int rule)
            (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
 }
 
-/* Checks the settings that selection and distances share. */
 static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
@@ -3601,7 +3478,7 @@ static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, fl
     return TERRIMP_OK;
 }
 
-/* terrimp_geomip_distances of checked settings. */
+/* The distances of all nodes; a parent's are at least what its children ask for. */
 static void terrimpi_mip_distances(const terrimp_quadtree *tree, int rule, float tolerance_px,
                                    float morph_ratio, float pixel_factor, float *distances)
 {
@@ -3615,18 +3492,6 @@ static void terrimpi_mip_distances(const terrimp_quadtree *tree, int rule, float
         float *d = &distances[terrimpi_tree_parent_number(tree, node)];
         *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
     }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_quadtree *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances)
-{
-    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
-    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
-    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
-    return TERRIMP_OK;
 }
 
 /* ---- selection ---- */
@@ -3855,7 +3720,7 @@ static void terrimpi_mip_side(const terrimpi_mip_frame *f, int side, terrimp_geo
     if (terrimpi_mip_marked(f, parent.number) < 1.0f) {
         draw->pattern |= 1u << side;
         draw->side_coarse[side] = terrimpi_mip_fraction(f, &parent);
-        draw->side[side] = 1.0f; /* left out, or in stitched patterns on the neighbour's edge */
+        draw->side[side] = 1.0f; /* they are left out */
     } else {
         draw->side[side] = terrimpi_max(draw->morph, terrimpi_mip_fraction(f, &beyond));
     }
@@ -3996,12 +3861,12 @@ static void terrimpi_mip_vertex(const terrimp_quadtree *t, uint32_t level, uint3
 {
     uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
     int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
-    vertex->height = terrimpi_mip_stand(t, level, terrimpi_tree_col(t, level, i0 + i),
+    vertex->height = terrimpi_sample(&t->field, terrimpi_tree_col(t, level, i0 + i),
                                         terrimpi_tree_row(t, level, j0 + j));
     vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
-    if ((along_x && along_z) || (!odd && !t->fits && (along_x || along_z)))
+    if ((along_x && along_z) || (!odd && (along_x || along_z)))
         vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 1);
-    else if (odd || t->fits)
+    else if (odd)
         vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 0);
     if (!odd)
         return;
@@ -4021,97 +3886,59 @@ static void terrimpi_mip_vertex(const terrimp_quadtree *t, uint32_t level, uint3
                                     terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
 }
 
-/* Writes one position, and moves on to the next. */
-static void terrimpi_mip_position(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z,
-                                  float **xyz)
-{
-    if (!*xyz)
-        return;
-    (*xyz)[0] = terrimpi_line(t->field.origin_x, t->field.spacing_x, x);
-    (*xyz)[1] = terrimpi_mip_stand(t, level, x, z);
-    (*xyz)[2] = terrimpi_line(t->field.origin_z, t->field.spacing_z, z);
-    *xyz += 3;
-}
-
-/* The vertices of coarse borders: they stand as the neighbour's do, a level further up. */
-static void terrimpi_mip_fill_borders(const terrimp_quadtree *t, terrimp_node p, float *xyz,
-                                      terrimp_geomip_vertex *vertices)
-{
-    uint32_t quads = t->chunk_quads, along;
-    int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        for (along = 2; along < quads; along += 2u) {
-            uint32_t across = side & 1 ? quads : 0u;
-            uint32_t i = p.x * quads + (terrimpi_along_x(side) ? along : across);
-            uint32_t j = p.z * quads + (terrimpi_along_x(side) ? across : along);
-            uint32_t x = terrimpi_tree_col(t, p.level, i), z = terrimpi_tree_row(t, p.level, j);
-            terrimpi_mip_position(t, p.level + 1u, x, z, &xyz);
-            if (!vertices)
-                continue;
-            vertices->height = terrimpi_mip_stand(t, p.level + 1u, x, z);
-            vertices->move = terrimpi_mip_move(t, p.level, i, j, 1);
-            vertices->beside[0] = vertices->beside[1] = 0.0f;
-            vertices++;
-        }
-}
-
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices)
 {
-    terrimp_node p;
+    terrimp_node n;
     uint32_t i, j, i0, j0;
     TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    p = terrimpi_tree_node(tree, node);
-    i0 = p.x * tree->chunk_quads;
-    j0 = p.z * tree->chunk_quads;
+    n = terrimpi_tree_node(tree, node);
+    i0 = n.x * tree->chunk_quads;
+    j0 = n.z * tree->chunk_quads;
     for (j = 0; j <= tree->chunk_quads; j++)
         for (i = 0; i <= tree->chunk_quads; i++) {
-            terrimpi_mip_position(tree, p.level, terrimpi_tree_col(tree, p.level, i0 + i),
-                                  terrimpi_tree_row(tree, p.level, j0 + j), &xyz);
+            if (xyz) {
+                *xyz++ = terrimpi_tree_x(tree, n.level, i0 + i);
+                *xyz++ = terrimpi_sample(&tree->field, terrimpi_tree_col(tree, n.level, i0 + i),
+                                         terrimpi_tree_row(tree, n.level, j0 + j));
+                *xyz++ = terrimpi_tree_z(tree, n.level, j0 + j);
+            }
             if (vertices)
-                terrimpi_mip_vertex(tree, p.level, i0, j0, i, j, vertices++);
+                terrimpi_mip_vertex(tree, n.level, i0, j0, i, j, vertices++);
         }
-    if (tree->fits)
-        terrimpi_mip_fill_borders(tree, p, xyz, vertices);
     return TERRIMP_OK;
 }
 
-/* The weights of vertex k, of the grid or of a coarse border. With fits every vertex moves to the
-   parent's shape, without them only odd ones do. */
-static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
+/* The weights of vertex k: odd vertices move to the parent's shape. */
+static void terrimpi_mip_weights(uint32_t quads, uint32_t k, terrimp_geomip_weights *w)
 {
     uint32_t row = quads + 1u, i = k % row, j = k / row, from[TERRIMP_SIDE_COUNT], side;
-    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED;
-    int corner = (i == 0 || i == quads) && (j == 0 || j == quads);
+    uint8_t odd = (i | j) & 1u;
     memset(w, 0, sizeof *w);
-    if (k >= row * row) {
-        w->even[(k - row * row) / terrimpi_mip_border_vertices(quads)] = 1;
-        return;
-    }
     from[TERRIMP_SIDE_Z0] = j;
     from[TERRIMP_SIDE_Z1] = quads - j;
     from[TERRIMP_SIDE_X0] = i;
     from[TERRIMP_SIDE_X1] = quads - i;
-    w->self = odd || fitted;
+    w->self = odd;
     for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
         w->beside[side] = from[side] == 1u || (from[side] == 0 && odd);
         if (from[side] > 0)
             continue;
-        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
+        (odd ? w->odd : w->even)[side] = 1;
         w->self = 0;
     }
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
                                                        terrimp_geomip_weights *weights)
 {
-    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
+    uint32_t k;
     TERRIMPI_REFUSE(!weights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
-    for (k = 0; k < count; k++)
-        terrimpi_mip_weights(chunk_quads, form, k, &weights[k]);
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(chunk_quads), TERRIMP_E_RANGE);
+    for (k = 0; k < (chunk_quads + 1u) * (chunk_quads + 1u); k++)
+        terrimpi_mip_weights(chunk_quads, k, &weights[k]);
     return TERRIMP_OK;
 }
 
@@ -4121,19 +3948,19 @@ static float terrimpi_mip_dot4(const uint8_t weight[4], const float factor[4])
            (float)weight[2] * factor[2] + (float)weight[3] * factor[3];
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride)
 {
-    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
+    uint32_t k;
     TERRIMPI_REFUSE(!draw || !vertices || !heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0 || stride == 0, TERRIMP_E_RANGE);
-    for (k = 0; k < count; k++, vertices++, heights += stride) {
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(chunk_quads) || stride == 0, TERRIMP_E_RANGE);
+    for (k = 0; k < (chunk_quads + 1u) * (chunk_quads + 1u); k++, vertices++, heights += stride) {
         const float *coarse = draw->side_coarse;
         terrimp_geomip_weights w;
         float factor, along_z, along_x;
-        terrimpi_mip_weights(chunk_quads, form, k, &w);
+        terrimpi_mip_weights(chunk_quads, k, &w);
         factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
                  terrimpi_mip_dot4(w.even, coarse);
         along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
@@ -10321,104 +10148,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     return TERRIMP_OK;
 }
 
-/* ---- heights, fits and errors of the ground ---- */
-
-/* Rows of vertices of a level. */
-static uint32_t terrimpi_mip_rows(const terrimp_quadtree *t, uint32_t level)
-{
-    return ((t->field.depth - 1u) >> level) + 1u;
-}
-
-/* Loads of level 1, where rows are the samples two rows above to two below; in units of a twelfth
-   of a small triangle's area, as all loads. */
-static void terrimpi_mip_first_loads(const float *samples, uint32_t width, uint32_t count,
-                                     float *loads)
-{
-    const float *a = samples, *b = a + width, *c = b + width, *d = c + width, *e = d + width;
-    uint32_t i, x;
-    for (i = 1, x = 2; i + 1u < count; i++, x += 2u) {
-        float ring = b[x - 1u] + b[x] + c[x - 1u] + c[x + 1u] + d[x] + d[x + 1u];
-        float corners = a[x - 2u] + a[x] + c[x - 2u] + c[x + 2u] + e[x] + e[x + 2u];
-        float middles = a[x - 1u] + b[x - 2u] + b[x + 1u] + d[x - 1u] + d[x + 2u] + e[x + 1u];
-        loads[i] = 18.0f * c[x] + 10.0f * ring + 2.0f * middles + corners;
-    }
-}
-
-/* Loads of a level from those of the next finer one, from the row that lies on it; scaled to its
-   own triangles. */
-static void terrimpi_mip_next_loads(const float *finer, uint32_t cols, uint32_t count, float *loads)
-{
-    const float *above = finer - cols, *below = finer + cols;
-    uint32_t i, x;
-    for (i = 1, x = 2; i + 1u < count; i++, x += 2u)
-        loads[i] = 0.25f * finer[x] +
-                   0.125f * (above[x - 1u] + above[x] + finer[x - 1u] + finer[x + 1u] + below[x] +
-                             below[x + 1u]);
-}
-
-/* One sweep over the free vertices of a row, whose loads are given. */
-static void terrimpi_mip_sweep(const terrimp_quadtree *t, uint32_t level, uint32_t j,
-                               const float *loads)
-{
-    uint32_t cols = terrimpi_mip_cols(t, level), half = t->chunk_quads / 2u, i, fixed;
-    float *fit = t->fits + t->fit_first[level] + j * cols;
-    const float *above = fit - cols, *below = fit + cols;
-    fixed = j % half == 0 ? half : cols;
-    for (i = 1; i + 1u < cols; i++) {
-        float round = above[i - 1u] + above[i] + fit[i - 1u] + fit[i + 1u] + below[i] +
-                      below[i + 1u];
-        if (i == fixed)
-            fixed += half;
-        else
-            fit[i] = (loads[i] - 8.0f * round) * (1.0f / 48.0f);
-    }
-}
-
-/* Turns the loads of a level, that are where its fits go, into fits. All sweeps run at once, each a
-   row behind the one before; scratch keeps the loads of the rows that they are at. */
-static void terrimpi_mip_solve(const terrimp_quadtree *t, uint32_t level, float *scratch)
-{
-    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), j, sweep;
-    float *fit = t->fits + t->fit_first[level];
-    for (j = 0; j < rows + TERRIMPI_MIP_SWEEPS; j++) {
-        if (j < rows) {
-            memcpy(scratch + j % (TERRIMPI_MIP_SWEEPS + 1u) * cols, fit + j * cols,
-                   cols * sizeof *fit);
-            terrimpi_heightfield_tile(&t->field, 0, j << level, cols, 1, 1u << level,
-                                      fit + j * cols);
-        }
-        for (sweep = 1; sweep <= TERRIMPI_MIP_SWEEPS; sweep++)
-            if (j > sweep && j - sweep + 1u < rows)
-                terrimpi_mip_sweep(t, level, j - sweep,
-                                   scratch + (j - sweep) % (TERRIMPI_MIP_SWEEPS + 1u) * cols);
-    }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_quadtree *tree, float *scratch)
-{
-    uint32_t level, j;
-    TERRIMPI_REFUSE(!tree || !scratch, TERRIMP_E_NULL);
-    for (level = 1; tree->fits && level < tree->level_count; level++) {
-        uint32_t cols = terrimpi_mip_cols(tree, level), width = terrimpi_mip_cols(tree, level - 1u);
-        float *loads = tree->fits + tree->fit_first[level];
-        memset(loads, 0, (tree->fit_first[level + 1u] - tree->fit_first[level]) * sizeof *loads);
-        for (j = 1; j + 1u < terrimpi_mip_rows(tree, level); j++) {
-            loads += cols;
-            if (level == 1u) {
-                terrimpi_heightfield_tile(&tree->field, 0, 2u * j - 2u, width, 5, 1, scratch);
-                terrimpi_mip_first_loads(scratch, width, cols, loads);
-            } else {
-                terrimpi_mip_next_loads(tree->fits + tree->fit_first[level - 1u] + 2u * j * width,
-                                        width, cols, loads);
-            }
-        }
-    }
-    for (level = 1; tree->fits && level < tree->level_count; level++)
-        terrimpi_mip_solve(tree, level, scratch);
-    return TERRIMP_OK;
-}
-
-/* ---- errors ---- */
+/* ---- heights and errors of the ground ---- */
 
 /* What the samples of a node are found to miss. */
 typedef struct terrimpi_mip_misses {
@@ -10465,20 +10195,6 @@ static void terrimpi_mip_row_misses(const float *upper, const float *lower, cons
     misses->count += (float)span + 1.0f;
 }
 
-/* Heights of a row of a level's lattice, from vertex (i, j) on. */
-static void terrimpi_mip_lattice_row(const terrimp_quadtree *t, uint32_t level, uint32_t i,
-                                     uint32_t j, uint32_t count, float *heights)
-{
-    uint32_t z = terrimpi_tree_row(t, level, j), k;
-    if (!t->fits || level == 0) {
-        terrimpi_heightfield_tile(&t->field, terrimpi_tree_col(t, level, i), z, count, 1,
-                                  1u << level, heights);
-        return;
-    }
-    for (k = 0; k < count; k++)
-        heights[k] = terrimpi_mip_stand(t, level, terrimpi_tree_col(t, level, i + k), z);
-}
-
 /* Compares all samples of a node with its triangles in pattern 0. */
 static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
                                       float *scratch, terrimpi_mip_misses *misses)
@@ -10491,8 +10207,8 @@ static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
         uint32_t z0 = terrimpi_tree_row(t, p.level, j), z1 = terrimpi_tree_row(t, p.level, j + 1u);
         if (z1 == z0)
             break;
-        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j, quads + 1u, upper);
-        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j + 1u, quads + 1u, lower);
+        terrimpi_heightfield_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
+        terrimpi_heightfield_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
         for (z = z0; z <= z1; z++) { /* lattice rows twice: which weighs next to nothing in rms */
             terrimpi_heightfield_tile(&t->field, x0, z, span + 1u, 1, 1, row);
             terrimpi_mip_row_misses(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
@@ -10501,95 +10217,61 @@ static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
     }
 }
 
-/* A corner of a triangle: a sample's column and row, and the height drawn there. */
-typedef struct terrimpi_mip_corner {
-    uint32_t x, z;
-    float height;
-} terrimpi_mip_corner;
-
-/* Compares the samples in a triangle, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t,
-                                         const terrimpi_mip_corner corner[3],
+/* Compares the samples in a triangle of three samples, counter-clockwise, with it. */
+static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const uint32_t a[2],
+                                         const uint32_t b[2], const uint32_t c[2],
                                          terrimpi_mip_misses *misses)
 {
-    uint32_t x0 = terrimpi_min_u32(corner[0].x, terrimpi_min_u32(corner[1].x, corner[2].x));
-    uint32_t x1 = terrimpi_max_u32(corner[0].x, terrimpi_max_u32(corner[1].x, corner[2].x));
-    uint32_t z0 = terrimpi_min_u32(corner[0].z, terrimpi_min_u32(corner[1].z, corner[2].z));
-    uint32_t z1 = terrimpi_max_u32(corner[0].z, terrimpi_max_u32(corner[1].z, corner[2].z));
-    uint32_t x, z, k;
-    for (z = z0; z <= z1; z++)
-        for (x = x0; x <= x1; x++) {
-            int64_t part[3], all; /* twice the areas opposite the corners */
+    uint32_t x0 = terrimpi_min_u32(a[0], terrimpi_min_u32(b[0], c[0]));
+    uint32_t x1 = terrimpi_max_u32(a[0], terrimpi_max_u32(b[0], c[0]));
+    uint32_t z0 = terrimpi_min_u32(a[1], terrimpi_min_u32(b[1], c[1]));
+    uint32_t z1 = terrimpi_max_u32(a[1], terrimpi_max_u32(b[1], c[1]));
+    int64_t all = terrimpi_twice_area(a, b, c);
+    float height = terrimpi_sample(&t->field, a[0], a[1]);
+    float to_b = terrimpi_sample(&t->field, b[0], b[1]) - height;
+    float to_c = terrimpi_sample(&t->field, c[0], c[1]) - height;
+    uint32_t at[2];
+    if (all <= 0)
+        return;
+    for (at[1] = z0; at[1] <= z1; at[1]++)
+        for (at[0] = x0; at[0] <= x1; at[0]++) {
+            int64_t by_b = terrimpi_twice_area(c, a, at), by_c = terrimpi_twice_area(a, b, at);
             float sample, miss;
-            for (k = 0; k < 3u; k++) {
-                const terrimpi_mip_corner *a = &corner[(k + 1u) % 3u], *b = &corner[(k + 2u) % 3u];
-                part[k] = ((int64_t)b->z - a->z) * ((int64_t)x - a->x) -
-                          ((int64_t)b->x - a->x) * ((int64_t)z - a->z);
-            }
-            all = part[0] + part[1] + part[2];
-            if (all == 0 || part[0] < 0 || part[1] < 0 || part[2] < 0)
+            if (by_b < 0 || by_c < 0 || by_b + by_c > all)
                 continue;
-            sample = terrimpi_sample(&t->field, x, z);
-            miss = sample - corner[0].height;
-            miss -= ((corner[1].height - corner[0].height) * (float)part[1] +
-                     (corner[2].height - corner[0].height) * (float)part[2]) / (float)all;
+            sample = terrimpi_sample(&t->field, at[0], at[1]);
+            miss = sample - height;
+            miss -= (to_b * (float)by_b + to_c * (float)by_c) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
             misses->low = terrimpi_min(misses->low, sample);
             misses->high = terrimpi_max(misses->high, sample);
         }
 }
 
-/* Compares with what a finer neighbour beyond a side draws up to it: three triangles in each block
-   of 2 x 1 of its quads, below in half quads of the node, the first of them at its own border. The
-   last number of a corner says that it stands on that border, at the node's heights. */
+/* Compares with what a finer neighbour beyond a side draws up to it: two of its quads for each of
+   the node's, in the pattern in which that side is coarse. */
 static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p, int side,
                                        terrimpi_mip_misses *misses)
 {
-    static const int8_t triangles[TERRIMP_SIDE_COUNT][3][3][3] = {
-        {{{1, -1, 0}, {0, 0, 1}, {2, 0, 1}}, {{0, -1, 0}, {0, 0, 1}, {1, -1, 0}},
-         {{1, -1, 0}, {2, 0, 1}, {2, -1, 0}}},
-        {{{0, 0, 1}, {1, 1, 0}, {2, 0, 1}}, {{0, 0, 1}, {0, 1, 0}, {1, 1, 0}},
-         {{2, 0, 1}, {1, 1, 0}, {2, 1, 0}}},
-        {{{-1, 1, 0}, {0, 2, 1}, {0, 0, 1}}, {{-1, 0, 0}, {-1, 1, 0}, {0, 0, 1}},
-         {{-1, 1, 0}, {-1, 2, 0}, {0, 2, 1}}},
-        {{{0, 0, 1}, {0, 2, 1}, {1, 1, 0}}, {{0, 2, 1}, {1, 2, 0}, {1, 1, 0}},
-         {{0, 0, 1}, {1, 1, 0}, {1, 0, 0}}}};
-    uint32_t quads = t->chunk_quads, at, k, c, fine = p.level - 1u;
-    for (at = 0; at < quads; at++) {
-        uint32_t i = p.x * quads, j = p.z * quads;
-        i += side == TERRIMP_SIDE_X0 ? 0 : side == TERRIMP_SIDE_X1 ? quads : at;
-        j += side == TERRIMP_SIDE_Z0 ? 0 : side == TERRIMP_SIDE_Z1 ? quads : at;
-        for (k = 0; k < 3u; k++) {
-            terrimpi_mip_corner corner[3];
-            for (c = 0; c < 3u; c++) {
-                const int8_t *offset = triangles[side][k][c];
-                corner[c].x = terrimpi_tree_col(t, fine, (uint32_t)((int32_t)(2u * i) + offset[0]));
-                corner[c].z = terrimpi_tree_row(t, fine, (uint32_t)((int32_t)(2u * j) + offset[1]));
-                corner[c].height = terrimpi_mip_stand(t, offset[2] ? p.level : fine, corner[c].x,
-                                                      corner[c].z);
-            }
-            terrimpi_mip_triangle_misses(t, corner, misses);
+    uint32_t quads = t->chunk_quads, along, k, c;
+    int along_x = terrimpi_along_x(side), last = side & 1;
+    terrimpi_mip_writer block; /* 2 x 2 quads of the neighbour */
+    block.quads = 2;
+    block.pattern = 1u << (side ^ 1);
+    for (along = 0; along < 2u * quads; along++) {
+        uint32_t across = last ? 0u : 1u, at[4][2], first[2];
+        first[!along_x] = along & ~1u;
+        first[along_x] = last ? 2u * quads : (uint32_t)-2;
+        for (c = 0; c < 4u; c++) { /* counter-clockwise */
+            uint32_t i = (along_x ? along & 1u : across) + (c >> 1);
+            uint32_t j = (along_x ? across : along & 1u) + ((c + 1u) >> 1 & 1u);
+            k = terrimpi_mip_index(&block, i, j);
+            at[c][0] = terrimpi_tree_col(t, p.level - 1u, 2u * p.x * quads + first[0] + k % 3u);
+            at[c][1] = terrimpi_tree_row(t, p.level - 1u, 2u * p.z * quads + first[1] + k / 3u);
         }
+        terrimpi_mip_triangle_misses(t, at[0], at[2], at[3], misses);
+        terrimpi_mip_triangle_misses(t, at[0], at[1], at[2], misses);
     }
-}
-
-/* Widens a node's range by the heights at which its vertices may stand: its own, and where it
-   morphs or meets coarser neighbours those of the two levels above. */
-static void terrimpi_mip_drawn_range(const terrimp_quadtree *t, terrimp_node p,
-                                     terrimp_geomip_node *node)
-{
-    uint32_t quads = t->chunk_quads, i, j, above;
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++)
-            for (above = 0; above <= 2u; above++) {
-                uint32_t x = terrimpi_tree_col(t, p.level, p.x * quads + i);
-                uint32_t z = terrimpi_tree_row(t, p.level, p.z * quads + j);
-                float height = terrimpi_mip_height(t, p.level + above, x, z);
-                node->low = terrimpi_min(node->low, height);
-                node->high = terrimpi_max(node->high, height);
-                if (((i | j) & 1u) != 0)
-                    break;
-            }
 }
 
 static terrimp_result terrimpi_mip_build_leaf(const terrimp_quadtree *t, terrimp_node p)
@@ -10599,8 +10281,6 @@ static terrimp_result terrimpi_mip_build_leaf(const terrimp_quadtree *t, terrimp
     terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
     TERRIMPI_TRY(terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high));
     node->error = node->rms = 0.0f;
-    if (t->fits)
-        terrimpi_mip_drawn_range(t, p, node);
     return TERRIMP_OK;
 }
 
@@ -10617,8 +10297,8 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tre
         return terrimpi_mip_build_leaf(tree, p);
     memset(&misses, 0, sizeof misses);
     terrimpi_mip_inner_misses(tree, p, scratch, &misses);
-    misses.low = misses.high = terrimpi_mip_stand(
-        tree, p.level, terrimpi_tree_col(tree, p.level, p.x * tree->chunk_quads),
+    misses.low = misses.high = terrimpi_sample(
+        &tree->field, terrimpi_tree_col(tree, p.level, p.x * tree->chunk_quads),
         terrimpi_tree_row(tree, p.level, p.z * tree->chunk_quads));
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         if (terrimpi_tree_beyond(tree, &p, side, &beyond))
@@ -10627,8 +10307,6 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tre
     tree->nodes[node].high = misses.high;
     tree->nodes[node].error = misses.most;
     tree->nodes[node].rms = TERRIMP_SQRTF(misses.squares / misses.count);
-    if (tree->fits)
-        terrimpi_mip_drawn_range(tree, p, &tree->nodes[node]);
     return TERRIMP_OK;
 }
 
@@ -10649,7 +10327,6 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *t
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch)
 {
     uint32_t node;
-    TERRIMPI_TRY(terrimp_geomip_fit(tree, scratch));
     for (node = 0; node < tree->node_count; node++)
         TERRIMPI_TRY(terrimp_geomip_build_node(tree, node, scratch));
     return terrimp_geomip_build_finish(tree);

@@ -20,7 +20,7 @@ enum { WIDTH = 640, HEIGHT = 512 };
 static terrimp_geomip_node nodes[NODES];
 static terrimp_geomip_mark marks[NODES];
 static terrimp_geomip_draw draws[NODES];
-static float distances[NODES], scratch[1 << 16];
+static float distances[NODES], scratch[SIDE + 2 * QUADS + 2];
 static uint8_t picture[WIDTH * HEIGHT * 3];
 static terrimp_pattern patterns[TERRIMP_PATTERN_COUNT];
 static GLuint arrays[NODES], indices; /* a node has no array until it is drawn */
@@ -100,7 +100,7 @@ int main(void)
     field.samples = samples, field.width = field.depth = SIDE;
     field.format = TERRIMP_FORMAT_U16, field.height_scale = 0.25f * PROCEDURAL_HEIGHT_SCALE;
     if (!samples || terrimp_quadtree_init(&field, QUADS, &tree) != TERRIMP_OK ||
-        tree.node_count > NODES || tree.scratch_count > sizeof scratch / sizeof *scratch)
+        tree.node_count > NODES)
         return 1;
     tree.nodes = nodes;
     view.distances = distances, view.marks = marks, view.draws = draws, view.draw_capacity = NODES;

@@ -246,7 +246,7 @@ static void use_patterns(void)
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count - 1u) == TERRIMP_E_CAPACITY);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count) == TERRIMP_OK);
         for (i = 0; i < count; i++)
-            FUZZ_CHECK(indices[i] < terrimp_pattern_vertex_count(quads, form));
+            FUZZ_CHECK(indices[i] < (quads + 1u) * (quads + 1u));
         free(indices);
     }
 }
@@ -257,8 +257,7 @@ static void draw_node(const terrimp_quadtree *tree, const terrimp_geomip_draw *d
     terrimp_geomip_vertex *vertices = (terrimp_geomip_vertex *)fuzz_take(count * sizeof *vertices);
     float *xyz = (float *)fuzz_take(count * 3u * sizeof *xyz);
     FUZZ_CHECK(terrimp_geomip_fill_vertices(tree, draw->node.number, xyz, vertices) == TERRIMP_OK);
-    FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, TERRIMP_FORM_LIST, draw, vertices, xyz + 1,
-                                    3) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, draw, vertices, xyz + 1, 3) == TERRIMP_OK);
     FUZZ_CHECK(fuzz_finite(xyz, count * 3u));
     free(xyz);
     free(vertices);
@@ -291,8 +290,6 @@ static void select_nodes(const terrimp_quadtree *tree)
             if (view.draw_count > 0)
                 draw_node(tree, view.draws + fuzz_u8() % view.draw_count);
         }
-    (void)terrimp_geomip_distances(tree, view.rule, fuzz_float(10.0f), fuzz_float(4.0f),
-                                   fuzz_float(1000.0f), view.distances);
     free(view.draws);
     free(view.marks);
     free(view.distances);
@@ -307,15 +304,14 @@ static void use_geomip(void)
     if (terrimp_quadtree_init(&field, quads, &tree) != TERRIMP_OK)
         return;
     tree.nodes = (terrimp_geomip_node *)fuzz_take(tree.node_count * sizeof *tree.nodes);
-    scratch = (float *)fuzz_take(tree.scratch_count * sizeof *scratch);
+    scratch = (float *)fuzz_take((tree.field.width + 2u * tree.chunk_quads + 2u) * sizeof *scratch);
     if (terrimp_geomip_build(&tree, scratch) == TERRIMP_OK)
         select_nodes(&tree);
     free(scratch);
     free(tree.nodes);
     weights = (terrimp_geomip_weights *)fuzz_take((size_t)(tree.chunk_quads + 1u)
                                                   * (tree.chunk_quads + 1u) * sizeof *weights);
-    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, TERRIMP_FORM_LIST, weights) ==
-               TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, weights) == TERRIMP_OK);
     free(weights);
 }
 

@@ -1721,7 +1721,7 @@ static void geomip_draws_the_selection(void)
     d.morph_ratio = view.morph_ratio = 1.4f;
     CHECK(terrimp_quadtree_init(&l.desc.field, l.desc.chunk_quads, &tree) == TERRIMP_OK);
     tree.nodes = (terrimp_geomip_node *)flight_array(tree.node_count, sizeof *tree.nodes);
-    scratch = (float *)flight_array(tree.scratch_count, sizeof *scratch);
+    scratch = (float *)flight_array(tree.field.width + 2u * tree.chunk_quads + 2u, sizeof *scratch);
     CHECK(terrimp_geomip_build(&tree, scratch) == TERRIMP_OK);
     view.distances = (float *)flight_array(tree.node_count, sizeof *view.distances);
     view.marks = (terrimp_geomip_mark *)flight_array(tree.node_count, sizeof *view.marks);

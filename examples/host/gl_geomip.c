@@ -16,12 +16,11 @@ static gl_program make_program(const gl_geomip *g, const char *fragment)
 
 /* ---- Opening ------------------------------------------------------------ */
 
-/* Lists, with heights that are fitted. */
-enum { FORM = TERRIMP_FORM_FITTED };
+enum { FORM = TERRIMP_FORM_LIST };
 
 static size_t vertex_count(const gl_geomip *g)
 {
-    return terrimp_pattern_vertex_count(g->tree.chunk_quads, FORM);
+    return (size_t)(g->tree.chunk_quads + 1u) * (g->tree.chunk_quads + 1u);
 }
 
 /* What the tree and its view keep; close frees it. */
@@ -30,7 +29,6 @@ static int allocate(gl_geomip *g)
     const terrimp_quadtree *t = &g->tree;
     size_t nodes = t->node_count, vertices = vertex_count(g);
     g->tree.nodes = malloc(nodes * sizeof *t->nodes);
-    g->tree.fits = malloc((t->fit_count + 1u) * sizeof *t->fits);
     g->view.distances = malloc(nodes * sizeof *g->view.distances);
     g->view.marks = calloc(nodes, sizeof *g->view.marks);
     g->view.draw_capacity = t->level_x[0] * t->level_z[0]; /* a tiling has no more */
@@ -39,13 +37,14 @@ static int allocate(gl_geomip *g)
     g->vertices = calloc(nodes, sizeof *g->vertices);
     g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
     g->moves = malloc(vertices * sizeof *g->moves);
-    return t->nodes && t->fits && g->view.distances && g->view.marks && g->view.draws && g->arrays
-           && g->vertices && g->xyz && g->moves;
+    return t->nodes && g->view.distances && g->view.marks && g->view.draws && g->arrays &&
+           g->vertices && g->xyz && g->moves;
 }
 
 static terrimp_result build(gl_geomip *g)
 {
-    float *scratch = malloc(g->tree.scratch_count * sizeof *scratch);
+    size_t count = g->tree.field.width + 2u * g->tree.chunk_quads + 2u;
+    float *scratch = malloc(count * sizeof *scratch);
     terrimp_result result = TERRIMP_E_MEMORY;
     if (scratch)
         result = terrimp_geomip_build(&g->tree, scratch);
@@ -80,7 +79,7 @@ static terrimp_result fill_weights(gl_geomip *g)
     terrimp_geomip_weights *weights = malloc(count * sizeof *weights);
     terrimp_result result = TERRIMP_E_MEMORY;
     if (weights)
-        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, FORM, weights);
+        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, weights);
     if (result == TERRIMP_OK) {
         glGenBuffers(1, &g->weights);
         glBindBuffer(GL_ARRAY_BUFFER, g->weights);
@@ -141,7 +140,6 @@ void gl_geomip_close(gl_geomip *g)
     glDeleteProgram(g->ground.id);
     glDeleteProgram(g->line.id);
     free(g->tree.nodes);
-    free(g->tree.fits);
     free(g->view.distances);
     free(g->view.marks);
     free(g->view.draws);
