@@ -302,16 +302,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z);
 
-/* The world height of one sample.
-
-   x, z       column and row [Limits: inside the field]
-   height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_RANGE  x or z is outside;
-              E_VOID  the sample is a void; E_NOT_FINITE  its height is NaN or infinite
-   Cost       O(1) */
-TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
-                                                      uint32_t z, float *height);
-
 /* Reads a tile of world heights. A tile may reach over the last column and row: it repeats them.
 
    x, z       column and row of the tile's first sample [Limits: inside the field]
@@ -777,18 +767,6 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
    Source           Hess 2010, equation 3.6: t = D sin(alpha) / S */
 TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_angle_rad,
                                                      float speed, float *seconds);
-
-/* For planning: the most captures per second that a set of impostors can ask for, whatever way the
-   eye moves: the sum of 1 / lifetime over the boxes that lie beyond a distance.
-
-   boxes            [count]
-   distance         [wu] boxes closer than this are not impostors; > 0
-   Errors           those of terrimp_impostor_lifetime
-   Source           Hess 2010, section 3.5.1 */
-TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t count,
-                                                const float eye[3], float distance,
-                                                float max_angle_rad, float speed,
-                                                float *captures_per_s);
 
 /* What a mesh hides from a capture and an eye that moves comes to see, and where the picture would
    best be split in two. */
@@ -1527,9 +1505,6 @@ typedef struct terrimp_mesh {
     uint32_t vertex_count;          /* out: all vertices */
     uint32_t surface_index_count;   /* out: indices of the surface */
     uint32_t index_count;           /* out: all indices */
-    float error_above;              /* out: [wu] largest height of a sample over the surface */
-    float error_below;              /* out: [wu] largest depth of a sample under the surface */
-    float error_rms;                /* out: [wu] root mean square over all samples */
 } terrimp_mesh;
 
 /* Simplifies one border of a tile on its own. The result depends on these samples alone, so two
@@ -1572,8 +1547,7 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
    polylines. A tile whose samples all fit the budget is returned whole; ground that is met without
    error may take fewer triangles, and one triangle stays over where the count does not work out.
    The mesh covers the tile's rectangle one to one: no triangle has a normal with y <= 0,
-   which is tested in integers. Two triangles share each inner edge, vertices stand on samples, and
-   the reported errors are those of all samples against the final surface.
+   which is tested in integers. Two triangles share each inner edge, vertices stand on samples.
 
    desc           what to simplify
    scratch        [scratch_bytes] aligned for int64_t; contents need not outlive the call
@@ -1590,24 +1564,18 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-/* Appends the lower skirt: a wall from the border down to one height, facing outwards. It fills
-   the gap to a neighbour of another level. Each skirt has as many vertices as the loop, and two
-   triangles for each of them.
+/* Appends a skirt: a wall along the border, of as many vertices as its loop and two triangles for
+   each of them. The lower one fills the gap to a neighbour of another level and faces outwards; the
+   upper one catches those pixels of a picture that lie above a border that is too low, and faces
+   inwards: keep it small.
 
    mesh    in: a surface, perhaps with skirts; out: the same and the wall
-   height  [wu] the bottom, as a rule the node's least height; a border vertex that lies lower
-           gets a wall of no height
-   Errors  NULL; NOT_FINITE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
+   upper   0: the lower skirt
+   height  [wu] of the lower skirt, its bottom, as a rule the node's least height; a border vertex
+           that lies lower gets a wall of no height. Of the upper one, its rise [Limits: >= 0]
+   Errors  NULL; NOT_FINITE; RANGE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
    Source  Hess 2010, section 4.2 */
-TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height);
-
-/* Appends the upper skirt: a wall that rises from the border, facing inwards. It catches those
-   pixels of a picture that lie above a border that is too low; keep it small.
-
-   rise    [wu] height of the wall [Limits: >= 0]
-   Errors  NULL; NOT_FINITE; RANGE; STATE; CAPACITY; mesh untouched
-   Source  Hess 2010, section 4.2 */
-TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise);
+TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
 
 /* --- standing proud (Hess 6.1) --- */
 
@@ -1626,7 +1594,7 @@ typedef struct terrimp_raise_desc {
    largest shortfall round it and lowers them together as far as the samples let it.
 
    desc    how far
-   mesh    in: a mesh of that tile without skirts; out: heights and errors
+   mesh    in: a mesh of that tile without skirts; out: its heights
    work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
    Errors  NULL; RANGE; NOT_FINITE; STATE when the mesh has no surface or has skirts; mesh untouched
    Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
@@ -2316,12 +2284,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
             *z = scan.z;
     }
     return result;
-}
-
-TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
-                                                      uint32_t z, float *height)
-{
-    return terrimp_heightfield_read(field, x, z, 1, 1, 1, height);
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
@@ -4195,27 +4157,6 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
                     !(speed > 0.0f), TERRIMP_E_RANGE);
     sine = max_angle_rad < 1.5707963f ? TERRIMP_SINF(max_angle_rad) : 1.0f;
     *seconds = distance * sine / speed;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t count,
-                                                const float eye[3], float distance,
-                                                float max_angle_rad, float speed,
-                                                float *captures_per_s)
-{
-    float rate = 0.0f, seconds;
-    size_t i;
-    TERRIMPI_REFUSE((count && !boxes) || !eye || !captures_per_s, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(terrimpi_finite(distance) && !(distance > 0.0f), TERRIMP_E_RANGE);
-    for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
-        float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
-        TERRIMPI_TRY(terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds));
-        TERRIMPI_REFUSE(!(seconds > 0.0f) && i == count, TERRIMP_E_RANGE);
-        if (i < count && to_box >= distance)
-            rate += 1.0f / seconds;
-    }
-    *captures_per_s = rate;
     return TERRIMP_OK;
 }
 
@@ -9234,82 +9175,6 @@ static void terrimpi_read_samples(terrimpi_simplifier *s, const float *heights)
     }
 }
 
-/* --- exact errors --- */
-
-/* Differences of samples to the surface. */
-typedef struct terrimpi_error {
-    float above, below, squares;
-} terrimpi_error;
-
-static void terrimpi_add_error(terrimpi_error *error, float difference)
-{
-    error->above = terrimpi_max(error->above, difference);
-    error->below = terrimpi_max(error->below, -difference);
-    error->squares += difference * difference;
-}
-
-/* The slopes of the plane through three vertices. */
-static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
-{
-    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
-    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
-    float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
-    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
-    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
-}
-
-/* Errors of the samples of a border between two points of its polyline, without the last one. */
-static void terrimpi_measure_border(const float *heights, int32_t stride, int32_t count,
-                                    float from, float to, terrimpi_error *error)
-{
-    int32_t i;
-    float slope = (to - from) / (float)count;
-    for (i = 0; i < count; i++)
-        terrimpi_add_error(error, heights[i * stride] - (from + slope * (float)i));
-}
-
-/* Works out the three errors of a surface: every sample once. The triangles own all but the last
-   row and the last column, which the border polylines supply. */
-static void terrimpi_measure(const float *heights, int32_t cols, int32_t rows, terrimp_mesh *mesh)
-{
-    const terrimp_mesh_vertex *v = mesh->vertices;
-    terrimpi_error all = {0.0f, 0.0f, 0.0f};
-    float squares = 0.0f, gx, gz;
-    uint32_t i, k;
-    int32_t x, z;
-    for (i = 0; i < mesh->surface_index_count; i += 3) {
-        terrimp_mesh_vertex a[3];
-        terrimpi_span span;
-        for (k = 0; k < 3u; k++)
-            a[k] = v[mesh->indices[i + k]];
-        terrimpi_find_span(a, &span);
-        terrimpi_find_plane(a, &gx, &gz);
-        all.squares = 0.0f; /* summed by triangle, as small sums round less */
-        for (z = span.low; z < span.high; z++) {
-            const float *row = heights + z * cols;
-            float base = a->height + (float)(z - a->z) * gz;
-            for (x = span.left[z]; x < span.right[z]; x++)
-                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * gx));
-        }
-        squares += all.squares;
-    }
-    all.squares = 0.0f;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        const terrimp_mesh_vertex *p = v + i, *q = v + (i + 1) % mesh->border_vertex_count;
-        const float *at = heights + p->z * cols + p->x;
-        if (p->z == rows - 1 && q->z == rows - 1)
-            terrimpi_measure_border(at, 1, q->x - p->x, p->height, q->height, &all);
-        else if (p->x == cols - 1 && q->x == cols - 1)
-            terrimpi_measure_border(at, -cols, p->z - q->z, p->height, q->height, &all);
-        else if (p->x == cols - 1) /* the corner where the last column ends */
-            terrimpi_measure_border(at, 1, 1, p->height, p->height, &all);
-    }
-    mesh->error_above = all.above;
-    mesh->error_below = all.below;
-    mesh->error_rms = TERRIMP_SQRTF((squares + all.squares) / (float)(cols * rows));
-}
-
 /* --- borders --- */
 
 /* Adds the squared error of the samples strictly between a kept point and sample `at`, where the
@@ -9632,7 +9497,6 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
     if (!whole)
         terrimpi_reduce(&s, desc, &plan, mesh->vertices);
     terrimpi_emit(&s, whole ? desc->heights : 0, mesh);
-    terrimpi_measure(desc->heights, s.cols, s.rows, mesh);
     return TERRIMP_OK;
 }
 
@@ -9656,35 +9520,24 @@ static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
     return TERRIMP_OK;
 }
 
-/* Appends a wall along the loop: down to a height, or up by a rise. */
-static terrimp_result terrimpi_add_skirt(terrimp_mesh *mesh, float value, int upper)
+TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height)
 {
     uint32_t i, n;
     TERRIMPI_TRY(terrimpi_check_surface(mesh));
     n = mesh->border_vertex_count;
     TERRIMPI_REFUSE(mesh->vertex_capacity - mesh->vertex_count < n ||
                     mesh->index_capacity - mesh->index_count < 6 * n, TERRIMP_E_CAPACITY);
-    TERRIMPI_REFUSE(!terrimpi_finite(value), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(upper && value < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(upper && height < 0.0f, TERRIMP_E_RANGE);
     for (i = 0; i < n; i++) {
         terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
         *rim = mesh->vertices[i];
-        rim->height = upper ? rim->height + value : terrimpi_min(rim->height, value);
+        rim->height = upper ? rim->height + height : terrimpi_min(rim->height, height);
     }
     terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
     mesh->vertex_count += n;
     mesh->index_count += 6 * n;
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height)
-{
-    return terrimpi_add_skirt(mesh, height, 0);
-}
-
-TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise)
-{
-    return terrimpi_add_skirt(mesh, rise, 1);
 }
 
 /* --- standing proud (Hess 6.1) --- */
@@ -9781,6 +9634,17 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
     }
 }
 
+/* The slopes of the plane through three vertices. */
+static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
+{
+    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
+    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
+    float inverse = 1.0f / (float)(bz * cx - bx * cz);
+    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
+    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
+}
+
 /* Goes once over the samples of a triangle. */
 static void terrimpi_rise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
                                    const uint16_t *t, const float *raise, float *change,
@@ -9862,7 +9726,6 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     }
     for (i = 0; i < n; i++)
         mesh->vertices[i].height += desc->amount * work[i];
-    terrimpi_measure(desc->heights, (int32_t)desc->cols, (int32_t)desc->rows, mesh);
     return TERRIMP_OK;
 }
 
@@ -10728,6 +10591,18 @@ static void terrimpi_store_surface(terrimp_terrain *t, uint32_t node, terrimp_me
     }
     for (i = 0; i < mesh->surface_index_count; i++)
         corners[i] = (uint8_t)mesh->indices[i];
+}
+
+/* Differences of samples to the surface. */
+typedef struct terrimpi_error {
+    float above, below, squares;
+} terrimpi_error;
+
+static void terrimpi_add_error(terrimpi_error *error, float difference)
+{
+    error->above = terrimpi_max(error->above, difference);
+    error->below = terrimpi_max(error->below, -difference);
+    error->squares += difference * difference;
 }
 
 /* Measures a mesh against every sample of its node. */

@@ -130,7 +130,7 @@ static void land_span(const land *l, uint32_t node, uint32_t first[2], uint32_t 
 static float land_sample(const land *l, uint32_t x, uint32_t z)
 {
     float height = -1e30f;
-    CHECK(terrimp_heightfield_sample(&l->desc.field, x, z, &height) == TERRIMP_OK);
+    CHECK(terrimp_heightfield_read(&l->desc.field, x, z, 1, 1, 1, &height) == TERRIMP_OK);
     return height;
 }
 
