@@ -19,6 +19,7 @@ static void *unit_malloc(size_t bytes)
 
 #include "check.h"
 #include "unit_heightfield.h"
+#include "unit_quadtree.h"
 #include "unit_geomipmap.h"
 #include "unit_simplifier.h"
 #include "unit_camera.h"
@@ -38,6 +39,7 @@ int main(int argc, char **argv)
         return check_bad != 0;
     }
     heightfield_tests();
+    quadtree_tests();
     geomipmap_tests();
     simplifier_tests();
     camera_tests();

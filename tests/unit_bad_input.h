@@ -1305,52 +1305,40 @@ static void geomip_functions_refuse(void)
 {
     terrimp_heightfield bad;
     mip_scene s;
-    terrimp_geomip out;
+    terrimp_quadtree out;
     terrimp_box box;
     terrimp_geomip_weights weights[25];
     terrimp_geomip_vertex vertices[25];
     terrimp_geomip_draw draw;
-    float distances[200], heights[25];
+    terrimp_camera camera;
+    float heights[25];
     int i;
     memset(&draw, 0, sizeof draw);
     memset(vertices, 0, sizeof vertices);
-    mip_make(&s, TERRIMP_FORM_LIST, 33, 33, 4);
+    mip_make(&s, 33, 33, 4);
     bad = s.tree.field;
     bad.width = 1;
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_geomip_init(&bad, 4, &out));
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_quadtree_init(&bad, 4, &out));
     REFUSES(TERRIMP_E_NULL, box, terrimp_geomip_box(NULL, 0, &box));
     REFUSES(TERRIMP_E_RANGE, box, terrimp_geomip_box(&s.tree, s.tree.node_count, &box));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_fit(NULL, s.scratch));
     GIVES(TERRIMP_E_NULL, terrimp_geomip_build_finish(NULL));
-    REFUSES(TERRIMP_E_NULL, distances,
-            terrimp_geomip_distances(NULL, 0, 1.0f, 1.0f, 500.0f, distances));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 500.0f, NULL));
-    REFUSES(TERRIMP_E_RANGE, distances,
-            terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 0.0f, distances));
-    REFUSES(TERRIMP_E_RANGE, distances,
-            terrimp_geomip_distances(&s.tree, TERRIMP_GEOMIP_RULE_COUNT, 1.0f, 1.0f, 500.0f,
-                                     distances));
-    for (i = 0; i < 3; i++) {
-        float wrong = not_finite(i);
-        terrimp_camera camera;
+    mip_random_camera(&s, &camera);
+    for (i = 0; i < 9; i++) {
         terrimp_geomip_view view = s.view;
-        mip_random_camera(&s, &camera);
-        REFUSES(TERRIMP_E_NOT_FINITE, distances,
-                terrimp_geomip_distances(&s.tree, 0, wrong, 1.0f, 500.0f, distances));
-        REFUSES(TERRIMP_E_NOT_FINITE, distances,
-                terrimp_geomip_distances(&s.tree, 0, 1.0f, wrong, 500.0f, distances));
-        REFUSES(TERRIMP_E_NOT_FINITE, distances,
-                terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, wrong, distances));
-        view.hysteresis = wrong;
+        float *fields[3];
+        fields[0] = &view.tolerance_px;
+        fields[1] = &view.morph_ratio;
+        fields[2] = &view.hysteresis;
+        *fields[i / 3] = not_finite(i % 3);
         GIVES(TERRIMP_E_NOT_FINITE, terrimp_geomip_select(&s.tree, &view, &camera));
     }
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_fill_weights(4, TERRIMP_FORM_LIST, NULL));
-    REFUSES(TERRIMP_E_RANGE, weights, terrimp_geomip_fill_weights(3, TERRIMP_FORM_LIST, weights));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, NULL, 1));
-    REFUSES(TERRIMP_E_NULL, heights,
-            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, NULL, vertices, heights, 1));
-    REFUSES(TERRIMP_E_RANGE, heights,
-            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, heights, 0));
+    s.view.rule = TERRIMP_GEOMIP_RULE_COUNT;
+    GIVES(TERRIMP_E_RANGE, terrimp_geomip_select(&s.tree, &s.view, &camera));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_fill_weights(4, NULL));
+    REFUSES(TERRIMP_E_RANGE, weights, terrimp_geomip_fill_weights(3, weights));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_morph(4, &draw, vertices, NULL, 1));
+    REFUSES(TERRIMP_E_NULL, heights, terrimp_geomip_morph(4, NULL, vertices, heights, 1));
+    REFUSES(TERRIMP_E_RANGE, heights, terrimp_geomip_morph(4, &draw, vertices, heights, 0));
     mip_free(&s);
 }
 

@@ -331,7 +331,7 @@ static int same_place(const land *l, const terrimp_mesh_info *mesh, uint32_t a, 
     return p[0] == q[0] && p[1] == q[1];
 }
 
-static int hangs(const land *l, const terrimp_mesh_info *mesh, uint32_t border, uint32_t foot,
+static uint32_t hangs(const land *l, const terrimp_mesh_info *mesh, uint32_t border, uint32_t foot,
                  float low, float deep)
 {
     float from = l->xyz[(size_t)(mesh->base_vertex + border) * 3u + 1u];
