@@ -377,7 +377,7 @@ static void check_skirts(const land *l, uint32_t node, uint16_t border[][2], uin
                 if (a != border[e][1] || b != border[e][0])
                     continue; /* the surface has a -> b, so its neighbour has b -> a */
                 found++;
-                lower += hangs(l, &mesh, same_place(l, &mesh, a, c) ? a : b, c, low, deep) ? 1u : 0u;
+                lower += hangs(l, &mesh, same_place(l, &mesh, a, c) ? a : b, c, low, deep);
             }
         }
         CHECK(found == skirts);
