@@ -9560,20 +9560,20 @@ static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
     return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
 }
 
-/* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
-   rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
-static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
-                                 float over, int lowering)
+/* A vertex of weight w in a sample rises by what that wants. */
+static void terrimpi_rise(float w, float wanted, float *change)
 {
-    int k;
-    for (k = 0; k < n; k++) {
-        if (!(w[k] > 1e-6f))
-            continue;
-        if (lowering)
-            *change[k] = terrimpi_min(*change[k], terrimpi_max(0.0f, over) / ((float)n * w[k]));
-        else
-            *change[k] = terrimpi_max(*change[k], wanted);
-    }
+    if (w > 1e-6f)
+        *change = terrimpi_max(*change, wanted);
+}
+
+/* A vertex of weight w in a sample, one of n round it, may lose its share of the surface's height
+   over the sample. That this is no less than it may lose by others, a product mostly tells without
+   a division. */
+static void terrimpi_lower(float w, float n, float over, float *change)
+{
+    if (w > 1e-6f && over < *change * (n * w) * 1.00001f)
+        *change = terrimpi_min(*change, over / (n * w));
 }
 
 static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
@@ -9598,13 +9598,18 @@ static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_
     is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
     for (k = 0; k <= count; k++, samples += stride) {
         float surface, wanted;
+        int i;
         w[1] = (float)k / (float)count;
         w[0] = 1.0f - w[1];
         surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
         wanted = terrimpi_wanted_raise(*samples - surface,
                                        *samples - (w[0] * p->height + w[1] * q->height),
                                        w[0] * is_free[0] + w[1] * is_free[1]);
-        terrimpi_rise_sample(w, to, 2, wanted, surface - *samples, lowering);
+        for (i = 0; i < 2; i++)
+            if (lowering)
+                terrimpi_lower(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
+            else
+                terrimpi_rise(w[i], wanted, to[i]);
     }
 }
 
@@ -9652,10 +9657,11 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
 {
     terrimp_mesh_vertex v[3];
     terrimpi_span span;
-    float slope_x[3], slope_z[3], gx, gz, *to[3];
+    float slope_x[3], slope_z[3], gx, gz, to[3];
+    float limit; /* from which on a sample takes nothing away, as no weight is above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
-        to[k] = change + t[k];
+        to[k] = change[t[k]];
         v[k] = mesh->vertices[t[k]];
         v[k].height = 0.0f;
     }
@@ -9668,19 +9674,32 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
     terrimpi_find_span(v, &span);
     terrimpi_find_plane(v, &gx, &gz);
+    limit = 3.001f * terrimpi_largest(to);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
-            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f;
-            float short_by = heights[z * cols + x] - (v[0].height + dx * gx + dz * gz), raised;
-            for (k = 0; k < 3; k++) {
+            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
+            float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
+            if (lowering && over >= limit)
+                continue;
+            for (k = 0; k < 3; k++)
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
-                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            if (lowering) {
+                over = terrimpi_max(over, 0.0f);
+                terrimpi_lower(w[0], 3.0f, over, &to[0]);
+                terrimpi_lower(w[1], 3.0f, over, &to[1]);
+                terrimpi_lower(w[2], 3.0f, over, &to[2]);
+                limit = 3.001f * terrimpi_largest(to);
+                continue;
             }
-            raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            terrimpi_rise_sample(w, to, 3,
-                                 terrimpi_wanted_raise(short_by, short_by + raised, hold),
-                                 -short_by, lowering);
+            for (k = 0; k < 3; k++)
+                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
+            wanted = terrimpi_wanted_raise(-over, wanted - over, hold);
+            for (k = 0; k < 3; k++)
+                terrimpi_rise(w[k], wanted, &to[k]);
         }
+    for (k = 0; k < 3; k++)
+        change[t[k]] = to[k];
 }
 
 static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
