@@ -328,7 +328,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
 
    x, z       [wu] position; the outline of the field belongs to it
    height     [wu] receives the height
-   Errors     E_MISS outside of the field; E_VOID in a hole; E_NOT_FINITE also for the quad's heights
+   Errors     E_MISS outside of the field; E_VOID in a hole; E_NOT_FINITE also for heights
    Cost       O(1) */
 TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield *field, float x,
                                                       float z, float *height);
@@ -381,7 +381,8 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera. */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
+   camera. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
@@ -488,8 +489,7 @@ typedef struct terrimp_quadtree {
 /* Lays the quadtree out; nodes is left NULL for the caller to set.
 
    chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
-                fewer triangles, for the same picture
-   Errors       those of terrimp_heightfield_resolve */
+                fewer triangles, for the same picture */
 TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
                                                  uint32_t chunk_quads, terrimp_quadtree *tree);
 
@@ -1023,8 +1023,7 @@ typedef struct terrimp_terrain_info {
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
 
-/* Writes the effective descriptor, defaults filled in. out may be desc.
-   Errors: those of terrimp_heightfield_resolve. */
+/* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
 
@@ -1369,8 +1368,7 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 
    terrain    built; outlives the view
    memory     [bytes] aligned to 8 bytes
-   view       out: lies in memory
-   Errors     those of terrimp_view_desc_resolve */
+   view       out: lies in memory */
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
@@ -1614,7 +1612,7 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tre
 /* Ends the building: parents hold what their children hold. */
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
@@ -1628,8 +1626,7 @@ TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *des
 /* Lays a terrain out in the caller's block. No sample is read, nothing is built yet.
 
    memory     [bytes] aligned to 8 bytes; freed by the caller when the terrain is no longer used
-   terrain    out: lies in memory
-   Errors     those of terrimp_terrain_desc_resolve */
+   terrain    out: lies in memory */
 TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc, void *memory,
                                                 size_t bytes, terrimp_terrain **terrain);
 
