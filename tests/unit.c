@@ -28,6 +28,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_view.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
+#include "unit_layers.h"
 
 int main(void)
 {
@@ -41,5 +42,6 @@ int main(void)
     bake_tests();
     view_tests();
     bad_input_tests();
+    layers_tests();
     return check_report();
 }
