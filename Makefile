@@ -17,6 +17,7 @@
 ## make coverage  which lines and branches the unit tests reach
 ## make analyse   static analysis and valgrind
 ## make deps-portable    installs what these five use, on Debian
+## make golden    writes tests/golden.h anew, where what hosts get is meant to change
 ## make clean     removes build/
 ##
 ## With any of them: CC=clang, CFLAGS='...', CONFIG=release|debug|sanitize|coverage, and
@@ -107,6 +108,11 @@ SECONDS ?= 60
 fuzz: | $(DEPS)
 	@sh tests/fuzz.sh $(SECONDS)
 
+# Into a file beside it first: the program that prints the new values has the old ones in it.
+golden: unit
+	@$(BUILD)/unit golden > $(BUILD)/golden.h && cp $(BUILD)/golden.h tests/golden.h
+	@git --no-pager diff --stat tests/golden.h
+
 clean:
 	rm -rf build
 
@@ -143,6 +149,6 @@ $(BUILD)/parallel_build: LIBS = -lpthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
-.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz \
+.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz golden \
         $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
 .SECONDARY:

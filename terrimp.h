@@ -42,6 +42,7 @@
        >>basics       result codes, boxes
        >>heightfield  a view of the caller's samples; heights, normals, rays
        >>camera       the frame's camera, culling, the frustum fitted to a box
+       >>quadtree     which node: its place, box, parent, neighbours, children closest first
        >>geomipmap    levels, crack-free index patterns, selection, morphing
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
        >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
@@ -234,6 +235,16 @@ typedef struct terrimp_box {
     float max[3];
 } terrimp_box;
 
+/* Sides of a node or of a tile of samples. Z0 and Z1 run along x; of either pair the odd one is the
+   last row or column. */
+enum {
+    TERRIMP_SIDE_Z0 = 0, /* towards -z */
+    TERRIMP_SIDE_Z1,
+    TERRIMP_SIDE_X0,     /* towards -x */
+    TERRIMP_SIDE_X1,
+    TERRIMP_SIDE_COUNT
+};
+
 /* ==== Heightfield ======================================================== >>heightfield */
 
 /* Storage of one sample. */
@@ -294,16 +305,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
    Cost       O(width * depth) */
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z);
-
-/* The world height of one sample.
-
-   x, z       column and row [Limits: inside the field]
-   height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_RANGE  x or z is outside;
-              E_VOID  the sample is a void; E_NOT_FINITE  its height is NaN or infinite
-   Cost       O(1) */
-TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
-                                                      uint32_t z, float *height);
 
 /* Reads a tile of world heights. A tile may reach over the last column and row: it repeats them.
 
@@ -477,39 +478,53 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16]);
 
+/* ==== Quadtree =========================================================== >>quadtree */
+
+#define TERRIMP_QUADTREE_LEVELS 17u /* 65537 samples in chunks of 4 quads have 15 */
+
+/* A node and where it lies: its column and row among the nodes of its level. */
+typedef struct terrimp_node {
+    uint32_t number, level, x, z;
+} terrimp_node;
+
+/* The nodes over a heightfield. A node of level L covers (chunk_quads << L)^2 quads of the field,
+   fewer at the far edges. Nodes are numbered level by level from the finest up, each level row by
+   row; the last one is the root. Read-only once built, for any number of views and threads. */
+typedef struct terrimp_quadtree {
+    terrimp_heightfield field; /* resolved; its samples outlive the tree */
+    uint32_t chunk_quads;
+    uint32_t level_count, node_count;
+    uint32_t level_first[TERRIMP_QUADTREE_LEVELS + 1u]; /* number of a level's first node */
+    uint32_t level_x[TERRIMP_QUADTREE_LEVELS], level_z[TERRIMP_QUADTREE_LEVELS]; /* its nodes */
+    struct terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
+} terrimp_quadtree;
+
+/* Lays the quadtree out; nodes is left NULL for the caller to set.
+
+   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
+                fewer triangles, for the same picture
+   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
+TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
+                                                 uint32_t chunk_quads, terrimp_quadtree *tree);
+
 /* ==== Geomipmap ========================================================== >>geomipmap */
 
-/* Geometrical mipmapping alone: a quadtree of nodes over a heightfield. A node of level L covers
-   (chunk_quads << L)^2 quads of the field and is always drawn as chunk_quads x chunk_quads quads,
-   every 2^L-th sample; vertices beyond the last column or row stand on it. So one shared index
-   buffer serves every node. Nodes are numbered level by level from the finest up, each level row by
-   row; the last one is the root.
+/* Geometrical mipmapping alone. A node is always drawn as chunk_quads x chunk_quads quads of every
+   2^level-th sample; vertices beyond the last column or row stand on it. So one shared index buffer
+   serves every node.
 
-   How to use it: init, build (both once), then select each frame: it lists the nodes to draw. */
+   How to use it: terrimp_quadtree_init and build once, then select each frame: it lists the nodes
+   to draw. */
 
 /* --- patterns: the shared index buffer --- */
 
-/* Borders of a node, and the bit that a pattern has for each where the neighbour is one level
-   coarser: there the node leaves out its odd border vertices, which the neighbour lacks. */
-enum {
-    TERRIMP_SIDE_Z0 = 0, /* towards -z */
-    TERRIMP_SIDE_Z1,
-    TERRIMP_SIDE_X0,     /* towards -x */
-    TERRIMP_SIDE_X1,
-    TERRIMP_SIDE_COUNT,
-    TERRIMP_PATTERN_COUNT = 16 /* bit i of a pattern: side i is coarse */
-};
+/* Bit i of a pattern says that the neighbour at side i is one level coarser: there the node leaves
+   out its odd border vertices, which the neighbour lacks. */
+#define TERRIMP_PATTERN_COUNT 16u
 
 typedef enum terrimp_form { /* of the index buffer */
     TERRIMP_FORM_LIST = 0, /* triangle lists */
     TERRIMP_FORM_STRIP,    /* each pattern is one triangle strip */
-    TERRIMP_FORM_STITCHED, /* lists for morphing without any pop: odd vertices of coarse borders
-                              are kept, on the neighbour's edge, and triangles of no area close what
-                              rounding could open (a rasteriser was seen to leave one pixel in ten
-                              million open beside them). LIST leaves none open, but to leave a
-                              vertex out shows where the triangles beside it have not morphed */
-    TERRIMP_FORM_FITTED,   /* lists for trees with fits, morphing or not: coarse borders stand on
-                              vertices of their own, at the neighbour's heights */
     TERRIMP_FORM_COUNT
 } terrimp_form;
 
@@ -517,11 +532,6 @@ typedef struct terrimp_pattern {
     uint32_t first_index, index_count; /* in the index buffer */
     uint32_t triangle_count; /* without those of no area */
 } terrimp_pattern;
-
-/* Vertices of a node: the grid, column i of row j being vertex j * (chunk_quads + 1) + i. With
-   FORM_FITTED there follow, for each side in turn, those between its ends that a coarse border
-   consists of, chunk_quads / 2 - 1 a side. Returns 0 when an argument is outside its limits. */
-TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form);
 
 /* The place of a pattern.
 
@@ -546,9 +556,7 @@ TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form)
 TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
                                                 size_t capacity);
 
-/* --- the quadtree and its errors --- */
-
-#define TERRIMP_GEOMIP_LEVELS 17u /* 65537 samples in chunks of 4 quads have 15 */
+/* --- errors --- */
 
 /* What is kept of a node. */
 typedef struct terrimp_geomip_node {
@@ -559,34 +567,8 @@ typedef struct terrimp_geomip_node {
     float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
 } terrimp_geomip_node;
 
-/* The quadtree: what init fills in. Read-only once built, for any number of views and threads. */
-typedef struct terrimp_geomip {
-    terrimp_heightfield field; /* resolved; its samples outlive the tree */
-    uint32_t chunk_quads;
-    uint32_t level_count, node_count;
-    uint32_t level_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* node (x, z) of a level is number
-                                                         level_first + z * level_x + x */
-    uint32_t level_x[TERRIMP_GEOMIP_LEVELS], level_z[TERRIMP_GEOMIP_LEVELS];
-    uint32_t scratch_count;     /* floats that building a node needs */
-    terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
-    float *fits;                /* [fit_count] the caller's: vertices above level 0 get the heights
-                                   that fit the samples best by least squares, which want
-                                   FORM_FITTED; pictures are 1 to 2 dB closer to the full mesh,
-                                   BOUND needs half the triangles. NULL: all stand on samples */
-    uint32_t fit_count;         /* a third of the samples; 0: there is but one level */
-    uint32_t fit_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* private: where a level's fits begin */
-} terrimp_geomip;
-
-/* Lays the quadtree out; nodes and fits are left NULL for the caller to set.
-
-   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
-                fewer triangles, for the same picture
-   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
-TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
-                                               uint32_t chunk_quads, terrimp_geomip *tree);
-
 /* The box of a node. Errors: E_NULL; E_RANGE. */
-TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box);
 
 /* --- selection --- */
@@ -602,8 +584,7 @@ typedef enum terrimp_geomip_rule {
 } terrimp_geomip_rule;
 
 typedef struct terrimp_geomip_draw {
-    uint32_t node, level;
-    uint32_t x, z;       /* column and row among the nodes of its level */
+    terrimp_node node;
     uint32_t pattern;
     float error_px;      /* by the rule, <= tolerance_px; 0 at level 0 */
     float morph;         /* 0: as it is .. 1: the shape of its parent; 0 without morphing */
@@ -628,7 +609,9 @@ typedef struct terrimp_geomip_view {
                            not morph] */
     float hysteresis;   /* without morphing: a split node stays split until its error is below
                            tolerance / (1 + hysteresis) [Limits: 0..1] */
-    float *distances;             /* (required) [node_count] */
+    float *distances;             /* (required) [node_count] squares of those at which nodes stop
+                                     being drawn as they are, 1e30 at most; de Boer's D_n^2 for the
+                                     level above. Remade when what they depend on has changed */
     terrimp_geomip_mark *marks;   /* (required) [node_count] zero before the first frame */
     terrimp_geomip_draw *draws;   /* (required) [draw_capacity] out: front to back */
     uint32_t draw_capacity;
@@ -639,19 +622,6 @@ typedef struct terrimp_geomip_view {
     uint32_t frame;               /* private */
 } terrimp_geomip_view;
 
-/* The distance at which each node stops being drawn as it is, squared: de Boer's D_n^2 for its
-   parent's level. Called by select when settings, screen or field of view have changed; here for
-   hosts that select by themselves.
-
-   pixel_factor  K [Limits: > 0]
-   distances     [node_count] out: D^2, at most 1e30. A parent's D is at least morph_ratio times
-                 that of each child.
-   Errors        E_NULL; E_RANGE; E_NOT_FINITE
-   Source        de Boer 2000, equations 1, 1a to 1c and 2 */
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances);
-
 /* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
    level, those outside of the camera's view are left out.
 
@@ -659,8 +629,8 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
    Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
               before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
    Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
-   Source     de Boer 2000, sections 2.2 and 2.3.1 */
-TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
+   Source     de Boer 2000, sections 2.2 and 2.3.1, equations 1 to 2 */
+TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera);
 
@@ -669,9 +639,8 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
 /* A node's vertex: what it moves by when its factors are 1. */
 typedef struct terrimp_geomip_vertex {
     float height;    /* [wu] */
-    float move;      /* [wu] to the parent's shape; for even vertices on a border without fits, for
-                        corners, and for those of coarse borders: from there to the shape of the
-                        parent's parent */
+    float move;      /* [wu] to the parent's shape; for even vertices on a border, from there to the
+                        shape of the parent's parent */
     float beside[2]; /* [wu] what is added to move where the border vertices that an odd vertex
                         stands between move themselves: those of a border along x, along z */
 } terrimp_geomip_vertex;
@@ -687,37 +656,33 @@ typedef struct terrimp_geomip_weights {
     uint8_t self, unused[3];
 } terrimp_geomip_weights;
 
-/* Fills the vertices of a node of any level, row by row; in a tree with fits those of coarse
-   borders follow.
+/* Fills the vertices of a node of any level, row by row.
 
-   xyz        [terrimp_pattern_vertex_count][3] out: unmorphed positions [wu]; NULL: not wanted;
-              (chunk_quads + 1)^2 without fits
-   vertices   [as many] out; NULL: not wanted
+   xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
    Errors     E_NULL (also when both are NULL); E_RANGE */
-TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices);
 
 /* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
 
-   form       terrimp_form
-   weights    [terrimp_pattern_vertex_count] out */
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
+   weights    [(chunk_quads + 1)^2] out */
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
                                                        terrimp_geomip_weights *weights);
 
 /* Morphs a node's vertices on the CPU, for hosts without shaders. Vertices that neighbours share
    come out equal, bit for bit.
 
-   form       terrimp_form; FITTED exactly when the tree has fits
    draw       from select
-   vertices   [terrimp_pattern_vertex_count] of that node
+   vertices   [(chunk_quads + 1)^2] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
    Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride);
@@ -807,18 +772,6 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
 TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_angle_rad,
                                                      float speed, float *seconds);
 
-/* For planning: the most captures per second that a set of impostors can ask for, whatever way the
-   eye moves: the sum of 1 / lifetime over the boxes that lie beyond a distance.
-
-   boxes            [count]
-   distance         [wu] boxes closer than this are not impostors; > 0
-   Errors           those of terrimp_impostor_lifetime
-   Source           Hess 2010, section 3.5.1 */
-TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t count,
-                                                const float eye[3], float distance,
-                                                float max_angle_rad, float speed,
-                                                float *captures_per_s);
-
 /* What a mesh hides from a capture and an eye that moves comes to see, and where the picture would
    best be split in two. */
 typedef struct terrimp_split {
@@ -841,7 +794,7 @@ typedef struct terrimp_split {
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
    Errors     E_NULL; E_NOT_FINITE; E_RANGE, also for an index beyond the vertices or a count not of
               triangles
-   Cost       O(triangles^2): 0.1 to 0.4 ms for 85 triangles
+   Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
                                                  uint32_t vertex_count, const uint16_t *indices,
@@ -1410,7 +1363,7 @@ typedef struct terrimp_stats {
     uint32_t visible;            /* nodes of which it was decided what they are drawn as */
     uint32_t ground;             /* ground nodes drawn */
     uint32_t impostors;          /* impostors drawn */
-    uint32_t impostors_by_level[TERRIMP_GEOMIP_LEVELS];
+    uint32_t impostors_by_level[TERRIMP_QUADTREE_LEVELS];
     uint32_t waiting;            /* impostors that were wanted and have no picture yet */
     uint32_t draws;              /* commands on the screen */
     uint32_t triangles;          /* of those */
@@ -1609,9 +1562,6 @@ typedef struct terrimp_mesh {
     uint32_t vertex_count;          /* out: all vertices */
     uint32_t surface_index_count;   /* out: indices of the surface */
     uint32_t index_count;           /* out: all indices */
-    float error_above;              /* out: [wu] largest height of a sample over the surface */
-    float error_below;              /* out: [wu] largest depth of a sample under the surface */
-    float error_rms;                /* out: [wu] root mean square over all samples */
 } terrimp_mesh;
 
 /* Simplifies one border of a tile on its own. The result depends on these samples alone, so two
@@ -1654,8 +1604,7 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
    polylines. A tile whose samples all fit the budget is returned whole; ground that is met without
    error may take fewer triangles, and one triangle stays over where the count does not work out.
    The mesh covers the tile's rectangle one to one: no triangle has a normal with y <= 0,
-   which is tested in integers. Two triangles share each inner edge, vertices stand on samples, and
-   the reported errors are those of all samples against the final surface.
+   which is tested in integers. Two triangles share each inner edge, vertices stand on samples.
 
    desc           what to simplify
    scratch        [scratch_bytes] aligned for int64_t; contents need not outlive the call
@@ -1672,24 +1621,18 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-/* Appends the lower skirt: a wall from the border down to one height, facing outwards. It fills
-   the gap to a neighbour of another level. Each skirt has as many vertices as the loop, and two
-   triangles for each of them.
+/* Appends a skirt: a wall along the border, of as many vertices as its loop and two triangles for
+   each of them. The lower one fills the gap to a neighbour of another level and faces outwards; the
+   upper one catches those pixels of a picture that lie above a border that is too low, and faces
+   inwards: keep it small.
 
    mesh    in: a surface, perhaps with skirts; out: the same and the wall
-   height  [wu] the bottom, as a rule the node's least height; a border vertex that lies lower
-           gets a wall of no height
-   Errors  NULL; NOT_FINITE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
+   upper   0: the lower skirt
+   height  [wu] of the lower skirt, its bottom, as a rule the node's least height; a border vertex
+           that lies lower gets a wall of no height. Of the upper one, its rise [Limits: >= 0]
+   Errors  NULL; NOT_FINITE; RANGE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
    Source  Hess 2010, section 4.2 */
-TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height);
-
-/* Appends the upper skirt: a wall that rises from the border, facing inwards. It catches those
-   pixels of a picture that lie above a border that is too low; keep it small.
-
-   rise    [wu] height of the wall [Limits: >= 0]
-   Errors  NULL; NOT_FINITE; RANGE; STATE; CAPACITY; mesh untouched
-   Source  Hess 2010, section 4.2 */
-TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise);
+TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
 
 /* --- standing proud (Hess 6.1) --- */
 
@@ -1708,7 +1651,7 @@ typedef struct terrimp_raise_desc {
    largest shortfall round it and lowers them together as far as the samples let it.
 
    desc    how far
-   mesh    in: a mesh of that tile without skirts; out: heights and errors
+   mesh    in: a mesh of that tile without skirts; out: its heights
    work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
    Errors  NULL; RANGE; NOT_FINITE; STATE when the mesh has no surface or has skirts; mesh untouched
    Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
@@ -1748,29 +1691,21 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 
 /* --- heights and errors of the ground --- */
 
-/* Fills in the fits, if there are any; before any node is built: the L2 projection on linear finite
-   elements, as in any book on these.
-
-   scratch    [scratch_count]
-   Errors     E_NULL
-   Cost       O(samples); about 0.35 s for 4097 x 4097 */
-TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch);
-
-/* Finds heights, error and rms of one node, from samples and fits alone: different nodes may be
+/* Finds heights, error and rms of one node, from samples alone: different nodes may be
    built at the same time by threads with scratch arrays of their own.
 
-   scratch    [scratch_count]
+   scratch    [field.width + 2 * chunk_quads + 2]
    Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
    Cost       O(samples of the node) */
-TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch);
 
 /* Ends the building: parents hold what their children hold. Errors: E_NULL. */
-TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree);
+TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Fits, builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes. Errors: those of build_node.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
-TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch);
+TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
 /* --- terrain --- */
 
@@ -2232,6 +2167,23 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
     terrimpi_cross(right, forward, up);
 }
 
+/* Whether a side runs along x. */
+static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
+
+/* Twice the area of a triangle of samples (x, z); positive when it is counter-clockwise from above:
+   when its normal has y > 0. */
+static int64_t terrimpi_twice_area(const uint32_t a[2], const uint32_t b[2], const uint32_t c[2])
+{
+    return ((int64_t)b[1] - a[1]) * ((int64_t)c[0] - a[0]) -
+           ((int64_t)b[0] - a[0]) * ((int64_t)c[1] - a[1]);
+}
+
+/* Where point k of a lattice of every 2^level-th sample lies; beyond the last sample, on it. */
+static uint32_t terrimpi_lattice(uint32_t k, uint32_t level, uint32_t last)
+{
+    return k > (last >> level) ? last : k << level;
+}
+
 static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
 {
     terrimp_rect rect;
@@ -2509,12 +2461,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
             *z = scan.z;
     }
     return result;
-}
-
-TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
-                                                      uint32_t z, float *height)
-{
-    return terrimp_heightfield_read(field, x, z, 1, 1, 1, height);
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
@@ -3179,6 +3125,201 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     return TERRIMP_OK;
 }
 
+/* ==== Quadtree =========================================================== >>impl-quadtree */
+
+static int terrimpi_tree_quads_fit(uint32_t quads)
+{
+    return quads >= 4u && quads <= 128u && quads % 2u == 0;
+}
+
+TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
+                                                 uint32_t chunk_quads, terrimp_quadtree *tree)
+{
+    terrimp_quadtree t;
+    uint32_t x, z, level;
+    TERRIMPI_REFUSE(!field || !tree, TERRIMP_E_NULL);
+    memset(&t, 0, sizeof t);
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &t.field));
+    t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(t.chunk_quads), TERRIMP_E_RANGE);
+    x = (t.field.width - 2u) / t.chunk_quads + 1u;
+    z = (t.field.depth - 2u) / t.chunk_quads + 1u;
+    for (level = 0;; level++) {
+        TERRIMP_ASSERT(level < TERRIMP_QUADTREE_LEVELS);
+        t.level_x[level] = x;
+        t.level_z[level] = z;
+        t.level_first[level + 1u] = t.level_first[level] + x * z;
+        if (x == 1u && z == 1u)
+            break;
+        x = (x + 1u) / 2u;
+        z = (z + 1u) / 2u;
+    }
+    t.level_count = level + 1u;
+    t.node_count = t.level_first[t.level_count];
+    *tree = t;
+    return TERRIMP_OK;
+}
+
+/* ---- which node ---- */
+
+static terrimp_node terrimpi_tree_at(const terrimp_quadtree *t, uint32_t level, uint32_t x,
+                                     uint32_t z)
+{
+    terrimp_node n;
+    n.number = t->level_first[level] + z * t->level_x[level] + x;
+    n.level = level;
+    n.x = x;
+    n.z = z;
+    return n;
+}
+
+static terrimp_node terrimpi_tree_node(const terrimp_quadtree *t, uint32_t number)
+{
+    uint32_t level = 0, k;
+    while (number >= t->level_first[level + 1u])
+        level++;
+    k = number - t->level_first[level];
+    return terrimpi_tree_at(t, level, k % t->level_x[level], k / t->level_x[level]);
+}
+
+static terrimp_node terrimpi_tree_root(const terrimp_quadtree *t)
+{
+    return terrimpi_tree_at(t, t->level_count - 1u, 0, 0);
+}
+
+static int terrimpi_tree_has(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z)
+{
+    return x < t->level_x[level] && z < t->level_z[level];
+}
+
+/* The parent of a node that is not the root. */
+static terrimp_node terrimpi_tree_parent(const terrimp_quadtree *t, const terrimp_node *n)
+{
+    return terrimpi_tree_at(t, n->level + 1u, n->x / 2u, n->z / 2u);
+}
+
+static uint32_t terrimpi_tree_parent_number(const terrimp_quadtree *t, uint32_t number)
+{
+    terrimp_node n = terrimpi_tree_node(t, number);
+    return terrimpi_tree_parent(t, &n).number;
+}
+
+/* The node of the same level beyond a side; returns 0 where the terrain ends. */
+static int terrimpi_tree_beyond(const terrimp_quadtree *t, const terrimp_node *n, int side,
+                                terrimp_node *beyond)
+{
+    uint32_t step = side & 1 ? 1u : (uint32_t)-1; /* from 0 it leads to a number too large */
+    uint32_t x = terrimpi_along_x(side) ? n->x : n->x + step;
+    uint32_t z = terrimpi_along_x(side) ? n->z + step : n->z;
+    if (!terrimpi_tree_has(t, n->level, x, z))
+        return 0;
+    *beyond = terrimpi_tree_at(t, n->level, x, z);
+    return 1;
+}
+
+/* ---- where it lies ---- */
+
+/* Column and row of lattice position (i, j) of a level. */
+static uint32_t terrimpi_tree_col(const terrimp_quadtree *t, uint32_t level, uint32_t i)
+{
+    return terrimpi_lattice(i, level, t->field.width - 1u);
+}
+
+static uint32_t terrimpi_tree_row(const terrimp_quadtree *t, uint32_t level, uint32_t j)
+{
+    return terrimpi_lattice(j, level, t->field.depth - 1u);
+}
+
+/* World x and z of lattice position (i, j) of a level. */
+static float terrimpi_tree_x(const terrimp_quadtree *t, uint32_t level, uint32_t i)
+{
+    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_tree_col(t, level, i));
+}
+
+static float terrimpi_tree_z(const terrimp_quadtree *t, uint32_t level, uint32_t j)
+{
+    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_tree_row(t, level, j));
+}
+
+/* The box of a node whose heights are low to high. */
+static void terrimpi_tree_box(const terrimp_quadtree *t, const terrimp_node *n, float low,
+                              float high, terrimp_box *box)
+{
+    uint32_t i = n->x * t->chunk_quads, j = n->z * t->chunk_quads;
+    box->min[0] = terrimpi_tree_x(t, n->level, i);
+    box->max[0] = terrimpi_tree_x(t, n->level, i + t->chunk_quads);
+    box->min[1] = low;
+    box->max[1] = high;
+    box->min[2] = terrimpi_tree_z(t, n->level, j);
+    box->max[2] = terrimpi_tree_z(t, n->level, j + t->chunk_quads);
+}
+
+/* ---- its children, closest first ---- */
+
+/* The children of a node above level 0, in the order in which an eye comes upon them: none hides
+   one before it. Returns how many there are. */
+static uint32_t terrimpi_tree_children(const terrimp_quadtree *t, const terrimp_node *n,
+                                       const float eye[3], terrimp_node children[4])
+{
+    uint32_t level = n->level - 1u, x = n->x * 2u, z = n->z * 2u, i, count = 0, first;
+    first = (eye[0] >= terrimpi_tree_x(t, level, (x + 1u) * t->chunk_quads) ? 1u : 0u) |
+            (eye[2] >= terrimpi_tree_z(t, level, (z + 1u) * t->chunk_quads) ? 2u : 0u);
+    for (i = 0; i < 4u; i++) {
+        uint32_t child_x = x + ((first ^ i) & 1u), child_z = z + ((first ^ i) >> 1);
+        if (terrimpi_tree_has(t, level, child_x, child_z))
+            children[count++] = terrimpi_tree_at(t, level, child_x, child_z);
+    }
+    return count;
+}
+
+/* A node on its way through the tree, and the planes that it has to be tested against. */
+typedef struct terrimpi_tree_visit {
+    terrimp_node node;
+    int planes;
+} terrimpi_tree_visit;
+
+/* A walk from the root down, closest first: `next` takes a node, `enter` adds its children. The
+   stack is enough for going down one child while the other three wait. */
+typedef struct terrimpi_tree_walk {
+    const terrimp_quadtree *tree;
+    const float *eye;
+    uint32_t depth;
+    terrimpi_tree_visit stack[3u * TERRIMP_QUADTREE_LEVELS + 1u];
+} terrimpi_tree_walk;
+
+static void terrimpi_tree_begin(terrimpi_tree_walk *walk, const terrimp_quadtree *tree,
+                                const float eye[3], int planes)
+{
+    walk->tree = tree;
+    walk->eye = eye;
+    walk->depth = 1;
+    walk->stack[0].node = terrimpi_tree_root(tree);
+    walk->stack[0].planes = planes;
+}
+
+/* Returns 0 at the end of the walk. */
+static int terrimpi_tree_next(terrimpi_tree_walk *walk, terrimpi_tree_visit *visit)
+{
+    if (walk->depth == 0)
+        return 0;
+    *visit = walk->stack[--walk->depth];
+    return 1;
+}
+
+/* The children of a node come next, to be tested against the planes that are left. */
+static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_visit *visit)
+{
+    terrimp_node children[4];
+    uint32_t count;
+    if (visit->node.level == 0)
+        return;
+    count = terrimpi_tree_children(walk->tree, &visit->node, walk->eye, children);
+    while (count > 0) {
+        walk->stack[walk->depth].node = children[--count];
+        walk->stack[walk->depth++].planes = visit->planes;
+    }
+}
+
 /* ==== Geomipmap ========================================================== >>impl-geomipmap */
 /* Based on: de Boer 2000 (errors, distances, patterns, morphing); Wagner 2003 (strips, factors of
    the borders).
@@ -3188,8 +3329,6 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
    that both get the same floats. */
 
 #define TERRIMPI_MIP_COLUMN 14u      /* 14 + 2 vertices: what a cache of 16 can hold of two rows */
-#define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
-                                          the cache is lost, and ACMR is 0.99 */
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
 #ifndef TERRIMP_NO_MORPH
 #define TERRIMPI_MIP_MORPH_MOST 4.0f
@@ -3203,49 +3342,22 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
-/* Whether a side of a node, or a border of a tile, runs along x: Z0 and Z1 do. Of either pair the
-   odd one is the last row or column. */
-static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
-
 /* ---- patterns ---- */
-
-static int terrimpi_mip_quads_fit(uint32_t quads)
-{
-    return quads >= 4u && quads <= 128u && quads % 2u == 0;
-}
 
 static int terrimpi_mip_form_fits(uint32_t quads, int form)
 {
-    return terrimpi_mip_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
+    return terrimpi_tree_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
 }
 
-static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
+static uint32_t terrimpi_mip_columns(uint32_t quads)
 {
-    uint32_t most = TERRIMPI_MIP_COLUMN;
-    if (form == TERRIMP_FORM_STITCHED)
-        most = TERRIMPI_MIP_STITCH_COLUMN;
-    return (quads + most - 1u) / most;
-}
-
-/* Vertices that a coarse border has between its ends. */
-static uint32_t terrimpi_mip_border_vertices(uint32_t quads)
-{
-    return quads / 2u - 1u;
-}
-
-TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form)
-{
-    uint32_t grid = (chunk_quads + 1u) * (chunk_quads + 1u);
-    if (!terrimpi_mip_form_fits(chunk_quads, form))
-        return 0;
-    return form == TERRIMP_FORM_FITTED
-               ? grid + 4u * terrimpi_mip_border_vertices(chunk_quads) : grid;
+    return (quads + TERRIMPI_MIP_COLUMN - 1u) / TERRIMPI_MIP_COLUMN;
 }
 
 /* First quad of a column: columns are as equally wide as can be. */
-static uint32_t terrimpi_mip_column(uint32_t quads, int form, uint32_t column)
+static uint32_t terrimpi_mip_column(uint32_t quads, uint32_t column)
 {
-    return quads * column / terrimpi_mip_columns(quads, form);
+    return quads * column / terrimpi_mip_columns(quads);
 }
 
 static uint32_t terrimpi_mip_coarse_sides(uint32_t pattern)
@@ -3262,13 +3374,11 @@ static uint32_t terrimpi_mip_triangles(uint32_t quads, uint32_t pattern)
 static uint32_t terrimpi_mip_indices(uint32_t quads, int form, uint32_t pattern)
 {
     uint32_t column, ahead = 0, triangles = terrimpi_mip_triangles(quads, pattern);
-    if (form == TERRIMP_FORM_STITCHED) /* plus one for each odd border vertex, not minus one */
-        triangles += quads * terrimpi_mip_coarse_sides(pattern);
     if (form == TERRIMP_FORM_STRIP) /* each row: its zigzag and two indices to join the next */
-        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads, form)) - 1u;
-    for (column = 0; column < terrimpi_mip_columns(quads, form); column++)
-        ahead += (terrimpi_mip_column(quads, form, column + 1u) -
-                  terrimpi_mip_column(quads, form, column) + 2u) / 2u;
+        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads)) - 1u;
+    for (column = 0; column < terrimpi_mip_columns(quads); column++)
+        ahead += (terrimpi_mip_column(quads, column + 1u) -
+                  terrimpi_mip_column(quads, column) + 2u) / 2u;
     return 3u * (triangles + ahead);
 }
 
@@ -3283,8 +3393,7 @@ TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, 
         first += terrimpi_mip_indices(chunk_quads, form, i);
     found->first_index = first;
     found->index_count = terrimpi_mip_indices(chunk_quads, form, pattern);
-    found->triangle_count =
-        terrimpi_mip_triangles(chunk_quads, form == TERRIMP_FORM_STITCHED ? 0 : pattern);
+    found->triangle_count = terrimpi_mip_triangles(chunk_quads, pattern);
     return TERRIMP_OK;
 }
 
@@ -3303,31 +3412,20 @@ typedef struct terrimpi_mip_writer {
     uint16_t *start, *out;
 } terrimpi_mip_writer;
 
-static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
-{
-    return (int)(w->pattern >> side & 1u);
-}
-
 /* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
    towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
-   edge. In fitted patterns coarse sides have vertices of their own between their ends. */
+   edge. */
 static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
 {
-    uint32_t row = w->quads + 1u, border = terrimpi_mip_border_vertices(w->quads);
-    uint32_t own = row * row; /* the first of the side's own vertices */
     int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++, own += border) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         int along_x = terrimpi_along_x(side), last = side & 1;
         uint32_t *along = along_x ? &i : &j;
-        if (w->form == TERRIMP_FORM_STITCHED || !terrimpi_mip_coarse(w, side) ||
-            (along_x ? j : i) != (last ? w->quads : 0u))
-            continue;
-        if (*along & 1u)
+        if ((w->pattern >> side & 1u) && (along_x ? j : i) == (last ? w->quads : 0u) &&
+            (*along & 1u))
             *along = last ? *along - 1u : *along + 1u;
-        if (w->form == TERRIMP_FORM_FITTED && *along != 0 && *along != w->quads)
-            return (uint16_t)(own + *along / 2u - 1u);
     }
-    return (uint16_t)(j * row + i);
+    return (uint16_t)(j * (w->quads + 1u) + i);
 }
 
 static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b, uint16_t c)
@@ -3337,22 +3435,6 @@ static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b
     *w->out++ = a;
     *w->out++ = b;
     *w->out++ = c;
-}
-
-/* After quad (i, j): what stitches its borders to a neighbour's edge, two quads long. */
-static void terrimpi_mip_stitch(terrimpi_mip_writer *w, uint32_t i, uint32_t j)
-{
-    uint16_t at = (uint16_t)(j * (w->quads + 1u) + i), row = (uint16_t)(w->quads + 1u);
-    if (i == 0 && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        terrimpi_mip_triangle(w, (uint16_t)(at + row), at, (uint16_t)(at - row));
-    at = (uint16_t)(at + 1u);
-    if (i + 1u == w->quads && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        terrimpi_mip_triangle(w, (uint16_t)(at - row), at, (uint16_t)(at + row));
-    if (j == 0 && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        terrimpi_mip_triangle(w, (uint16_t)(at - 1u), at, (uint16_t)(at + 1u));
-    at = (uint16_t)(at + row);
-    if (j + 1u == w->quads && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        terrimpi_mip_triangle(w, (uint16_t)(at + 1u), at, (uint16_t)(at - 1u));
 }
 
 /* A column of quads as a list. Rows run from +x to -x, so that a quad's diagonal needs no vertex
@@ -3373,8 +3455,6 @@ static void terrimpi_mip_list_column(terrimpi_mip_writer *w, uint32_t from, uint
             uint16_t c = terrimpi_mip_index(w, i + 1u, j + 1u);
             terrimpi_mip_triangle(w, a, c, terrimpi_mip_index(w, i + 1u, j));
             terrimpi_mip_triangle(w, a, b, c);
-            if (w->form == TERRIMP_FORM_STITCHED)
-                terrimpi_mip_stitch(w, i, j);
         }
 }
 
@@ -3399,9 +3479,9 @@ static void terrimpi_mip_fill_pattern(terrimpi_mip_writer *w)
 {
     uint32_t column, j;
     w->start = w->out;
-    for (column = 0; column < terrimpi_mip_columns(w->quads, w->form); column++) {
-        uint32_t from = terrimpi_mip_column(w->quads, w->form, column);
-        uint32_t to = terrimpi_mip_column(w->quads, w->form, column + 1u);
+    for (column = 0; column < terrimpi_mip_columns(w->quads); column++) {
+        uint32_t from = terrimpi_mip_column(w->quads, column);
+        uint32_t to = terrimpi_mip_column(w->quads, column + 1u);
         if (w->form != TERRIMP_FORM_STRIP) {
             terrimpi_mip_list_column(w, from, to);
             continue;
@@ -3428,180 +3508,38 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
     return TERRIMP_OK;
 }
 
-/* ---- the quadtree ---- */
+/* ---- boxes ---- */
 
-TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
-                                               uint32_t chunk_quads, terrimp_geomip *tree)
+static void terrimpi_mip_box(const terrimp_quadtree *t, const terrimp_node *n, terrimp_box *box)
 {
-    terrimp_geomip t;
-    uint32_t x, z, level;
-    TERRIMPI_REFUSE(!field || !tree, TERRIMP_E_NULL);
-    memset(&t, 0, sizeof t);
-    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &t.field));
-    t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
-    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(t.chunk_quads), TERRIMP_E_RANGE);
-    x = (t.field.width - 2u) / t.chunk_quads + 1u;
-    z = (t.field.depth - 2u) / t.chunk_quads + 1u;
-    for (level = 0;; level++) {
-        TERRIMP_ASSERT(level < TERRIMP_GEOMIP_LEVELS);
-        t.level_x[level] = x;
-        t.level_z[level] = z;
-        t.level_first[level + 1u] = t.level_first[level] + x * z;
-        if (x == 1u && z == 1u)
-            break;
-        x = (x + 1u) / 2u;
-        z = (z + 1u) / 2u;
-    }
-    t.level_count = level + 1u;
-    t.node_count = t.level_first[t.level_count];
-    t.scratch_count = 5u * t.field.width + 2u * (t.chunk_quads + 1u);
-    for (level = 1; level < t.level_count; level++)
-        t.fit_first[level + 1u] =
-            t.fit_first[level] + (((t.field.width - 1u) >> level) + 1u) *
-                                     (((t.field.depth - 1u) >> level) + 1u);
-    t.fit_count = t.fit_first[t.level_count];
-    *tree = t;
-    return TERRIMP_OK;
-}
-
-/* A node by its place. */
-typedef struct terrimpi_mip_place {
-    uint32_t level, x, z;
-} terrimpi_mip_place;
-
-static uint32_t terrimpi_mip_number(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
-{
-    return t->level_first[level] + z * t->level_x[level] + x;
-}
-
-static terrimpi_mip_place terrimpi_mip_place_of(const terrimp_geomip *t, uint32_t node)
-{
-    terrimpi_mip_place p;
-    p.level = 0;
-    while (node >= t->level_first[p.level + 1u])
-        p.level++;
-    node -= t->level_first[p.level];
-    p.x = node % t->level_x[p.level];
-    p.z = node / t->level_x[p.level];
-    return p;
-}
-
-/* The parent of a node that is not the root. */
-static uint32_t terrimpi_mip_parent(const terrimp_geomip *t, uint32_t node)
-{
-    terrimpi_mip_place p = terrimpi_mip_place_of(t, node);
-    return terrimpi_mip_number(t, p.level + 1u, p.x / 2u, p.z / 2u);
-}
-
-/* Column and row of lattice position (i, j) of a level. */
-static uint32_t terrimpi_mip_col(const terrimp_geomip *t, uint32_t level, uint32_t i)
-{
-    uint32_t last = t->field.width - 1u;
-    return i > (last >> level) ? last : i << level;
-}
-
-static uint32_t terrimpi_mip_row(const terrimp_geomip *t, uint32_t level, uint32_t j)
-{
-    uint32_t last = t->field.depth - 1u;
-    return j > (last >> level) ? last : j << level;
-}
-
-/* World x and z of lattice position (i, j) of a level. */
-static float terrimpi_mip_x(const terrimp_geomip *t, uint32_t level, uint32_t i)
-{
-    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_mip_col(t, level, i));
-}
-
-static float terrimpi_mip_z(const terrimp_geomip *t, uint32_t level, uint32_t j)
-{
-    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_mip_row(t, level, j));
-}
-
-static void terrimpi_mip_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
-{
-    const terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, p.level, p.x, p.z)];
-    uint32_t i = p.x * t->chunk_quads, j = p.z * t->chunk_quads;
-    box->min[0] = terrimpi_mip_x(t, p.level, i);
-    box->max[0] = terrimpi_mip_x(t, p.level, i + t->chunk_quads);
-    box->min[1] = node->low;
-    box->max[1] = node->high;
-    box->min[2] = terrimpi_mip_z(t, p.level, j);
-    box->max[2] = terrimpi_mip_z(t, p.level, j + t->chunk_quads);
+    terrimpi_tree_box(t, n, t->nodes[n->number].low, t->nodes[n->number].high, box);
 }
 
 /* The box within which a node's error holds: half a quad larger all round, for what finer
    neighbours draw up to it. */
-static void terrimpi_mip_error_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
+static void terrimpi_mip_error_box(const terrimp_quadtree *t, const terrimp_node *n,
+                                   terrimp_box *box)
 {
-    float half = 0.5f * (float)(1u << p.level);
-    terrimpi_mip_box(t, p, box);
+    float half = 0.5f * (float)(1u << n->level);
+    terrimpi_mip_box(t, n, box);
     box->min[0] -= half * t->field.spacing_x;
     box->max[0] += half * t->field.spacing_x;
     box->min[2] -= half * t->field.spacing_z;
     box->max[2] += half * t->field.spacing_z;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box)
 {
+    terrimp_node n;
     TERRIMPI_REFUSE(!tree || !box || !tree->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    terrimpi_mip_box(tree, terrimpi_mip_place_of(tree, node), box);
+    n = terrimpi_tree_node(tree, node);
+    terrimpi_mip_box(tree, &n, box);
     return TERRIMP_OK;
 }
 
-/* Which of a node's four children is closest to the eye: bit 0 the one farther along x, bit 1 the
-   one farther along z. */
-static uint32_t terrimpi_mip_closest(const terrimp_geomip *t, uint32_t level, uint32_t x,
-                                     uint32_t z, const float eye[3])
-{
-    const terrimp_heightfield *f = &t->field;
-    uint32_t i = terrimpi_mip_col(t, level - 1u, (x * 2u + 1u) * t->chunk_quads);
-    uint32_t j = terrimpi_mip_row(t, level - 1u, (z * 2u + 1u) * t->chunk_quads);
-    return (eye[0] >= terrimpi_line(f->origin_x, f->spacing_x, i) ? 1u : 0u) |
-           (eye[2] >= terrimpi_line(f->origin_z, f->spacing_z, j) ? 2u : 0u);
-}
-
-/* The place next to a node beyond a side; returns 0 where the terrain ends. */
-static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, int side,
-                               terrimpi_mip_place *beyond)
-{
-    uint32_t *across = terrimpi_along_x(side) ? &p.z : &p.x;
-    *across += side & 1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
-    *beyond = p;
-    return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
-}
-
-/* ---- fits ---- */
-
-/* What is minimised is the integral of the squared difference of two surfaces, that of the samples
-   and that of a level. Its normal equations have seven terms each: the products of a vertex's hat
-   function with its own and its six neighbours'. The right-hand sides, here called loads, are the
-   products of the hats with the surface of the samples. As every hat is a sum of hats of the next
-   finer level, so is a load of finer loads. Gauss and Seidel's method then gains a digit in two
-   sweeps.
-
-   Some vertices stay on their samples: those at the terrain's edge, beside which the sums would be
-   special, and those at the corners and half-way points of nodes. A corner is shared with a node
-   that no side is shared with, whose level a pattern does not tell: so it stands where it stands in
-   all levels that can meet there. */
-
-#define TERRIMPI_MIP_SWEEPS 4u
-
-/* Columns of a level's lattice without what is off it at the far edges. */
-static uint32_t terrimpi_mip_cols(const terrimp_geomip *t, uint32_t level)
-{
-    return ((t->field.width - 1u) >> level) + 1u;
-}
-
-/* Height of a level's lattice at sample (x, z), which belongs to that lattice. */
-static float terrimpi_mip_stand(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
-{
-    uint32_t between = (1u << level) - 1u;
-    if (!t->fits || level == 0 || level >= t->level_count || ((x | z) & between) != 0)
-        return terrimpi_sample(&t->field, x, z); /* or at the far edges, off the lattice */
-    return t->fits[t->fit_first[level] + (z >> level) * terrimpi_mip_cols(t, level) + (x >> level)];
-}
+/* ---- heights ---- */
 
 /* Height on the edge from a to b, k of n steps along it; exact at its ends. */
 static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
@@ -3610,12 +3548,12 @@ static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
 }
 
 /* Height of the triangles of a level at a sample. */
-static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
+static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z)
 {
     uint32_t i = x >> level, j = z >> level;
-    uint32_t x0 = terrimpi_mip_col(t, level, i), x1 = terrimpi_mip_col(t, level, i + 1u);
-    uint32_t z0 = terrimpi_mip_row(t, level, j), z1 = terrimpi_mip_row(t, level, j + 1u);
-    float a = terrimpi_mip_stand(t, level, x0, z0), d = terrimpi_mip_stand(t, level, x1, z1);
+    uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
+    uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
+    float a = terrimpi_sample(&t->field, x0, z0), d = terrimpi_sample(&t->field, x1, z1);
     float b, c, u, v;
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
@@ -3624,8 +3562,8 @@ static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32
                                                                   diagonal */
         return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
                          : terrimpi_mip_between(a, d, right, wide);
-    b = terrimpi_mip_stand(t, level, x1, z0);
-    c = terrimpi_mip_stand(t, level, x0, z1);
+    b = terrimpi_sample(&t->field, x1, z0);
+    c = terrimpi_sample(&t->field, x0, z1);
     if (right == 0)
         return terrimpi_mip_between(a, c, down, deep);
     if (down == 0)
@@ -3638,8 +3576,8 @@ static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32
 /* ---- distances ---- */
 
 /* D of one node, squared, before its children have a say. */
-static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint32_t node, int rule,
-                                   float tolerance_px, float pixel_factor)
+static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, uint32_t node,
+                                   int rule, float tolerance_px, float pixel_factor)
 {
     const terrimp_geomip_node *n = &t->nodes[node];
     float d;
@@ -3668,8 +3606,7 @@ static int terrimpi_mip_rule_fits(int rule)
            (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
 }
 
-/* Checks the settings that selection and distances share. */
-static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
+static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
     TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
@@ -3680,8 +3617,8 @@ static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, floa
     return TERRIMP_OK;
 }
 
-/* terrimp_geomip_distances of checked settings. */
-static void terrimpi_mip_distances(const terrimp_geomip *tree, int rule, float tolerance_px,
+/* The distances of all nodes; a parent's are at least what its children ask for. */
+static void terrimpi_mip_distances(const terrimp_quadtree *tree, int rule, float tolerance_px,
                                    float morph_ratio, float pixel_factor, float *distances)
 {
     uint32_t level, node;
@@ -3691,21 +3628,9 @@ static void terrimpi_mip_distances(const terrimp_geomip *tree, int rule, float t
                 terrimpi_mip_distance(tree, level, node, rule, tolerance_px, pixel_factor);
     for (node = 0; node + 1u < tree->node_count; node++) {
         float least = distances[node] * morph_ratio * morph_ratio;
-        float *d = &distances[terrimpi_mip_parent(tree, node)];
+        float *d = &distances[terrimpi_tree_parent_number(tree, node)];
         *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
     }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances)
-{
-    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
-    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
-    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
-    return TERRIMP_OK;
 }
 
 /* ---- selection ---- */
@@ -3715,7 +3640,7 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
    and q the parts of r along and across the horizontal heading, and forward = (heading * level,
    steep), the product's length is sqrt(p^2 + (steep q)^2). */
 typedef struct terrimpi_mip_frame {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
     terrimp_geomip_view *view;
     terrimp_frustum frustum;
     float eye[3], forward[3];
@@ -3725,7 +3650,7 @@ typedef struct terrimpi_mip_frame {
                                   seen there, and across it */
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
-    uint32_t first[TERRIMP_GEOMIP_LEVELS]; /* lists of marks; ends with node_count */
+    uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
 /* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
@@ -3817,18 +3742,18 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 }
 
 /* Square of a node's error over the tolerance, when it is drawn as it is; 0 when it is out of view.
-   *mask: planes to test against, and those that are left for its parts. */
-static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node,
-                                  int *mask)
+   *planes: those to test against, and those that are left for its parts. */
+static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_node *node,
+                                  int *planes)
 {
-    float d2, measure, split2 = f->view->distances[node];
+    float d2, measure, split2 = f->view->distances[node->number];
     terrimp_box box;
     if (!(split2 > 0.0f))
         return 0.0f;
-    terrimpi_mip_error_box(f->tree, p, &box);
-    if (*mask) {
-        *mask = terrimp_frustum_test(&f->frustum, &box, *mask);
-        if (*mask == TERRIMP_PLANES_OUTSIDE)
+    terrimpi_mip_error_box(f->tree, node, &box);
+    if (*planes) {
+        *planes = terrimp_frustum_test(&f->frustum, &box, *planes);
+        if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
     d2 = terrimpi_mip_distance2(&box, f->eye);
@@ -3838,14 +3763,14 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_plac
 }
 
 /* Raises a node's measure, and enters the node into the list of its level. */
-static void terrimpi_mip_raise(terrimpi_mip_frame *f, uint32_t level, uint32_t node, float measure)
+static void terrimpi_mip_raise(terrimpi_mip_frame *f, const terrimp_node *node, float measure)
 {
-    terrimp_geomip_mark *mark = &f->view->marks[node];
+    terrimp_geomip_mark *mark = &f->view->marks[node->number];
     if (mark->frame != f->view->frame) {
         mark->frame = f->view->frame;
         mark->measure = 0.0f;
-        mark->next = f->first[level];
-        f->first[level] = node;
+        mark->next = f->first[node->level];
+        f->first[node->level] = node->number;
     }
     mark->measure = terrimpi_max(mark->measure, measure);
 }
@@ -3857,65 +3782,27 @@ static float terrimpi_mip_marked(const terrimpi_mip_frame *f, uint32_t node)
     return mark->frame == f->view->frame ? mark->measure : 0.0f;
 }
 
-/* A node on its way through the quadtree, and the planes that it still has to be tested against. */
-typedef struct terrimpi_mip_visit {
-    terrimpi_mip_place place;
-    int mask;
-} terrimpi_mip_visit;
-
-/* Enough for a walk that goes down one child and keeps the other three. */
-#define TERRIMPI_MIP_STACK (3u * TERRIMP_GEOMIP_LEVELS + 1u)
-
-/* Begins a walk at the root; returns the depth of the stack. */
-static uint32_t terrimpi_mip_push_root(const terrimp_geomip *t, terrimpi_mip_visit *stack, int mask)
-{
-    stack->place.level = t->level_count - 1u;
-    stack->place.x = stack->place.z = 0;
-    stack->mask = mask;
-    return 1;
-}
-
-/* Pushes the children of a node, `first` (bit 0: x, bit 1: z) last, so that it is visited first. */
-static uint32_t terrimpi_mip_push_children(const terrimp_geomip *t, terrimpi_mip_visit v,
-                                           uint32_t first, terrimpi_mip_visit *stack,
-                                           uint32_t depth)
-{
-    terrimpi_mip_place p = v.place;
-    uint32_t i;
-    v.place.level--;
-    for (i = 4u; i-- > 0;) {
-        v.place.x = p.x * 2u + ((first ^ i) & 1u);
-        v.place.z = p.z * 2u + ((first ^ i) >> 1);
-        if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
-            stack[depth++] = v;
-    }
-    return depth;
-}
-
 /* Marks the nodes whose own error asks for a split, and those that are close to it. Measures never
    grow towards the leaves, so what lies below an unsplit node asks for nothing. What is out of view
    asks for nothing either, unless nodes morph: then a border would jump when one of its nodes
    leaves the view. */
 static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
 {
-    const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
     float stay = 1.0f + f->view->hysteresis;
     float worth = 1.0f / (f->view->morph_ratio * f->view->morph_ratio);
-    uint32_t depth = terrimpi_mip_push_root(t, stack, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
-    while (depth > 0) {
-        terrimpi_mip_visit v = stack[--depth];
-        terrimpi_mip_place p = v.place;
-        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
-        const terrimp_geomip_mark *mark = &f->view->marks[node];
-        float measure = p.level == 0 ? 0.0f : terrimpi_mip_measure(f, p, node, &v.mask);
+    terrimpi_tree_begin(&walk, f->tree, f->eye, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
+    while (terrimpi_tree_next(&walk, &v)) {
+        const terrimp_geomip_mark *mark = &f->view->marks[v.node.number];
+        float measure = v.node.level == 0 ? 0.0f : terrimpi_mip_measure(f, &v.node, &v.planes);
         if (mark->frame == f->view->frame - 1u && mark->measure >= 1.0f && worth >= 1.0f)
             measure *= stay * stay;
         if (measure < worth)
             continue;
-        terrimpi_mip_raise(f, p.level, node, measure);
-        if (measure >= 1.0f && p.level > 1u)
-            depth = terrimpi_mip_push_children(t, v, 0, stack, depth);
+        terrimpi_mip_raise(f, &v.node, measure);
+        if (measure >= 1.0f && v.node.level > 1u)
+            terrimpi_tree_enter(&walk, &v);
     }
 }
 
@@ -3927,31 +3814,30 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
    children, which lets nodes cease to morph before they split. */
 static void terrimpi_mip_balance(terrimpi_mip_frame *f)
 {
-    const terrimp_geomip *t = f->tree;
-    uint32_t level, node;
+    const terrimp_quadtree *t = f->tree;
+    uint32_t level, number;
     int side;
     for (level = 1; level + 1u < t->level_count; level++)
-        for (node = f->first[level]; node != t->node_count; node = f->view->marks[node].next) {
-            terrimpi_mip_place p = terrimpi_mip_place_of(t, node), beyond;
+        for (number = f->first[level]; number != t->node_count;
+             number = f->view->marks[number].next) {
+            terrimp_node node = terrimpi_tree_node(t, number), beyond;
             for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-                if (terrimpi_mip_beyond(t, p, side, &beyond))
-                    terrimpi_mip_raise(f, level + 1u,
-                                       terrimpi_mip_number(t, level + 1u, beyond.x / 2u,
-                                                           beyond.z / 2u),
-                                       f->view->marks[node].measure);
+                if (terrimpi_tree_beyond(t, &node, side, &beyond)) {
+                    terrimp_node parent = terrimpi_tree_parent(t, &beyond);
+                    terrimpi_mip_raise(f, &parent, f->view->marks[number].measure);
+                }
         }
 }
 
 /* How far a node has morphed into the shape of its parent, from the parent's measure: from 1 where
    the parent splits to 0 at morph_ratio times less distance, linear in the distance. */
-static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_place p)
+static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, const terrimp_node *node)
 {
     float ratio = f->view->morph_ratio, measure;
     if (TERRIMPI_MIP_MORPH_MOST <= 1.0f || !(ratio > 1.0f) ||
-        p.level + 1u >= f->tree->level_count)
+        node->level + 1u >= f->tree->level_count)
         return 0.0f;
-    measure = terrimpi_mip_marked(
-        f, terrimpi_mip_number(f->tree, p.level + 1u, p.x / 2u, p.z / 2u));
+    measure = terrimpi_mip_marked(f, terrimpi_tree_parent(f->tree, node).number);
     if (measure >= ratio * ratio)
         return 0.0f;
     return measure > 1.0f ? (ratio / TERRIMP_SQRTF(measure) - 1.0f) / (ratio - 1.0f) : 1.0f;
@@ -3959,48 +3845,42 @@ static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_pla
 
 /* What a node's side needs: whether the neighbour is coarser, and the factors of the border. With a
    neighbour of the same level the larger fraction holds for both; a coarser neighbour dictates. */
-static void terrimpi_mip_side(const terrimpi_mip_frame *f, terrimpi_mip_place p, int side,
-                              terrimp_geomip_draw *draw)
+static void terrimpi_mip_side(const terrimpi_mip_frame *f, int side, terrimp_geomip_draw *draw)
 {
-    const terrimp_geomip *t = f->tree;
-    terrimpi_mip_place beyond, parent;
+    const terrimp_node *node = &draw->node;
+    terrimp_node beyond, parent;
     draw->side[side] = draw->morph;
     draw->side_coarse[side] = 0.0f;
-    if (!terrimpi_mip_beyond(t, p, side, &beyond))
+    if (!terrimpi_tree_beyond(f->tree, node, side, &beyond))
         return;
-    parent.level = p.level + 1u;
-    parent.x = beyond.x / 2u;
-    parent.z = beyond.z / 2u;
-    if (parent.x == p.x / 2u && parent.z == p.z / 2u)
+    parent = terrimpi_tree_parent(f->tree, &beyond);
+    if (parent.x == node->x / 2u && parent.z == node->z / 2u)
         return; /* a sibling, or its children: the same fraction, or 0 */
-    if (terrimpi_mip_marked(f, terrimpi_mip_number(t, parent.level, parent.x, parent.z)) < 1.0f) {
+    if (terrimpi_mip_marked(f, parent.number) < 1.0f) {
         draw->pattern |= 1u << side;
-        draw->side_coarse[side] = terrimpi_mip_fraction(f, parent);
-        draw->side[side] = 1.0f; /* left out, or in stitched patterns on the neighbour's edge */
+        draw->side_coarse[side] = terrimpi_mip_fraction(f, &parent);
+        draw->side[side] = 1.0f; /* they are left out */
     } else {
-        draw->side[side] = terrimpi_max(draw->morph, terrimpi_mip_fraction(f, beyond));
+        draw->side[side] = terrimpi_max(draw->morph, terrimpi_mip_fraction(f, &beyond));
     }
 }
 
-static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node)
+static void terrimpi_mip_emit(terrimpi_mip_frame *f, const terrimp_node *node)
 {
     terrimp_geomip_view *v = f->view;
     terrimp_geomip_draw *draw;
-    int side, whole = 0;
+    int side, planes = 0;
     if (v->draws_needed++ >= v->draw_capacity)
         return;
     draw = &v->draws[v->draws_needed - 1u];
-    draw->node = node;
-    draw->level = p.level;
-    draw->x = p.x;
-    draw->z = p.z;
+    draw->node = *node;
     draw->pattern = 0;
     draw->error_px = 0.0f;
-    if (p.level > 0)
-        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, p, node, &whole));
-    draw->morph = terrimpi_mip_fraction(f, p);
+    if (node->level > 0)
+        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, node, &planes));
+    draw->morph = terrimpi_mip_fraction(f, node);
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        terrimpi_mip_side(f, p, side, draw);
+        terrimpi_mip_side(f, side, draw);
     v->triangle_count += terrimpi_mip_triangles(f->tree->chunk_quads, draw->pattern);
 }
 
@@ -4009,27 +3889,22 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
    and above, was measured and left out: 0.042 against 0.045 ms a frame, which is noise. */
 static void terrimpi_mip_collect(terrimpi_mip_frame *f)
 {
-    const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
-    uint32_t depth = terrimpi_mip_push_root(t, stack, TERRIMP_PLANES_ALL);
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
     f->view->draws_needed = f->view->triangle_count = 0;
-    while (depth > 0) {
-        terrimpi_mip_visit v = stack[--depth];
-        terrimpi_mip_place p = v.place;
-        terrimp_box box;
-        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
-        if (v.mask) {
-            terrimpi_mip_box(t, p, &box);
-            v.mask = terrimp_frustum_test(&f->frustum, &box, v.mask);
-            if (v.mask == TERRIMP_PLANES_OUTSIDE)
+    terrimpi_tree_begin(&walk, f->tree, f->eye, TERRIMP_PLANES_ALL);
+    while (terrimpi_tree_next(&walk, &v)) {
+        if (v.planes) {
+            terrimp_box box;
+            terrimpi_mip_box(f->tree, &v.node, &box);
+            v.planes = terrimp_frustum_test(&f->frustum, &box, v.planes);
+            if (v.planes == TERRIMP_PLANES_OUTSIDE)
                 continue;
         }
-        if (p.level == 0 || terrimpi_mip_marked(f, node) < 1.0f) {
-            terrimpi_mip_emit(f, p, node);
-            continue;
-        }
-        depth = terrimpi_mip_push_children(t, v, terrimpi_mip_closest(t, p.level, p.x, p.z, f->eye),
-                                           stack, depth);
+        if (v.node.level == 0 || terrimpi_mip_marked(f, v.node.number) < 1.0f)
+            terrimpi_mip_emit(f, &v.node);
+        else
+            terrimpi_tree_enter(&walk, &v);
     }
 }
 
@@ -4051,7 +3926,7 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
-static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
+static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
                                                 terrimp_geomip_view *view)
 {
     TERRIMPI_DEFAULT(view->rule, TERRIMP_GEOMIP_PICTURE);
@@ -4064,7 +3939,7 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
 }
 
 /* terrimp_geomip_select with resolved settings and camera. */
-static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_geomip_view *view,
+static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_geomip_view *view,
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
@@ -4089,7 +3964,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_ge
     return TERRIMP_E_CAPACITY;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
+TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera)
 {
@@ -4111,26 +3986,26 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
 /* ---- vertices and morphing ---- */
 
 /* How far a vertex of a level's lattice moves between the levels `from` and `from` + 1 above. */
-static float terrimpi_mip_move(const terrimp_geomip *t, uint32_t level, uint32_t i, uint32_t j,
+static float terrimpi_mip_move(const terrimp_quadtree *t, uint32_t level, uint32_t i, uint32_t j,
                                uint32_t from)
 {
-    uint32_t x = terrimpi_mip_col(t, level, i), z = terrimpi_mip_row(t, level, j);
+    uint32_t x = terrimpi_tree_col(t, level, i), z = terrimpi_tree_row(t, level, j);
     return terrimpi_mip_height(t, level + from + 1u, x, z) -
            terrimpi_mip_height(t, level + from, x, z);
 }
 
 /* The moves of a node's vertex (i, j); (i0, j0) is the node's first one on the lattice. */
-static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_t i0, uint32_t j0,
+static void terrimpi_mip_vertex(const terrimp_quadtree *t, uint32_t level, uint32_t i0, uint32_t j0,
                                 uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
 {
     uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
     int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
-    vertex->height = terrimpi_mip_stand(t, level, terrimpi_mip_col(t, level, i0 + i),
-                                        terrimpi_mip_row(t, level, j0 + j));
+    vertex->height = terrimpi_sample(&t->field, terrimpi_tree_col(t, level, i0 + i),
+                                        terrimpi_tree_row(t, level, j0 + j));
     vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
-    if ((along_x && along_z) || (!odd && !t->fits && (along_x || along_z)))
+    if ((along_x && along_z) || (!odd && (along_x || along_z)))
         vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 1);
-    else if (odd || t->fits)
+    else if (odd)
         vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 0);
     if (!odd)
         return;
@@ -4150,97 +4025,59 @@ static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_
                                     terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
 }
 
-/* Writes one position, and moves on to the next. */
-static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z,
-                                  float **xyz)
-{
-    if (!*xyz)
-        return;
-    (*xyz)[0] = terrimpi_line(t->field.origin_x, t->field.spacing_x, x);
-    (*xyz)[1] = terrimpi_mip_stand(t, level, x, z);
-    (*xyz)[2] = terrimpi_line(t->field.origin_z, t->field.spacing_z, z);
-    *xyz += 3;
-}
-
-/* The vertices of coarse borders: they stand as the neighbour's do, a level further up. */
-static void terrimpi_mip_fill_borders(const terrimp_geomip *t, terrimpi_mip_place p, float *xyz,
-                                      terrimp_geomip_vertex *vertices)
-{
-    uint32_t quads = t->chunk_quads, along;
-    int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        for (along = 2; along < quads; along += 2u) {
-            uint32_t across = side & 1 ? quads : 0u;
-            uint32_t i = p.x * quads + (terrimpi_along_x(side) ? along : across);
-            uint32_t j = p.z * quads + (terrimpi_along_x(side) ? across : along);
-            uint32_t x = terrimpi_mip_col(t, p.level, i), z = terrimpi_mip_row(t, p.level, j);
-            terrimpi_mip_position(t, p.level + 1u, x, z, &xyz);
-            if (!vertices)
-                continue;
-            vertices->height = terrimpi_mip_stand(t, p.level + 1u, x, z);
-            vertices->move = terrimpi_mip_move(t, p.level, i, j, 1);
-            vertices->beside[0] = vertices->beside[1] = 0.0f;
-            vertices++;
-        }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices)
 {
-    terrimpi_mip_place p;
+    terrimp_node n;
     uint32_t i, j, i0, j0;
     TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    p = terrimpi_mip_place_of(tree, node);
-    i0 = p.x * tree->chunk_quads;
-    j0 = p.z * tree->chunk_quads;
+    n = terrimpi_tree_node(tree, node);
+    i0 = n.x * tree->chunk_quads;
+    j0 = n.z * tree->chunk_quads;
     for (j = 0; j <= tree->chunk_quads; j++)
         for (i = 0; i <= tree->chunk_quads; i++) {
-            terrimpi_mip_position(tree, p.level, terrimpi_mip_col(tree, p.level, i0 + i),
-                                  terrimpi_mip_row(tree, p.level, j0 + j), &xyz);
+            if (xyz) {
+                *xyz++ = terrimpi_tree_x(tree, n.level, i0 + i);
+                *xyz++ = terrimpi_sample(&tree->field, terrimpi_tree_col(tree, n.level, i0 + i),
+                                         terrimpi_tree_row(tree, n.level, j0 + j));
+                *xyz++ = terrimpi_tree_z(tree, n.level, j0 + j);
+            }
             if (vertices)
-                terrimpi_mip_vertex(tree, p.level, i0, j0, i, j, vertices++);
+                terrimpi_mip_vertex(tree, n.level, i0, j0, i, j, vertices++);
         }
-    if (tree->fits)
-        terrimpi_mip_fill_borders(tree, p, xyz, vertices);
     return TERRIMP_OK;
 }
 
-/* The weights of vertex k, of the grid or of a coarse border. With fits every vertex moves to the
-   parent's shape, without them only odd ones do. */
-static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
+/* The weights of vertex k: odd vertices move to the parent's shape. */
+static void terrimpi_mip_weights(uint32_t quads, uint32_t k, terrimp_geomip_weights *w)
 {
     uint32_t row = quads + 1u, i = k % row, j = k / row, from[TERRIMP_SIDE_COUNT], side;
-    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED;
-    int corner = (i == 0 || i == quads) && (j == 0 || j == quads);
+    uint8_t odd = (i | j) & 1u;
     memset(w, 0, sizeof *w);
-    if (k >= row * row) {
-        w->even[(k - row * row) / terrimpi_mip_border_vertices(quads)] = 1;
-        return;
-    }
     from[TERRIMP_SIDE_Z0] = j;
     from[TERRIMP_SIDE_Z1] = quads - j;
     from[TERRIMP_SIDE_X0] = i;
     from[TERRIMP_SIDE_X1] = quads - i;
-    w->self = odd || fitted;
+    w->self = odd;
     for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
         w->beside[side] = from[side] == 1u || (from[side] == 0 && odd);
         if (from[side] > 0)
             continue;
-        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
+        (odd ? w->odd : w->even)[side] = 1;
         w->self = 0;
     }
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
                                                        terrimp_geomip_weights *weights)
 {
-    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
+    uint32_t k;
     TERRIMPI_REFUSE(!weights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
-    for (k = 0; k < count; k++)
-        terrimpi_mip_weights(chunk_quads, form, k, &weights[k]);
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(chunk_quads), TERRIMP_E_RANGE);
+    for (k = 0; k < (chunk_quads + 1u) * (chunk_quads + 1u); k++)
+        terrimpi_mip_weights(chunk_quads, k, &weights[k]);
     return TERRIMP_OK;
 }
 
@@ -4250,19 +4087,19 @@ static float terrimpi_mip_dot4(const uint8_t weight[4], const float factor[4])
            (float)weight[2] * factor[2] + (float)weight[3] * factor[3];
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride)
 {
-    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
+    uint32_t k;
     TERRIMPI_REFUSE(!draw || !vertices || !heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0 || stride == 0, TERRIMP_E_RANGE);
-    for (k = 0; k < count; k++, vertices++, heights += stride) {
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(chunk_quads) || stride == 0, TERRIMP_E_RANGE);
+    for (k = 0; k < (chunk_quads + 1u) * (chunk_quads + 1u); k++, vertices++, heights += stride) {
         const float *coarse = draw->side_coarse;
         terrimp_geomip_weights w;
         float factor, along_z, along_x;
-        terrimpi_mip_weights(chunk_quads, form, k, &w);
+        terrimpi_mip_weights(chunk_quads, k, &w);
         factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
                  terrimpi_mip_dot4(w.even, coarse);
         along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
@@ -4279,6 +4116,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
 /* Based on: Hess 2010, sections 3.3 to 3.5 and 6.2. */
 
 #define TERRIMPI_SPLITS 24u /* places of a split that are tried */
+#define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
 #define TERRIMPI_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
@@ -4500,95 +4338,79 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t count,
-                                                const float eye[3], float distance,
-                                                float max_angle_rad, float speed,
-                                                float *captures_per_s)
-{
-    float rate = 0.0f, seconds;
-    size_t i;
-    TERRIMPI_REFUSE((count && !boxes) || !eye || !captures_per_s, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(terrimpi_finite(distance) && !(distance > 0.0f), TERRIMP_E_RANGE);
-    for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
-        float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
-        TERRIMPI_TRY(terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds));
-        TERRIMPI_REFUSE(!(seconds > 0.0f) && i == count, TERRIMP_E_RANGE);
-        if (i < count && to_box >= distance)
-            rate += 1.0f / seconds;
-    }
-    *captures_per_s = rate;
-    return TERRIMP_OK;
-}
+/* A mesh as the eye of a capture sees it: for each of a few cells of the picture the closest
+   triangle that faces the eye, and 1 / depth there. A point is (across, up, 1 / depth), the first
+   two in cells: planes stay planes, and an eye that moves by r moves a point by r / depth. */
+typedef struct terrimpi_split_map {
+    const terrimp_capture *capture;
+    const float *xyz;
+    const uint16_t *indices;
+    float low[2], cells[2]; /* first edge of the cells; cells for one unit at depth 1 */
+    float closest[TERRIMPI_SPLIT_CELLS][TERRIMPI_SPLIT_CELLS]; /* 0: there is none */
+    uint16_t own[TERRIMPI_SPLIT_CELLS][TERRIMPI_SPLIT_CELLS];  /* first index of its triangle */
+} terrimpi_split_map;
 
-/* Where the way `to` from the origin passes through a triangle: the fraction of the way, or 1 when
-   it does not. */
-static float terrimpi_hidden_at(const float to[3], const float a[3], const float b[3],
-                                const float c[3])
-{
-    float ab[3], ac[3], p[3], q[3], det, u, v, t;
-    terrimpi_sub(b, a, ab);
-    terrimpi_sub(c, a, ac);
-    terrimpi_cross(to, ac, p);
-    det = terrimpi_dot(ab, p);
-    if (!(terrimpi_abs(det) > 0.0f))
-        return 1.0f;
-    u = -terrimpi_dot(a, p) / det;
-    if (!(u >= 0.0f && u <= 1.0f))
-        return 1.0f;
-    terrimpi_cross(a, ab, q); /* of the origin minus a, and ab, with the sign turned */
-    v = -terrimpi_dot(to, q) / det;
-    if (!(v >= 0.0f && u + v <= 1.0f))
-        return 1.0f;
-    t = -terrimpi_dot(ac, q) / det;
-    return t > 0.0f && t < 1.0f ? t : 1.0f;
-}
-
-/* The fraction of the way from an eye to a point of triangle `own` at which another triangle first
-   hides it, or 1. */
-static float terrimpi_first_hit(const float eye[3], const float point[3], const float *xyz,
-                                const uint16_t *indices, uint32_t index_count, uint32_t own)
-{
-    float first = 1.0f, to[3], corner[3][3];
-    const uint16_t *t;
-    int k;
-    terrimpi_sub(point, eye, to);
-    for (t = indices; t < indices + index_count; t += 3) {
-        if (t == indices + own)
-            continue;
-        for (k = 0; k < 3; k++)
-            terrimpi_sub(xyz + t[k] * 3u, eye, corner[k]);
-        first = terrimpi_min(first, terrimpi_hidden_at(to, corner[0], corner[1], corner[2]));
-    }
-    return first;
-}
-
-/* How far a vertex lies in front of the eye of a capture. */
-static float terrimpi_depth(const terrimp_capture *capture, const float xyz[3])
+static void terrimpi_split_point(const terrimpi_split_map *m, const float xyz[3], float p[3])
 {
     float to[3];
-    terrimpi_sub(xyz, capture->eye, to);
-    return terrimpi_dot(to, capture->forward);
+    terrimpi_sub(xyz, m->capture->eye, to);
+    p[2] = 1.0f / terrimpi_max(terrimpi_dot(to, m->capture->forward), 1e-20f);
+    p[0] = (terrimpi_dot(to, m->capture->right) * p[2] - m->low[0]) * m->cells[0];
+    p[1] = (terrimpi_dot(to, m->capture->up) * p[2] - m->low[1]) * m->cells[1];
 }
 
-/* The middle of a triangle, and how large an eye sees it: 0 from behind. The solid angle, but for a
-   factor that all triangles share. */
-static float terrimpi_triangle_seen(const float eye[3], const float *xyz, const uint16_t *corners,
-                                    float middle[3])
+static void terrimpi_split_corners(const terrimpi_split_map *m, uint32_t first, float p[3][3])
 {
-    float ab[3], ac[3], to[3], normal[3], distance, facing;
-    int i;
-    for (i = 0; i < 3; i++) {
-        const float a = xyz[corners[0] * 3u + (uint32_t)i];
-        ab[i] = xyz[corners[1] * 3u + (uint32_t)i] - a;
-        ac[i] = xyz[corners[2] * 3u + (uint32_t)i] - a;
-        middle[i] = a + (ab[i] + ac[i]) * (1.0f / 3.0f);
-        to[i] = middle[i] - eye[i];
-    }
-    terrimpi_cross(ab, ac, normal);
-    distance = terrimpi_length(to);
-    facing = -terrimpi_dot(normal, to);
-    return facing > 0.0f && distance > 0.0f ? facing / (distance * distance * distance) : 0.0f;
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        terrimpi_split_point(m, m->xyz + m->indices[first + i] * 3u, p[i]);
+}
+
+/* Twice the area of a triangle of the picture, less than 0 when it is seen from behind, for an eye
+   that has moved by so many cells at depth 1. */
+static float terrimpi_split_area(float p[3][3], float move_x, float move_y)
+{
+    float w1 = p[1][2] - p[0][2], w2 = p[2][2] - p[0][2];
+    return (p[1][0] - p[0][0] - move_x * w1) * (p[2][1] - p[0][1] - move_y * w2) -
+           (p[2][0] - p[0][0] - move_x * w2) * (p[1][1] - p[0][1] - move_y * w1);
+}
+
+/* 1 / depth of a triangle's plane at a place of the picture; sets *inside to less than 0 where that
+   is not in the triangle. `area` is that of the triangle. */
+static float terrimpi_split_plane(float p[3][3], float area, float x, float y, float *inside)
+{
+    float a = (p[1][0] - x) * (p[2][1] - y) - (p[2][0] - x) * (p[1][1] - y);
+    float b = (p[2][0] - x) * (p[0][1] - y) - (p[0][0] - x) * (p[2][1] - y);
+    *inside = terrimpi_min(terrimpi_min(a, b), area - a - b);
+    return p[2][2] + (a * (p[0][2] - p[2][2]) + b * (p[1][2] - p[2][2])) / area;
+}
+
+/* The cells whose middles lie within low..high. */
+static void terrimpi_split_range(float a, float b, float c, int *low, int *high)
+{
+    const float last = (float)TERRIMPI_SPLIT_CELLS;
+    *low = (int)terrimpi_clamp(terrimpi_min(a, terrimpi_min(b, c)) + 0.5f, 0.0f, last);
+    *high = (int)terrimpi_clamp(terrimpi_max(a, terrimpi_max(b, c)) + 0.5f, 0.0f, last);
+}
+
+/* Enters a triangle into the cells that it is the closest in. */
+static void terrimpi_split_draw(terrimpi_split_map *m, uint32_t first, float p[3][3])
+{
+    float area = terrimpi_split_area(p, 0.0f, 0.0f);
+    int x, y, x0, x1, y0, y1;
+    if (!(area > 0.0f))
+        return;
+    terrimpi_split_range(p[0][0], p[1][0], p[2][0], &x0, &x1);
+    terrimpi_split_range(p[0][1], p[1][1], p[2][1], &y0, &y1);
+    for (y = y0; y < y1; y++)
+        for (x = x0; x < x1; x++) {
+            float inside, w;
+            w = terrimpi_split_plane(p, area, (float)x + 0.5f, (float)y + 0.5f, &inside);
+            if (inside >= 0.0f && w > m->closest[y][x]) {
+                m->closest[y][x] = w;
+                m->own[y][x] = (uint16_t)first;
+            }
+        }
 }
 
 /* Sums over a mesh as the moved eyes see it. */
@@ -4598,28 +4420,60 @@ typedef struct terrimpi_smear {
     float saved[TERRIMPI_SPLITS]; /* ... and that a split would spare */
 } terrimpi_smear;
 
-/* Adds the triangle whose indices begin at `own`. Places of a split: first + (k + 1) * step. */
-static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
-                               const uint16_t *indices, uint32_t index_count, uint32_t own,
-                               float reach, float overlap, float first, float step,
-                               terrimpi_smear *smear)
+/* Whether a point that is hidden at cell (x, y) still is after the eye has moved towards larger x
+   (or y, or smaller x), by `move` cells at depth 1. What hides it stretches up to a crest, some
+   cells in that direction, and moves by more than the point does. */
+static int terrimpi_split_still(const terrimpi_split_map *m, int x, int y, int step_x, int step_y,
+                                float move, float w)
 {
-    float middle[3], eye[3], size, hit = -1.0f, depth = 0.0f, weight;
-    uint32_t i, k, way;
-    for (way = 0; way < 3u; way++) {
-        const float *axis = way == 0 ? capture->up : capture->right;
-        for (i = 0; i < 3u; i++)
-            eye[i] = capture->eye[i] + axis[i] * (way == 2u ? -reach : reach);
-        size = terrimpi_triangle_seen(eye, xyz, indices + own, middle);
-        smear->seen += size;
-        if (!(size > 0.0f) || hit > TERRIMPI_IN_SIGHT)
+    float away = 0.5f;
+    while (x >= 0 && x < TERRIMPI_SPLIT_CELLS && y < TERRIMPI_SPLIT_CELLS &&
+           m->closest[y][x] * TERRIMPI_IN_SIGHT > w) {
+        if (away >= move * (m->closest[y][x] - w))
+            return 1;
+        away += 1.0f;
+        x += step_x;
+        y += step_y;
+    }
+    return 0;
+}
+
+/* The part of the way to a point of cell (x, y) after which something hides it, or 1. */
+static float terrimpi_split_hit(const terrimpi_split_map *m, int x, int y, const float point[3])
+{
+    float p[3][3], inside, w;
+    if (!(m->closest[y][x] * TERRIMPI_IN_SIGHT > point[2]))
+        return 1.0f;
+    terrimpi_split_corners(m, m->own[y][x], p);
+    w = terrimpi_split_plane(p, terrimpi_split_area(p, 0.0f, 0.0f), point[0], point[1], &inside);
+    return w > point[2] ? point[2] / w : 1.0f;
+}
+
+/* Adds a triangle, for eyes that have moved up, right and left. Places of a split: first + (k + 1)
+   * step. */
+static void terrimpi_split_add(const terrimpi_split_map *m, float p[3][3], float reach,
+                               float overlap, float first, float step, terrimpi_smear *smear)
+{
+    static const int ways[3][2] = { { 0, 1 }, { 1, 0 }, { -1, 0 } };
+    const float last = (float)(TERRIMPI_SPLIT_CELLS - 1);
+    float middle[3], hit, depth;
+    int x, y, way;
+    uint32_t k;
+    for (k = 0; k < 3u; k++)
+        middle[k] = (p[0][k] + p[1][k] + p[2][k]) * (1.0f / 3.0f);
+    x = (int)terrimpi_clamp(middle[0], 0.0f, last);
+    y = (int)terrimpi_clamp(middle[1], 0.0f, last);
+    hit = terrimpi_split_hit(m, x, y, middle);
+    depth = 1.0f / middle[2];
+    for (way = 0; way < 3; way++) {
+        int up = ways[way][1];
+        float size = terrimpi_split_area(p, (float)ways[way][0] * reach * m->cells[0],
+                                         (float)up * reach * m->cells[1]), weight;
+        if (!(size > 0.0f))
             continue;
-        if (hit < 0.0f) {
-            hit = terrimpi_first_hit(capture->eye, middle, xyz, indices, index_count, own);
-            depth = terrimpi_depth(capture, middle);
-        }
+        smear->seen += size;
         if (hit > TERRIMPI_IN_SIGHT ||
-            terrimpi_first_hit(eye, middle, xyz, indices, index_count, own) < TERRIMPI_IN_SIGHT)
+            terrimpi_split_still(m, x, y, ways[way][0], up, reach * m->cells[up], middle[2]))
             continue;
         weight = size * (1.0f - hit) * (1.0f - hit);
         smear->all += weight;
@@ -4631,25 +4485,55 @@ static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
     }
 }
 
+/* Sets the cells over all vertices; they lie between the depths 1 / *w_most and 1 / *w_least. */
+static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, float *w_least,
+                               float *w_most)
+{
+    float low[3], high[3], p[3];
+    uint32_t i, k;
+    memset(m->closest, 0, sizeof m->closest);
+    m->low[0] = m->low[1] = 0.0f;
+    m->cells[0] = m->cells[1] = 1.0f;
+    for (i = 0; i < vertex_count; i++) {
+        terrimpi_split_point(m, m->xyz + i * 3u, p);
+        for (k = 0; k < 3u; k++) {
+            low[k] = i == 0 ? p[k] : terrimpi_min(low[k], p[k]);
+            high[k] = i == 0 ? p[k] : terrimpi_max(high[k], p[k]);
+        }
+    }
+    for (k = 0; k < 2u; k++) {
+        m->low[k] = low[k];
+        m->cells[k] = (float)TERRIMPI_SPLIT_CELLS / terrimpi_max(high[k] - low[k], 1e-20f);
+    }
+    *w_least = low[2];
+    *w_most = high[2];
+}
+
 /* terrimp_capture_split of checked arguments. */
 static void terrimpi_capture_split(const terrimp_capture *capture, const float *xyz,
                                    uint32_t vertex_count, const uint16_t *indices,
                                    uint32_t index_count, float reach, float overlap,
                                    terrimp_split *split)
 {
-    float first = TERRIMPI_FLOAT_MAX, last = 0.0f, step;
+    float first, step, w_least, w_most, p[3][3];
     uint32_t i, k, best = 0;
+    terrimpi_split_map map;
     terrimpi_smear smear;
-    for (i = 0; i < vertex_count; i++) {
-        float depth = terrimpi_depth(capture, xyz + i * 3u);
-        first = terrimpi_min(first, depth);
-        last = terrimpi_max(last, depth);
+    map.capture = capture;
+    map.xyz = xyz;
+    map.indices = indices;
+    terrimpi_split_aim(&map, vertex_count, &w_least, &w_most);
+    first = 1.0f / w_most;
+    step = (1.0f / w_least - first) / (float)(TERRIMPI_SPLITS + 1u);
+    for (i = 0; i < index_count; i += 3u) {
+        terrimpi_split_corners(&map, i, p);
+        terrimpi_split_draw(&map, i, p);
     }
-    step = (last - first) / (float)(TERRIMPI_SPLITS + 1u);
     memset(&smear, 0, sizeof smear);
-    for (i = 0; i < index_count; i += 3u)
-        terrimpi_add_smear(capture, xyz, indices, index_count, i, reach, overlap, first, step,
-                           &smear);
+    for (i = 0; i < index_count; i += 3u) {
+        terrimpi_split_corners(&map, i, p);
+        terrimpi_split_add(&map, p, reach, overlap, first, step, &smear);
+    }
     for (k = 1; k < TERRIMPI_SPLITS; k++)
         if (smear.saved[k] > smear.saved[best])
             best = k;
@@ -5501,7 +5385,7 @@ struct terrimp_terrain {
     terrimpi_point *points;                /* [node_count][vertex_limit] */
     uint8_t *corners;                      /* [node_count][index_limit] indices of the surface */
     terrimp_terrain_desc desc; /* resolved */
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;           /* of create; release is NULL otherwise */
     size_t bytes;
@@ -5538,7 +5422,7 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     TERRIMPI_DEFAULT(d.triangle_budget, TERRIMP_TRIANGLE_BUDGET);
     TERRIMPI_DEFAULT(d.proud, 1.0f);
     d.proud = d.not_proud ? 0.0f : d.proud;
-    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) ||
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(d.chunk_quads) ||
                     !terrimpi_within_u32(d.triangle_budget, 32u, 400u) ||
                     !terrimpi_within(d.proud, 0.0f, 1.0f) || d.height_low > d.height_high,
                     TERRIMP_E_RANGE);
@@ -5575,7 +5459,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
     uint32_t budget = t->desc.triangle_budget, skirts;
     int ok = 1;
     skirts = (t->desc.no_lower_skirts ? 0u : 1u) + (t->desc.upper_skirts ? 1u : 0u);
-    terrimp_geomip_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
+    terrimp_quadtree_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
     /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices in all. */
     t->border_limit = 4u * (terrimpi_border_points(budget) + 1u);
     t->vertex_limit = (budget + t->border_limit + 2u) / 2u;
@@ -5622,14 +5506,14 @@ typedef struct terrimpi_patch {
 
 static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 {
-    terrimpi_mip_place place = terrimpi_mip_place_of(&t->tree, node);
+    terrimp_node place = terrimpi_tree_node(&t->tree, node);
     uint32_t quads = t->desc.chunk_quads;
     terrimpi_patch p;
     p.level = place.level;
-    p.x = terrimpi_mip_col(&t->tree, p.level, place.x * quads);
-    p.z = terrimpi_mip_row(&t->tree, p.level, place.z * quads);
-    p.span_x = terrimpi_mip_col(&t->tree, p.level, (place.x + 1u) * quads) - p.x;
-    p.span_z = terrimpi_mip_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
+    p.x = terrimpi_tree_col(&t->tree, p.level, place.x * quads);
+    p.z = terrimpi_tree_row(&t->tree, p.level, place.z * quads);
+    p.span_x = terrimpi_tree_col(&t->tree, p.level, (place.x + 1u) * quads) - p.x;
+    p.span_z = terrimpi_tree_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
     p.cols = ((p.span_x - 1u) >> p.level) + 2u;
     p.rows = ((p.span_z - 1u) >> p.level) + 2u;
     return p;
@@ -5649,12 +5533,12 @@ static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
-    return terrimpi_mip_x(&t->tree, 0, column);
+    return terrimpi_tree_x(&t->tree, 0, column);
 }
 
 static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
 {
-    return terrimpi_mip_z(&t->tree, 0, row);
+    return terrimpi_tree_z(&t->tree, 0, row);
 }
 
 /* The height that a number of steps stands for. */
@@ -5683,27 +5567,20 @@ static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32
     return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
-/* The box of node (x, z) of a level: of everything drawn of it and of those below it. */
-static void terrimpi_node_box(const terrimp_terrain *t, uint32_t level, uint32_t x, uint32_t z,
-                              terrimp_box *box)
+/* The box of a node: of everything drawn of it and of those below it. */
+static void terrimpi_node_box(const terrimp_terrain *t, const terrimp_node *node, terrimp_box *box)
 {
-    const terrimpi_mesh *mesh = &t->meshes[terrimpi_mip_number(&t->tree, level, x, z)];
-    terrimpi_mip_place p;
-    p.level = level;
-    p.x = x;
-    p.z = z;
-    terrimpi_mip_box(&t->tree, p, box);
-    box->min[1] = mesh->low;
-    box->max[1] = mesh->high;
+    const terrimpi_mesh *mesh = &t->meshes[node->number];
+    terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box)
 {
-    terrimpi_mip_place place;
+    terrimp_node place;
     TERRIMPI_TRY(terrimpi_check_node(terrain, node, box));
-    place = terrimpi_mip_place_of(&terrain->tree, node);
-    terrimpi_node_box(terrain, place.level, place.x, place.z, box);
+    place = terrimpi_tree_node(&terrain->tree, node);
+    terrimpi_node_box(terrain, &place, box);
     return TERRIMP_OK;
 }
 
@@ -5791,7 +5668,7 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
         terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++)
-                *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
+                *nodes++ = terrimpi_tree_at(&terrain->tree, level, x, z).number;
     }
     return TERRIMP_OK;
 }
@@ -5889,7 +5766,8 @@ static void terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p, uint32
 TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terrain,
                                                     terrimp_terrain_info *info)
 {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
+    terrimp_node root;
     uint32_t quads;
     TERRIMPI_REFUSE(!terrain || !info, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
@@ -5909,7 +5787,8 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->mesh_index_count = tree->node_count * terrain->index_stride +
                              terrimpi_floor_indices(terrain);
     info->mesh_triangle_count = terrain->mesh_triangle_count;
-    terrimpi_node_box(terrain, tree->level_count - 1u, 0, 0, &info->box);
+    root = terrimpi_tree_root(tree);
+    terrimpi_node_box(terrain, &root, &info->box);
     return TERRIMP_OK;
 }
 
@@ -6351,7 +6230,8 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
 /* Whether a node is held by its parent. */
 static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
-    uint32_t parent = node + 1u < t->tree.node_count ? terrimpi_mip_parent(&t->tree, node) : node;
+    uint32_t parent =
+        node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
     const terrimp_geomip_node *c = &t->tree.nodes[node], *p = &t->tree.nodes[parent];
     return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
            t->meshes[node].low >= t->meshes[parent].low &&
@@ -6549,11 +6429,8 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #endif
 #define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
-
-/* A node and where it stands. */
-typedef struct terrimpi_site {
-    uint32_t node, level, x, z;
-} terrimpi_site;
+#define TERRIMPI_SPLIT_OVERLAP 0.6f /* ... unless the parts overlap in so much of their depth: then
+                                       19 of 20 splits would spare too little (seven flights) */
 
 /* A slot of an atlas. */
 typedef struct terrimpi_seat {
@@ -6576,7 +6453,7 @@ typedef struct terrimpi_record {
 
 /* An impostor that would be good to have. */
 typedef struct terrimpi_want {
-    terrimpi_site site;
+    terrimp_node site;
     float closest;    /* [wu] from the eye to its box */
     float pixels;     /* that it covers, about */
     float urgency;    /* error of its picture over the tolerance */
@@ -6588,7 +6465,7 @@ typedef struct terrimpi_want {
 
 /* A part of the frame: see above. */
 typedef struct terrimpi_unit {
-    terrimpi_site site;
+    terrimp_node site;
     float closest;
     uint32_t first_leaf, leaf_count;
     uint32_t first_want, want_count; /* want_count 0: ground is all it can be */
@@ -6596,7 +6473,7 @@ typedef struct terrimpi_unit {
 
 /* A capture of this frame. Its cells are the source nodes of the picture and those around. */
 typedef struct terrimpi_job {
-    terrimpi_site site;
+    terrimp_node site;
     uint32_t record;
     uint32_t part_count;
     terrimpi_seat parts[TERRIMPI_PARTS];
@@ -6822,45 +6699,20 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 
 /* ---- places in the quadtree ---- */
 
-static terrimpi_site terrimpi_site_at(const terrimp_geomip *tree, uint32_t level, uint32_t x,
-                                      uint32_t z)
-{
-    terrimpi_site s;
-    s.level = level;
-    s.x = x;
-    s.z = z;
-    s.node = tree->level_first[level] + z * tree->level_x[level] + x;
-    return s;
-}
-
-static terrimpi_site terrimpi_site_of(const terrimp_geomip *tree, uint32_t node)
-{
-    terrimpi_mip_place p = terrimpi_mip_place_of(tree, node);
-    return terrimpi_site_at(tree, p.level, p.x, p.z);
-}
-
 /* The children of a node, nearest to the eye first. Returns how many there are. */
-static uint32_t terrimpi_children(const terrimp_view *v, const terrimpi_site *s,
-                                  terrimpi_site children[4])
+static uint32_t terrimpi_children(const terrimp_view *v, const terrimp_node *s,
+                                  terrimp_node children[4])
 {
-    const terrimp_geomip *tree = &v->terrain->tree;
-    uint32_t level = s->level - 1u, count = 0, i;
-    uint32_t closest = terrimpi_mip_closest(tree, s->level, s->x, s->z, v->camera.eye);
-    for (i = 0; i < 4u; i++) {
-        uint32_t child = closest ^ i, x = s->x * 2u + (child & 1u), z = s->z * 2u + (child >> 1);
-        if (x < tree->level_x[level] && z < tree->level_z[level])
-            children[count++] = terrimpi_site_at(tree, level, x, z);
-    }
-    return count;
+    return terrimpi_tree_children(&v->terrain->tree, s, v->camera.eye, children);
 }
 
-static void terrimpi_site_box(const terrimp_view *v, const terrimpi_site *s, terrimp_box *box)
+static void terrimpi_site_box(const terrimp_view *v, const terrimp_node *s, terrimp_box *box)
 {
-    terrimpi_node_box(v->terrain, s->level, s->x, s->z, box);
+    terrimpi_node_box(v->terrain, s, box);
 }
 
 /* A node's box, and which of the planes in `mask` its parts have to be tested against. */
-static int terrimpi_sight(const terrimp_view *v, const terrimpi_site *s, int mask, terrimp_box *box)
+static int terrimpi_sight(const terrimp_view *v, const terrimp_node *s, int mask, terrimp_box *box)
 {
     terrimpi_site_box(v, s, box);
     return mask ? terrimp_frustum_test(&v->frustum, box, mask) : 0;
@@ -6868,12 +6720,12 @@ static int terrimpi_sight(const terrimp_view *v, const terrimpi_site *s, int mas
 
 /* Does something with a node, of which the planes in `mask` may cut a part off, and goes on to its
    children. Returns 0 to end the walk. */
-typedef int (*terrimpi_visit)(terrimp_view *v, const terrimpi_site *s, int mask);
+typedef int (*terrimpi_visit)(terrimp_view *v, const terrimp_node *s, int mask);
 
-static int terrimpi_visit_children(terrimp_view *v, const terrimpi_site *s, int mask,
+static int terrimpi_visit_children(terrimp_view *v, const terrimp_node *s, int mask,
                                    terrimpi_visit visit)
 {
-    terrimpi_site children[4];
+    terrimp_node children[4];
     uint32_t i, count = s->level > 0 ? terrimpi_children(v, s, children) : 0;
     for (i = 0; i < count; i++)
         if (!visit(v, &children[i], mask))
@@ -6884,8 +6736,7 @@ static int terrimpi_visit_children(terrimp_view *v, const terrimpi_site *s, int 
 /* Visits the root. */
 static void terrimpi_visit_tree(terrimp_view *v, terrimpi_visit visit)
 {
-    terrimpi_site root = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u,
-                                          0, 0);
+    terrimp_node root = terrimpi_tree_root(&v->terrain->tree);
     visit(v, &root, TERRIMP_PLANES_ALL);
 }
 
@@ -7022,7 +6873,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows)
 {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
     uint32_t i;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     tree = &view->terrain->tree;
@@ -7033,11 +6884,11 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     terrimpi_cancel_jobs(view);
     view->outdated = 1;
     for (i = 0; i < view->desc.max_impostors; i++) {
-        terrimpi_site s;
+        terrimp_node s;
         uint32_t quads, reach;
         if (view->records[i].seen == 0)
             continue;
-        s = terrimpi_site_of(tree, view->records[i].node);
+        s = terrimpi_tree_node(tree, view->records[i].node);
         quads = view->terrain->desc.chunk_quads << s.level;
         reach = quads; /* the border in the picture is at most the node's neighbours */
         if (x <= (s.x + 1u) * quads + reach && x + cols + reach > s.x * quads &&
@@ -7051,7 +6902,7 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 
 /* Counts the chunks in sight in draws_needed, and lists the first draw_count of them, front to
    back, at full resolution. */
-static int terrimpi_visit_chunks(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_visit_chunks(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimp_geomip_view *g = &v->ground;
     terrimp_box box;
@@ -7061,9 +6912,7 @@ static int terrimpi_visit_chunks(terrimp_view *v, const terrimpi_site *s, int ma
     if (s->level == 0 && g->draws_needed++ < g->draw_count) {
         terrimp_geomip_draw *draw = &g->draws[g->draws_needed - 1u];
         memset(draw, 0, sizeof *draw);
-        draw->node = s->node;
-        draw->x = s->x;
-        draw->z = s->z;
+        draw->node = *s;
     }
     return terrimpi_visit_children(v, s, mask, terrimpi_visit_chunks);
 }
@@ -7105,7 +6954,7 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
         }
     }
     for (i = 0; i < v->ground.draw_count; i++)
-        v->leaf_at[v->ground.draws[i].node] = i;
+        v->leaf_at[v->ground.draws[i].node.number] = i;
     return TERRIMP_OK;
 }
 
@@ -7113,14 +6962,15 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
 static uint32_t terrimpi_leaf(const terrimp_view *v, uint32_t node)
 {
     uint32_t i = v->leaf_at[node];
-    return i < v->ground.draw_count && v->ground.draws[i].node == node ? i : TERRIMPI_NO_LEAF;
+    return i < v->ground.draw_count && v->ground.draws[i].node.number == node ? i
+                                                                              : TERRIMPI_NO_LEAF;
 }
 
 /* ---- the impostor cut and the units ---- */
 
 /* Whether a node is where the impostor cut runs: far enough away, and small enough on the screen.
    A node that has a picture keeps its place for a little longer. */
-static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float closest)
+static int terrimpi_wanted(const terrimp_view *v, const terrimp_node *s, float closest)
 {
     const terrimp_heightfield *field = &v->terrain->desc.field;
     float side, sides = terrimpi_max(2.0f, v->pixel_factor / v->desc.impostor_px);
@@ -7132,16 +6982,16 @@ static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float 
         return 0;
     side = (float)(v->terrain->desc.chunk_quads << s->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (v->record_of[s->node] != TERRIMPI_NO_RECORD)
+    if (v->record_of[s->number] != TERRIMPI_NO_RECORD)
         side /= 1.15f;
     return closest >= sides * side;
 }
 
 /* Adds the ground draws below a node to the last unit. */
-static int terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_gather_leaves(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimp_box box;
-    uint32_t leaf = terrimpi_leaf(v, s->node);
+    uint32_t leaf = terrimpi_leaf(v, s->number);
     if (leaf != TERRIMPI_NO_LEAF) {
         v->leaves[v->leaf_count++] = leaf;
         v->units[v->unit_count].leaf_count++;
@@ -7155,7 +7005,7 @@ static int terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int m
 
 /* Adds the impostors wanted below a node to the last unit. Returns 0 when a part of it that is in
    sight cannot be one. */
-static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_gather_wants(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimpi_want *want = &v->wants[v->want_count];
     terrimp_box box;
@@ -7177,7 +7027,7 @@ static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int ma
 }
 
 /* Makes a unit of a node in one of the cuts. What is in sight has ground leaves. */
-static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask, float closest)
+static void terrimpi_add_unit(terrimp_view *v, const terrimp_node *s, int mask, float closest)
 {
     terrimpi_unit *unit = &v->units[v->unit_count];
     memset(unit, 0, sizeof *unit);
@@ -7197,7 +7047,7 @@ static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask,
 }
 
 /* Goes down to where one of the cuts runs, until all ground has its unit. */
-static int terrimpi_visit_units(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_visit_units(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimp_box box;
     float closest;
@@ -7207,7 +7057,7 @@ static int terrimpi_visit_units(terrimp_view *v, const terrimpi_site *s, int mas
     if (mask == TERRIMP_PLANES_OUTSIDE)
         return 1;
     closest = terrimp_box_distance(&box, v->camera.eye);
-    if (terrimpi_leaf(v, s->node) == TERRIMPI_NO_LEAF &&
+    if (terrimpi_leaf(v, s->number) == TERRIMPI_NO_LEAF &&
         (v->desc.mode < TERRIMP_MODE_IMPOSTOR || !terrimpi_wanted(v, s, closest)))
         return terrimpi_visit_children(v, s, mask, terrimpi_visit_units);
     terrimpi_add_unit(v, s, mask, closest);
@@ -7236,7 +7086,7 @@ static float terrimpi_sine_limit(const terrimp_view *v, float error, float close
 }
 
 /* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
-static float terrimpi_source_error(const terrimp_geomip *tree, const terrimpi_site *s,
+static float terrimpi_source_error(const terrimp_quadtree *tree, const terrimp_node *s,
                                    uint32_t level)
 {
     uint32_t shift = s->level - level, x, z;
@@ -7251,7 +7101,7 @@ static float terrimpi_source_error(const terrimp_geomip *tree, const terrimpi_si
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
-static uint32_t terrimpi_source_level(const terrimp_view *v, const terrimpi_site *s, float closest)
+static uint32_t terrimpi_source_level(const terrimp_view *v, const terrimp_node *s, float closest)
 {
     float limit = TERRIMPI_SOURCE_TEXELS * closest / (v->pixel_factor * v->desc.texels_per_px);
     uint32_t level = s->level;
@@ -7272,12 +7122,12 @@ static float terrimpi_speed(const terrimp_view *v)
 /* How good a picture is from the present eye: its view angle and parallax error, and the larger of
    the two over its limit. */
 static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
-                            const terrimpi_site *s, float *angle_rad, float *parallax_px)
+                            const terrimp_node *s, float *angle_rad, float *parallax_px)
 {
     terrimp_box box;
     terrimpi_site_box(v, s, &box);
     *angle_rad = terrimpi_view_angle(&box, captured_eye, v->camera.eye);
-    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye,
+    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->number), captured_eye,
                                            v->camera.eye, v->pixel_factor);
     return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
                         *parallax_px / v->desc.tolerance_px);
@@ -7291,7 +7141,7 @@ static float terrimpi_sharpness(const terrimp_view *v, float closest)
 /* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
    become too coarse, or far too fine. */
 static float terrimpi_urgency(const terrimp_view *v, const terrimpi_record *record,
-                              const terrimpi_site *s, float closest)
+                              const terrimp_node *s, float closest)
 {
     float angle, parallax, urgency, wanted = terrimpi_sharpness(v, closest);
     urgency = terrimpi_judge(v, record->eye, s, &angle, &parallax);
@@ -7318,12 +7168,12 @@ static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
     terrimpi_site_box(v, &want->site, &box);
     if (terrimpi_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
         return 0;
-    terrimpi_mesh_place(v->terrain, want->site.node, &mesh);
-    want->record = v->record_of[want->site.node];
+    terrimpi_mesh_place(v->terrain, want->site.number, &mesh);
+    want->record = v->record_of[want->site.number];
     want->pixels = k * k * (capture.tan_right - capture.tan_left) *
                    (capture.tan_up - capture.tan_down);
     want->draw_cost = costs->draw + costs->triangle * (float)(mesh.index_count / 3u);
-    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.number), want->closest);
     want->life = v->desc.no_lookahead ? 1.0f : 1.0f + TERRIMPI_AHEAD;
     want->life = terrimpi_min(TERRIMPI_LONGEST_LIFE,
                               want->life * want->closest * sine / terrimpi_max(speed, 1e-20f));
@@ -7359,7 +7209,7 @@ static float terrimpi_ground_cost(const terrimp_view *v, const terrimpi_unit *un
 static void terrimpi_decide(terrimp_view *v, terrimpi_unit *unit, float *spread, float *drawn)
 {
     float impostors = 0.0f, captures = 0.0f, pixels = 0.0f, ground;
-    uint32_t i, node = unit->site.node;
+    uint32_t i, node = unit->site.number;
     int pays = 1, ready = 1;
     for (i = 0; i < unit->want_count && pays; i++) {
         terrimpi_want *want = &v->wants[unit->first_want + i];
@@ -7469,7 +7319,7 @@ static int terrimpi_cell(const terrimp_view *v, const terrimpi_job *job, uint32_
         which = terrimpi_strip_pattern(quads, job->strip,
                                        direction > 4u ? direction - 1u : direction);
     *pattern = terrimpi_find_pattern(quads, which);
-    *node = terrimpi_mip_number(&t->tree, job->source, x, z);
+    *node = terrimpi_tree_at(&t->tree, job->source, x, z).number;
     return 1;
 }
 
@@ -7490,7 +7340,7 @@ static int terrimpi_cell_in_part(const terrimp_view *v, const terrimpi_job *job,
     if (TERRIMPI_PARTS == 1u || job->part_count == 1u)
         return 1;
     {
-        terrimpi_site s = terrimpi_site_of(&v->terrain->tree, node);
+        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, node);
         terrimpi_site_box(v, &s, &box);
     }
     for (i = 0; i < 3; i++) {
@@ -7544,7 +7394,7 @@ static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *wan
     if (v->desc.no_lookahead || !(speed > 0.0f))
         return;
     ahead = TERRIMPI_AHEAD * want->closest *
-            terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+            terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.number), want->closest);
     ahead = terrimpi_min(ahead, speed * 0.5f * TERRIMPI_LONGEST_LIFE);
     for (i = 0; i < 3u; i++)
         eye[i] += v->motion[i] / speed * ahead;
@@ -7554,15 +7404,15 @@ static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *wan
 
 /* The frustum around a node's mesh, and the size of the slot that it needs. Returns 0 when none
    fits. */
-static int terrimpi_slot_size(terrimp_view *v, const terrimpi_site *s, const terrimp_box *box,
+static int terrimpi_slot_size(terrimp_view *v, const terrimp_node *s, const terrimp_box *box,
                               const float eye[3], terrimp_capture *capture, uint32_t size[2])
 {
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
     float density = v->pixel_factor * v->desc.texels_per_px, width, height;
     terrimp_mesh_info mesh;
-    terrimpi_mesh_place(v->terrain, s->node, &mesh);
-    terrimpi_fill_mesh(v->terrain, s->node, v->mesh_xyz, v->mesh_indices);
+    terrimpi_mesh_place(v->terrain, s->number, &mesh);
+    terrimpi_fill_mesh(v->terrain, s->number, v->mesh_xyz, v->mesh_indices);
     if (terrimpi_capture_fit(box, eye, capture) != TERRIMP_OK ||
         !terrimpi_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count))
         return 0;
@@ -7629,16 +7479,17 @@ static float terrimpi_depth_error(const terrimp_view *v, uint32_t node,
 static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const terrimp_box *box,
                              const terrimp_capture *capture, float *distance)
 {
-    uint32_t node = want->site.node;
+    uint32_t node = want->site.number;
     const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
+    float overlap = terrimpi_depth_error(v, node, capture, box);
     terrimp_split split;
     if (TERRIMPI_PARTS == 1u || v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
-        !(sine * want->closest > 0.0f))
+        !(sine * want->closest > 0.0f) ||
+        2.0f * overlap > TERRIMPI_SPLIT_OVERLAP * (capture->z_far - capture->z_near))
         return 0;
     terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
-                           3u * mesh->triangle_count, sine * want->closest,
-                           terrimpi_depth_error(v, node, capture, box), &split);
+                           3u * mesh->triangle_count, sine * want->closest, overlap, &split);
     *distance = split.distance;
     return split.gap * sine * v->pixel_factor >
                TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
@@ -7661,9 +7512,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     terrimpi_capture_eye(v, want, &box, eye);
     if (!terrimpi_slot_size(v, &want->site, &box, eye, front, size))
         return 0;
-    job->record = v->record_of[want->site.node];
+    job->record = v->record_of[want->site.number];
     if (job->record == TERRIMPI_NO_RECORD)
-        job->record = terrimpi_take_record(v, want->site.node);
+        job->record = terrimpi_take_record(v, want->site.number);
     if (job->record == TERRIMPI_NO_RECORD)
         return 0;
     job->part_count = 1;
@@ -7691,7 +7542,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
     if (job->part_count > 1u) {
-        float overlap = terrimpi_depth_error(v, want->site.node, front, &box);
+        float overlap = terrimpi_depth_error(v, want->site.number, front, &box);
         *back = *front;
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
@@ -7740,7 +7591,7 @@ static void terrimpi_sort_queue(terrimp_view *v, uint32_t count)
             for (k = i; k >= gap; k -= gap) {
                 const terrimpi_want *w = &v->wants[v->queue[k - gap]];
                 if (w->priority > m->priority ||
-                    (w->priority == m->priority && w->site.node < m->site.node))
+                    (w->priority == m->priority && w->site.number < m->site.number))
                     break;
                 v->queue[k] = v->queue[k - gap];
             }
@@ -7758,7 +7609,7 @@ static uint32_t terrimpi_fill_queue(terrimp_view *v)
             uint32_t index = v->units[u].first_want + i;
             terrimpi_want *want = &v->wants[index];
             float weight = want->pixels / (1.0f + want->pixels); /* never 0 */
-            if (v->open && v->opened.site.node == want->site.node)
+            if (v->open && v->opened.site.number == want->site.number)
                 continue;
             if (want->urgency < 1.0f && (v->desc.no_spreading || want->urgency < TERRIMPI_EARLY))
                 continue;
@@ -7903,7 +7754,7 @@ static const float *terrimpi_picture(const terrimp_view *v, uint32_t index, uint
 static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urgent)
 {
     uint32_t index = v->record_of[node];
-    terrimpi_site s;
+    terrimp_node s;
     terrimpi_record *record;
     const float *eye;
     float angle, parallax;
@@ -7913,7 +7764,7 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     record = &v->records[index];
     if (record->listed == v->frame)
         return 1;
-    s = terrimpi_site_of(&v->terrain->tree, node);
+    s = terrimpi_tree_node(&v->terrain->tree, node);
     eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
@@ -7929,10 +7780,10 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
    together, or its parent, of which it is a part. Returns 0 when there is no picture. */
 static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
 {
-    const terrimp_geomip *tree = &v->terrain->tree;
-    terrimpi_site children[4];
+    const terrimp_quadtree *tree = &v->terrain->tree;
+    terrimp_node children[4];
     uint32_t i, count, level = want->site.level, up;
-    if (terrimpi_list_impostor(v, want->site.node, TERRIMPI_STALE))
+    if (terrimpi_list_impostor(v, want->site.number, TERRIMPI_STALE))
         return 1;
     v->stats.waiting++;
     if (v->desc.mode != TERRIMP_MODE_AUTO)
@@ -7940,25 +7791,25 @@ static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
     if (level > 0) {
         count = terrimpi_children(v, &want->site, children);
         for (i = 0; i < count; i++) {
-            uint32_t record = v->record_of[children[i].node];
+            uint32_t record = v->record_of[children[i].number];
             if (record == TERRIMPI_NO_RECORD || v->records[record].part_count == 0)
                 break;
         }
         if (i == count) {
             for (i = 0; i < count; i++)
-                if (!terrimpi_list_impostor(v, children[i].node, 2.0f * TERRIMPI_STALE))
+                if (!terrimpi_list_impostor(v, children[i].number, 2.0f * TERRIMPI_STALE))
                     break;
             if (i == count)
                 return 1;
         }
     }
     for (up = 1; up <= 2u && level + up < tree->level_count; up++) {
-        terrimpi_site s = terrimpi_site_at(tree, level + up, want->site.x >> up,
+        terrimp_node s = terrimpi_tree_at(tree, level + up, want->site.x >> up,
                                            want->site.z >> up);
         terrimp_box box;
         terrimpi_site_box(v, &s, &box);
         if (terrimp_box_distance(&box, v->camera.eye) >= v->desc.fade_start &&
-            terrimpi_list_impostor(v, s.node, 2.0f * TERRIMPI_STALE))
+            terrimpi_list_impostor(v, s.number, 2.0f * TERRIMPI_STALE))
             return 1;
     }
     return 0;
@@ -7997,7 +7848,7 @@ static void terrimpi_unlist(terrimp_view *v, uint32_t first)
         terrimpi_record *record = &v->records[v->items[--v->item_count].index];
         record->listed = 0;
         v->stats.impostors--;
-        v->stats.impostors_by_level[terrimpi_site_of(&v->terrain->tree, record->node).level]--;
+        v->stats.impostors_by_level[terrimpi_tree_node(&v->terrain->tree, record->node).level]--;
     }
 }
 
@@ -8024,7 +7875,7 @@ static void terrimpi_settle(terrimp_view *v)
     }
     for (i = 0; i < v->item_count; i++)
         if (v->items[i].is_impostor) {
-            terrimpi_site s = terrimpi_site_of(&v->terrain->tree,
+            terrimp_node s = terrimpi_tree_node(&v->terrain->tree,
                                                v->records[v->items[i].index].node);
             float angle, parallax;
             terrimp_mesh_info mesh;
@@ -8032,7 +7883,7 @@ static void terrimpi_settle(terrimp_view *v)
             uint32_t parts;
             terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
                            &parallax);
-            terrimpi_mesh_place(v->terrain, s.node, &mesh);
+            terrimpi_mesh_place(v->terrain, s.number, &mesh);
             v->stats.triangles += mesh.index_count / 3u * parts;
             v->stats.draws += parts;
             v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
@@ -8050,8 +7901,9 @@ static void terrimpi_settle(terrimp_view *v)
 static int terrimpi_floor_wanted(const terrimp_view *v)
 {
     const terrimp_terrain *t = v->terrain;
+    terrimp_node root = terrimpi_tree_root(&t->tree);
     terrimp_box box;
-    terrimpi_node_box(t, t->tree.level_count - 1u, 0, 0, &box);
+    terrimpi_node_box(t, &root, &box);
     return v->stats.impostors > 0 && v->camera.eye[0] >= box.min[0] &&
            v->camera.eye[0] <= box.max[0] && v->camera.eye[2] >= box.min[2] &&
            v->camera.eye[2] <= box.max[2] && v->camera.eye[1] >= box.min[1];
@@ -8179,7 +8031,7 @@ static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job,
     float border;
     uint32_t k;
     memset(&command, 0, sizeof command);
-    command.node = job->site.node;
+    command.node = job->site.number;
     command.level = job->site.level;
     command.part = part;
     command.atlas = job->parts[part].atlas;
@@ -8236,7 +8088,7 @@ static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
     terrimpi_mesh_place(v->terrain, record->node, &mesh);
     memset(&command, 0, sizeof command);
     command.node = record->node;
-    command.level = terrimpi_site_of(&v->terrain->tree, record->node).level;
+    command.level = terrimpi_tree_node(&v->terrain->tree, record->node).level;
     command.part_count = record->part_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
@@ -8271,8 +8123,8 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     terrimp_pattern pattern;
     terrimpi_ground_pattern(v, index, &pattern);
     memset(&command, 0, sizeof command);
-    command.node = draw->node;
-    command.level = draw->level;
+    command.node = draw->node.number;
+    command.level = draw->node.level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.alpha = v->shown[index] < 0.0f ? 1.0f : v->shown[index];
@@ -9664,82 +9516,6 @@ static void terrimpi_read_samples(terrimpi_simplifier *s, const float *heights)
     }
 }
 
-/* --- exact errors --- */
-
-/* Differences of samples to the surface. */
-typedef struct terrimpi_error {
-    float above, below, squares;
-} terrimpi_error;
-
-static void terrimpi_add_error(terrimpi_error *error, float difference)
-{
-    error->above = terrimpi_max(error->above, difference);
-    error->below = terrimpi_max(error->below, -difference);
-    error->squares += difference * difference;
-}
-
-/* The slopes of the plane through three vertices. */
-static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
-{
-    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
-    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
-    float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
-    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
-    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
-}
-
-/* Errors of the samples of a border between two points of its polyline, without the last one. */
-static void terrimpi_measure_border(const float *heights, int32_t stride, int32_t count,
-                                    float from, float to, terrimpi_error *error)
-{
-    int32_t i;
-    float slope = (to - from) / (float)count;
-    for (i = 0; i < count; i++)
-        terrimpi_add_error(error, heights[i * stride] - (from + slope * (float)i));
-}
-
-/* Works out the three errors of a surface: every sample once. The triangles own all but the last
-   row and the last column, which the border polylines supply. */
-static void terrimpi_measure(const float *heights, int32_t cols, int32_t rows, terrimp_mesh *mesh)
-{
-    const terrimp_mesh_vertex *v = mesh->vertices;
-    terrimpi_error all = {0.0f, 0.0f, 0.0f};
-    float squares = 0.0f, gx, gz;
-    uint32_t i, k;
-    int32_t x, z;
-    for (i = 0; i < mesh->surface_index_count; i += 3) {
-        terrimp_mesh_vertex a[3];
-        terrimpi_span span;
-        for (k = 0; k < 3u; k++)
-            a[k] = v[mesh->indices[i + k]];
-        terrimpi_find_span(a, &span);
-        terrimpi_find_plane(a, &gx, &gz);
-        all.squares = 0.0f; /* summed by triangle, as small sums round less */
-        for (z = span.low; z < span.high; z++) {
-            const float *row = heights + z * cols;
-            float base = a->height + (float)(z - a->z) * gz;
-            for (x = span.left[z]; x < span.right[z]; x++)
-                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * gx));
-        }
-        squares += all.squares;
-    }
-    all.squares = 0.0f;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        const terrimp_mesh_vertex *p = v + i, *q = v + (i + 1) % mesh->border_vertex_count;
-        const float *at = heights + p->z * cols + p->x;
-        if (p->z == rows - 1 && q->z == rows - 1)
-            terrimpi_measure_border(at, 1, q->x - p->x, p->height, q->height, &all);
-        else if (p->x == cols - 1 && q->x == cols - 1)
-            terrimpi_measure_border(at, -cols, p->z - q->z, p->height, q->height, &all);
-        else if (p->x == cols - 1) /* the corner where the last column ends */
-            terrimpi_measure_border(at, 1, 1, p->height, p->height, &all);
-    }
-    mesh->error_above = all.above;
-    mesh->error_below = all.below;
-    mesh->error_rms = TERRIMP_SQRTF((squares + all.squares) / (float)(cols * rows));
-}
-
 /* --- borders --- */
 
 /* Adds the squared error of the samples strictly between a kept point and sample `at`, where the
@@ -10062,7 +9838,6 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
     if (!whole)
         terrimpi_reduce(&s, desc, &plan, mesh->vertices);
     terrimpi_emit(&s, whole ? desc->heights : 0, mesh);
-    terrimpi_measure(desc->heights, s.cols, s.rows, mesh);
     return TERRIMP_OK;
 }
 
@@ -10086,35 +9861,24 @@ static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
     return TERRIMP_OK;
 }
 
-/* Appends a wall along the loop: down to a height, or up by a rise. */
-static terrimp_result terrimpi_add_skirt(terrimp_mesh *mesh, float value, int upper)
+TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height)
 {
     uint32_t i, n;
     TERRIMPI_TRY(terrimpi_check_surface(mesh));
     n = mesh->border_vertex_count;
     TERRIMPI_REFUSE(mesh->vertex_capacity - mesh->vertex_count < n ||
                     mesh->index_capacity - mesh->index_count < 6 * n, TERRIMP_E_CAPACITY);
-    TERRIMPI_REFUSE(!terrimpi_finite(value), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(upper && value < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(upper && height < 0.0f, TERRIMP_E_RANGE);
     for (i = 0; i < n; i++) {
         terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
         *rim = mesh->vertices[i];
-        rim->height = upper ? rim->height + value : terrimpi_min(rim->height, value);
+        rim->height = upper ? rim->height + height : terrimpi_min(rim->height, height);
     }
     terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
     mesh->vertex_count += n;
     mesh->index_count += 6 * n;
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height)
-{
-    return terrimpi_add_skirt(mesh, height, 0);
-}
-
-TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise)
-{
-    return terrimpi_add_skirt(mesh, rise, 1);
 }
 
 /* --- standing proud (Hess 6.1) --- */
@@ -10137,20 +9901,20 @@ static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
     return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
 }
 
-/* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
-   rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
-static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
-                                 float over, int lowering)
+/* A vertex of weight w in a sample rises by what that wants. */
+static void terrimpi_rise(float w, float wanted, float *change)
 {
-    int k;
-    for (k = 0; k < n; k++) {
-        if (!(w[k] > 1e-6f))
-            continue;
-        if (lowering)
-            *change[k] = terrimpi_min(*change[k], terrimpi_max(0.0f, over) / ((float)n * w[k]));
-        else
-            *change[k] = terrimpi_max(*change[k], wanted);
-    }
+    if (w > 1e-6f)
+        *change = terrimpi_max(*change, wanted);
+}
+
+/* A vertex of weight w in a sample, one of n round it, may lose its share of the surface's height
+   over the sample. That this is no less than it may lose by others, a product mostly tells without
+   a division. */
+static void terrimpi_lower(float w, float n, float over, float *change)
+{
+    if (w > 1e-6f && over < *change * (n * w) * 1.00001f)
+        *change = terrimpi_min(*change, over / (n * w));
 }
 
 static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
@@ -10175,13 +9939,18 @@ static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_
     is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
     for (k = 0; k <= count; k++, samples += stride) {
         float surface, wanted;
+        int i;
         w[1] = (float)k / (float)count;
         w[0] = 1.0f - w[1];
         surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
         wanted = terrimpi_wanted_raise(*samples - surface,
                                        *samples - (w[0] * p->height + w[1] * q->height),
                                        w[0] * is_free[0] + w[1] * is_free[1]);
-        terrimpi_rise_sample(w, to, 2, wanted, surface - *samples, lowering);
+        for (i = 0; i < 2; i++)
+            if (lowering)
+                terrimpi_lower(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
+            else
+                terrimpi_rise(w[i], wanted, to[i]);
     }
 }
 
@@ -10211,6 +9980,17 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
     }
 }
 
+/* The slopes of the plane through three vertices. */
+static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
+{
+    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
+    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
+    float inverse = 1.0f / (float)(bz * cx - bx * cz);
+    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
+    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
+}
+
 /* Goes once over the samples of a triangle. */
 static void terrimpi_rise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
                                    const uint16_t *t, const float *raise, float *change,
@@ -10218,10 +9998,11 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
 {
     terrimp_mesh_vertex v[3];
     terrimpi_span span;
-    float slope_x[3], slope_z[3], gx, gz, *to[3];
+    float slope_x[3], slope_z[3], gx, gz, to[3];
+    float limit; /* from which on a sample takes nothing away, as no weight is above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
-        to[k] = change + t[k];
+        to[k] = change[t[k]];
         v[k] = mesh->vertices[t[k]];
         v[k].height = 0.0f;
     }
@@ -10234,19 +10015,32 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
     terrimpi_find_span(v, &span);
     terrimpi_find_plane(v, &gx, &gz);
+    limit = 3.001f * terrimpi_largest(to);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
-            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f;
-            float short_by = heights[z * cols + x] - (v[0].height + dx * gx + dz * gz), raised;
-            for (k = 0; k < 3; k++) {
+            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
+            float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
+            if (lowering && over >= limit)
+                continue;
+            for (k = 0; k < 3; k++)
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
-                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            if (lowering) {
+                over = terrimpi_max(over, 0.0f);
+                terrimpi_lower(w[0], 3.0f, over, &to[0]);
+                terrimpi_lower(w[1], 3.0f, over, &to[1]);
+                terrimpi_lower(w[2], 3.0f, over, &to[2]);
+                limit = 3.001f * terrimpi_largest(to);
+                continue;
             }
-            raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            terrimpi_rise_sample(w, to, 3,
-                                 terrimpi_wanted_raise(short_by, short_by + raised, hold),
-                                 -short_by, lowering);
+            for (k = 0; k < 3; k++)
+                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
+            wanted = terrimpi_wanted_raise(-over, wanted - over, hold);
+            for (k = 0; k < 3; k++)
+                terrimpi_rise(w[k], wanted, &to[k]);
         }
+    for (k = 0; k < 3; k++)
+        change[t[k]] = to[k];
 }
 
 static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
@@ -10292,7 +10086,6 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     }
     for (i = 0; i < n; i++)
         mesh->vertices[i].height += desc->amount * work[i];
-    terrimpi_measure(desc->heights, (int32_t)desc->cols, (int32_t)desc->rows, mesh);
     return TERRIMP_OK;
 }
 
@@ -10578,104 +10371,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     return TERRIMP_OK;
 }
 
-/* ---- heights, fits and errors of the ground ---- */
-
-/* Rows of vertices of a level. */
-static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
-{
-    return ((t->field.depth - 1u) >> level) + 1u;
-}
-
-/* Loads of level 1, where rows are the samples two rows above to two below; in units of a twelfth
-   of a small triangle's area, as all loads. */
-static void terrimpi_mip_first_loads(const float *samples, uint32_t width, uint32_t count,
-                                     float *loads)
-{
-    const float *a = samples, *b = a + width, *c = b + width, *d = c + width, *e = d + width;
-    uint32_t i, x;
-    for (i = 1, x = 2; i + 1u < count; i++, x += 2u) {
-        float ring = b[x - 1u] + b[x] + c[x - 1u] + c[x + 1u] + d[x] + d[x + 1u];
-        float corners = a[x - 2u] + a[x] + c[x - 2u] + c[x + 2u] + e[x] + e[x + 2u];
-        float middles = a[x - 1u] + b[x - 2u] + b[x + 1u] + d[x - 1u] + d[x + 2u] + e[x + 1u];
-        loads[i] = 18.0f * c[x] + 10.0f * ring + 2.0f * middles + corners;
-    }
-}
-
-/* Loads of a level from those of the next finer one, from the row that lies on it; scaled to its
-   own triangles. */
-static void terrimpi_mip_next_loads(const float *finer, uint32_t cols, uint32_t count, float *loads)
-{
-    const float *above = finer - cols, *below = finer + cols;
-    uint32_t i, x;
-    for (i = 1, x = 2; i + 1u < count; i++, x += 2u)
-        loads[i] = 0.25f * finer[x] +
-                   0.125f * (above[x - 1u] + above[x] + finer[x - 1u] + finer[x + 1u] + below[x] +
-                             below[x + 1u]);
-}
-
-/* One sweep over the free vertices of a row, whose loads are given. */
-static void terrimpi_mip_sweep(const terrimp_geomip *t, uint32_t level, uint32_t j,
-                               const float *loads)
-{
-    uint32_t cols = terrimpi_mip_cols(t, level), half = t->chunk_quads / 2u, i, fixed;
-    float *fit = t->fits + t->fit_first[level] + j * cols;
-    const float *above = fit - cols, *below = fit + cols;
-    fixed = j % half == 0 ? half : cols;
-    for (i = 1; i + 1u < cols; i++) {
-        float round = above[i - 1u] + above[i] + fit[i - 1u] + fit[i + 1u] + below[i] +
-                      below[i + 1u];
-        if (i == fixed)
-            fixed += half;
-        else
-            fit[i] = (loads[i] - 8.0f * round) * (1.0f / 48.0f);
-    }
-}
-
-/* Turns the loads of a level, that are where its fits go, into fits. All sweeps run at once, each a
-   row behind the one before; scratch keeps the loads of the rows that they are at. */
-static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *scratch)
-{
-    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), j, sweep;
-    float *fit = t->fits + t->fit_first[level];
-    for (j = 0; j < rows + TERRIMPI_MIP_SWEEPS; j++) {
-        if (j < rows) {
-            memcpy(scratch + j % (TERRIMPI_MIP_SWEEPS + 1u) * cols, fit + j * cols,
-                   cols * sizeof *fit);
-            terrimpi_heightfield_tile(&t->field, 0, j << level, cols, 1, 1u << level,
-                                      fit + j * cols);
-        }
-        for (sweep = 1; sweep <= TERRIMPI_MIP_SWEEPS; sweep++)
-            if (j > sweep && j - sweep + 1u < rows)
-                terrimpi_mip_sweep(t, level, j - sweep,
-                                   scratch + (j - sweep) % (TERRIMPI_MIP_SWEEPS + 1u) * cols);
-    }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch)
-{
-    uint32_t level, j;
-    TERRIMPI_REFUSE(!tree || !scratch, TERRIMP_E_NULL);
-    for (level = 1; tree->fits && level < tree->level_count; level++) {
-        uint32_t cols = terrimpi_mip_cols(tree, level), width = terrimpi_mip_cols(tree, level - 1u);
-        float *loads = tree->fits + tree->fit_first[level];
-        memset(loads, 0, (tree->fit_first[level + 1u] - tree->fit_first[level]) * sizeof *loads);
-        for (j = 1; j + 1u < terrimpi_mip_rows(tree, level); j++) {
-            loads += cols;
-            if (level == 1u) {
-                terrimpi_heightfield_tile(&tree->field, 0, 2u * j - 2u, width, 5, 1, scratch);
-                terrimpi_mip_first_loads(scratch, width, cols, loads);
-            } else {
-                terrimpi_mip_next_loads(tree->fits + tree->fit_first[level - 1u] + 2u * j * width,
-                                        width, cols, loads);
-            }
-        }
-    }
-    for (level = 1; tree->fits && level < tree->level_count; level++)
-        terrimpi_mip_solve(tree, level, scratch);
-    return TERRIMP_OK;
-}
-
-/* ---- errors ---- */
+/* ---- heights and errors of the ground ---- */
 
 /* What the samples of a node are found to miss. */
 typedef struct terrimpi_mip_misses {
@@ -10722,34 +10418,20 @@ static void terrimpi_mip_row_misses(const float *upper, const float *lower, cons
     misses->count += (float)span + 1.0f;
 }
 
-/* Heights of a row of a level's lattice, from vertex (i, j) on. */
-static void terrimpi_mip_lattice_row(const terrimp_geomip *t, uint32_t level, uint32_t i,
-                                     uint32_t j, uint32_t count, float *heights)
-{
-    uint32_t z = terrimpi_mip_row(t, level, j), k;
-    if (!t->fits || level == 0) {
-        terrimpi_heightfield_tile(&t->field, terrimpi_mip_col(t, level, i), z, count, 1,
-                                  1u << level, heights);
-        return;
-    }
-    for (k = 0; k < count; k++)
-        heights[k] = terrimpi_mip_stand(t, level, terrimpi_mip_col(t, level, i + k), z);
-}
-
 /* Compares all samples of a node with its triangles in pattern 0. */
-static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_place p,
+static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
                                       float *scratch, terrimpi_mip_misses *misses)
 {
     uint32_t quads = t->chunk_quads, j, z;
-    uint32_t x0 = terrimpi_mip_col(t, p.level, p.x * quads);
-    uint32_t span = terrimpi_mip_col(t, p.level, (p.x + 1u) * quads) - x0;
+    uint32_t x0 = terrimpi_tree_col(t, p.level, p.x * quads);
+    uint32_t span = terrimpi_tree_col(t, p.level, (p.x + 1u) * quads) - x0;
     float *upper = scratch, *lower = upper + quads + 1u, *row = lower + quads + 1u;
     for (j = p.z * quads; j < (p.z + 1u) * quads; j++) {
-        uint32_t z0 = terrimpi_mip_row(t, p.level, j), z1 = terrimpi_mip_row(t, p.level, j + 1u);
+        uint32_t z0 = terrimpi_tree_row(t, p.level, j), z1 = terrimpi_tree_row(t, p.level, j + 1u);
         if (z1 == z0)
             break;
-        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j, quads + 1u, upper);
-        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j + 1u, quads + 1u, lower);
+        terrimpi_heightfield_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
+        terrimpi_heightfield_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
         for (z = z0; z <= z1; z++) { /* lattice rows twice: which weighs next to nothing in rms */
             terrimpi_heightfield_tile(&t->field, x0, z, span + 1u, 1, 1, row);
             terrimpi_mip_row_misses(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
@@ -10758,144 +10440,106 @@ static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_plac
     }
 }
 
-/* A corner of a triangle: a sample's column and row, and the height drawn there. */
-typedef struct terrimpi_mip_corner {
-    uint32_t x, z;
-    float height;
-} terrimpi_mip_corner;
-
-/* Compares the samples in a triangle, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_geomip *t,
-                                         const terrimpi_mip_corner corner[3],
+/* Compares the samples in a triangle of three samples, counter-clockwise, with it. */
+static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const uint32_t a[2],
+                                         const uint32_t b[2], const uint32_t c[2],
                                          terrimpi_mip_misses *misses)
 {
-    uint32_t x0 = terrimpi_min_u32(corner[0].x, terrimpi_min_u32(corner[1].x, corner[2].x));
-    uint32_t x1 = terrimpi_max_u32(corner[0].x, terrimpi_max_u32(corner[1].x, corner[2].x));
-    uint32_t z0 = terrimpi_min_u32(corner[0].z, terrimpi_min_u32(corner[1].z, corner[2].z));
-    uint32_t z1 = terrimpi_max_u32(corner[0].z, terrimpi_max_u32(corner[1].z, corner[2].z));
-    uint32_t x, z, k;
-    for (z = z0; z <= z1; z++)
-        for (x = x0; x <= x1; x++) {
-            int64_t part[3], all; /* twice the areas opposite the corners */
+    uint32_t x0 = terrimpi_min_u32(a[0], terrimpi_min_u32(b[0], c[0]));
+    uint32_t x1 = terrimpi_max_u32(a[0], terrimpi_max_u32(b[0], c[0]));
+    uint32_t z0 = terrimpi_min_u32(a[1], terrimpi_min_u32(b[1], c[1]));
+    uint32_t z1 = terrimpi_max_u32(a[1], terrimpi_max_u32(b[1], c[1]));
+    int64_t all = terrimpi_twice_area(a, b, c);
+    float height = terrimpi_sample(&t->field, a[0], a[1]);
+    float to_b = terrimpi_sample(&t->field, b[0], b[1]) - height;
+    float to_c = terrimpi_sample(&t->field, c[0], c[1]) - height;
+    uint32_t at[2];
+    if (all <= 0)
+        return;
+    for (at[1] = z0; at[1] <= z1; at[1]++)
+        for (at[0] = x0; at[0] <= x1; at[0]++) {
+            int64_t by_b = terrimpi_twice_area(c, a, at), by_c = terrimpi_twice_area(a, b, at);
             float sample, miss;
-            for (k = 0; k < 3u; k++) {
-                const terrimpi_mip_corner *a = &corner[(k + 1u) % 3u], *b = &corner[(k + 2u) % 3u];
-                part[k] = ((int64_t)b->z - a->z) * ((int64_t)x - a->x) -
-                          ((int64_t)b->x - a->x) * ((int64_t)z - a->z);
-            }
-            all = part[0] + part[1] + part[2];
-            if (all == 0 || part[0] < 0 || part[1] < 0 || part[2] < 0)
+            if (by_b < 0 || by_c < 0 || by_b + by_c > all)
                 continue;
-            sample = terrimpi_sample(&t->field, x, z);
-            miss = sample - corner[0].height;
-            miss -= ((corner[1].height - corner[0].height) * (float)part[1] +
-                     (corner[2].height - corner[0].height) * (float)part[2]) / (float)all;
+            sample = terrimpi_sample(&t->field, at[0], at[1]);
+            miss = sample - height;
+            miss -= (to_b * (float)by_b + to_c * (float)by_c) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
             misses->low = terrimpi_min(misses->low, sample);
             misses->high = terrimpi_max(misses->high, sample);
         }
 }
 
-/* Compares with what a finer neighbour beyond a side draws up to it: three triangles in each block
-   of 2 x 1 of its quads, below in half quads of the node, the first of them at its own border. The
-   last number of a corner says that it stands on that border, at the node's heights. */
-static void terrimpi_mip_border_misses(const terrimp_geomip *t, terrimpi_mip_place p, int side,
+/* Compares with what a finer neighbour beyond a side draws up to it: two of its quads for each of
+   the node's, in the pattern in which that side is coarse. */
+static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p, int side,
                                        terrimpi_mip_misses *misses)
 {
-    static const int8_t triangles[TERRIMP_SIDE_COUNT][3][3][3] = {
-        {{{1, -1, 0}, {0, 0, 1}, {2, 0, 1}}, {{0, -1, 0}, {0, 0, 1}, {1, -1, 0}},
-         {{1, -1, 0}, {2, 0, 1}, {2, -1, 0}}},
-        {{{0, 0, 1}, {1, 1, 0}, {2, 0, 1}}, {{0, 0, 1}, {0, 1, 0}, {1, 1, 0}},
-         {{2, 0, 1}, {1, 1, 0}, {2, 1, 0}}},
-        {{{-1, 1, 0}, {0, 2, 1}, {0, 0, 1}}, {{-1, 0, 0}, {-1, 1, 0}, {0, 0, 1}},
-         {{-1, 1, 0}, {-1, 2, 0}, {0, 2, 1}}},
-        {{{0, 0, 1}, {0, 2, 1}, {1, 1, 0}}, {{0, 2, 1}, {1, 2, 0}, {1, 1, 0}},
-         {{0, 0, 1}, {1, 1, 0}, {1, 0, 0}}}};
-    uint32_t quads = t->chunk_quads, at, k, c, fine = p.level - 1u;
-    for (at = 0; at < quads; at++) {
-        uint32_t i = p.x * quads, j = p.z * quads;
-        i += side == TERRIMP_SIDE_X0 ? 0 : side == TERRIMP_SIDE_X1 ? quads : at;
-        j += side == TERRIMP_SIDE_Z0 ? 0 : side == TERRIMP_SIDE_Z1 ? quads : at;
-        for (k = 0; k < 3u; k++) {
-            terrimpi_mip_corner corner[3];
-            for (c = 0; c < 3u; c++) {
-                const int8_t *offset = triangles[side][k][c];
-                corner[c].x = terrimpi_mip_col(t, fine, (uint32_t)((int32_t)(2u * i) + offset[0]));
-                corner[c].z = terrimpi_mip_row(t, fine, (uint32_t)((int32_t)(2u * j) + offset[1]));
-                corner[c].height = terrimpi_mip_stand(t, offset[2] ? p.level : fine, corner[c].x,
-                                                      corner[c].z);
-            }
-            terrimpi_mip_triangle_misses(t, corner, misses);
+    uint32_t quads = t->chunk_quads, along, k, c;
+    int along_x = terrimpi_along_x(side), last = side & 1;
+    terrimpi_mip_writer block; /* 2 x 2 quads of the neighbour */
+    block.quads = 2;
+    block.pattern = 1u << (side ^ 1);
+    for (along = 0; along < 2u * quads; along++) {
+        uint32_t across = last ? 0u : 1u, at[4][2], first[2];
+        first[!along_x] = along & ~1u;
+        first[along_x] = last ? 2u * quads : (uint32_t)-2;
+        for (c = 0; c < 4u; c++) { /* counter-clockwise */
+            uint32_t i = (along_x ? along & 1u : across) + (c >> 1);
+            uint32_t j = (along_x ? across : along & 1u) + ((c + 1u) >> 1 & 1u);
+            k = terrimpi_mip_index(&block, i, j);
+            at[c][0] = terrimpi_tree_col(t, p.level - 1u, 2u * p.x * quads + first[0] + k % 3u);
+            at[c][1] = terrimpi_tree_row(t, p.level - 1u, 2u * p.z * quads + first[1] + k / 3u);
         }
+        terrimpi_mip_triangle_misses(t, at[0], at[2], at[3], misses);
+        terrimpi_mip_triangle_misses(t, at[0], at[1], at[2], misses);
     }
 }
 
-/* Widens a node's range by the heights at which its vertices may stand: its own, and where it
-   morphs or meets coarser neighbours those of the two levels above. */
-static void terrimpi_mip_drawn_range(const terrimp_geomip *t, terrimpi_mip_place p,
-                                     terrimp_geomip_node *node)
+static terrimp_result terrimpi_mip_build_leaf(const terrimp_quadtree *t, terrimp_node p)
 {
-    uint32_t quads = t->chunk_quads, i, j, above;
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++)
-            for (above = 0; above <= 2u; above++) {
-                uint32_t x = terrimpi_mip_col(t, p.level, p.x * quads + i);
-                uint32_t z = terrimpi_mip_row(t, p.level, p.z * quads + j);
-                float height = terrimpi_mip_height(t, p.level + above, x, z);
-                node->low = terrimpi_min(node->low, height);
-                node->high = terrimpi_max(node->high, height);
-                if (((i | j) & 1u) != 0)
-                    break;
-            }
-}
-
-static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_mip_place p)
-{
-    terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, 0, p.x, p.z)];
+    terrimp_geomip_node *node = &t->nodes[p.number];
     uint32_t quads = t->chunk_quads;
     terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
     TERRIMPI_TRY(terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high));
     node->error = node->rms = 0.0f;
-    if (t->fits)
-        terrimpi_mip_drawn_range(t, p, node);
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch)
 {
-    terrimpi_mip_place p, beyond;
+    terrimp_node p, beyond;
     terrimpi_mip_misses misses;
     int side;
     TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    p = terrimpi_mip_place_of(tree, node);
+    p = terrimpi_tree_node(tree, node);
     if (p.level == 0)
         return terrimpi_mip_build_leaf(tree, p);
     memset(&misses, 0, sizeof misses);
     terrimpi_mip_inner_misses(tree, p, scratch, &misses);
-    misses.low = misses.high = terrimpi_mip_stand(
-        tree, p.level, terrimpi_mip_col(tree, p.level, p.x * tree->chunk_quads),
-        terrimpi_mip_row(tree, p.level, p.z * tree->chunk_quads));
+    misses.low = misses.high = terrimpi_sample(
+        &tree->field, terrimpi_tree_col(tree, p.level, p.x * tree->chunk_quads),
+        terrimpi_tree_row(tree, p.level, p.z * tree->chunk_quads));
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        if (terrimpi_mip_beyond(tree, p, side, &beyond))
+        if (terrimpi_tree_beyond(tree, &p, side, &beyond))
             terrimpi_mip_border_misses(tree, p, side, &misses);
     tree->nodes[node].low = misses.low;
     tree->nodes[node].high = misses.high;
     tree->nodes[node].error = misses.most;
     tree->nodes[node].rms = TERRIMP_SQRTF(misses.squares / misses.count);
-    if (tree->fits)
-        terrimpi_mip_drawn_range(tree, p, &tree->nodes[node]);
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree)
+TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree)
 {
     uint32_t i;
     TERRIMPI_REFUSE(!tree || !tree->nodes, TERRIMP_E_NULL);
     for (i = 0; i + 1u < tree->node_count; i++) {
         const terrimp_geomip_node *child = &tree->nodes[i];
-        terrimp_geomip_node *node = &tree->nodes[terrimpi_mip_parent(tree, i)];
+        terrimp_geomip_node *node = &tree->nodes[terrimpi_tree_parent_number(tree, i)];
         node->low = terrimpi_min(node->low, child->low);
         node->high = terrimpi_max(node->high, child->high);
         node->error = terrimpi_max(node->error, child->error);
@@ -10903,10 +10547,9 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tre
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch)
+TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch)
 {
     uint32_t node;
-    TERRIMPI_TRY(terrimp_geomip_fit(tree, scratch));
     for (node = 0; node < tree->node_count; node++)
         TERRIMPI_TRY(terrimp_geomip_build_node(tree, node, scratch));
     return terrimp_geomip_build_finish(tree);
@@ -11310,6 +10953,18 @@ static void terrimpi_store_surface(terrimp_terrain *t, uint32_t node, terrimp_me
         corners[i] = (uint8_t)mesh->indices[i];
 }
 
+/* Differences of samples to the surface. */
+typedef struct terrimpi_error {
+    float above, below, squares;
+} terrimpi_error;
+
+static void terrimpi_add_error(terrimpi_error *error, float difference)
+{
+    error->above = terrimpi_max(error->above, difference);
+    error->below = terrimpi_max(error->below, -difference);
+    error->squares += difference * difference;
+}
+
 /* Measures a mesh against every sample of its node. */
 static void terrimpi_measure_node(const terrimp_terrain *t, const terrimpi_patch *p,
                                   const terrimp_mesh *mesh, const terrimpi_build *build,
@@ -11466,7 +11121,7 @@ static void terrimpi_hold(terrimpi_mesh *mesh, float low, float high)
 
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain)
 {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
@@ -11479,7 +11134,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
         terrain->mesh_triangle_count += terrain->meshes[node].triangle_count;
     }
     for (node = 0; node + 1u < tree->node_count; node++)
-        terrimpi_hold(&terrain->meshes[terrimpi_mip_parent(tree, node)],
+        terrimpi_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
                       terrain->meshes[node].low, terrain->meshes[node].high);
     terrain->built = 1;
     return TERRIMP_OK;
@@ -11519,7 +11174,7 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++)
                 TERRIMPI_TRY(terrimp_terrain_build_node(
-                    terrain, terrimpi_mip_number(&terrain->tree, level, x, z), scratch, bytes));
+                    terrain, terrimpi_tree_at(&terrain->tree, level, x, z).number, scratch, bytes));
     }
     return terrimp_terrain_build_finish(terrain);
 }

@@ -20,7 +20,7 @@ enum { WIDTH = 640, HEIGHT = 512 };
 static terrimp_geomip_node nodes[NODES];
 static terrimp_geomip_mark marks[NODES];
 static terrimp_geomip_draw draws[NODES];
-static float distances[NODES], scratch[1 << 16];
+static float distances[NODES], scratch[SIDE + 2 * QUADS + 2];
 static uint8_t picture[WIDTH * HEIGHT * 3];
 static terrimp_pattern patterns[TERRIMP_PATTERN_COUNT];
 static GLuint arrays[NODES], indices; /* a node has no array until it is drawn */
@@ -53,7 +53,7 @@ static void fill_indices(void)
     glBufferData(GL_ARRAY_BUFFER, sizeof list, list, GL_STATIC_DRAW);
 }
 
-static void fill_vertices(const terrimp_geomip *tree, uint32_t node)
+static void fill_vertices(const terrimp_quadtree *tree, uint32_t node)
 {
     float xyz[GRID][3];
     GLuint buffer; /* the array keeps it */
@@ -68,18 +68,18 @@ static void fill_vertices(const terrimp_geomip *tree, uint32_t node)
     glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
 }
 
-static void draw_nodes(const terrimp_geomip *tree, const terrimp_geomip_view *view, GLint tint,
+static void draw_nodes(const terrimp_quadtree *tree, const terrimp_geomip_view *view, GLint tint,
                        float outlined)
 {
     uint32_t i;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
         const terrimp_pattern *pattern = &patterns[draw->pattern];
-        const float *colour = gl_geomip_colour(draw->level);
-        if (!arrays[draw->node])
-            fill_vertices(tree, draw->node);
+        const float *colour = gl_geomip_colour(draw->node.level);
+        if (!arrays[draw->node.number])
+            fill_vertices(tree, draw->node.number);
         glUniform4f(tint, colour[0], colour[1], colour[2], outlined);
-        glBindVertexArray(arrays[draw->node]);
+        glBindVertexArray(arrays[draw->node.number]);
         glDrawElements(GL_TRIANGLES, (GLsizei)pattern->index_count, GL_UNSIGNED_SHORT,
                        (const void *)(uintptr_t)(pattern->first_index * sizeof(uint16_t)));
     }
@@ -88,7 +88,7 @@ static void draw_nodes(const terrimp_geomip *tree, const terrimp_geomip_view *vi
 int main(void)
 {
     terrimp_heightfield field = {0};
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view = {0};
     terrimp_camera camera = {0};
     uint16_t *samples = procedural_terrain(SIDE, SIDE, 1);
@@ -99,8 +99,8 @@ int main(void)
 
     field.samples = samples, field.width = field.depth = SIDE;
     field.format = TERRIMP_FORMAT_U16, field.height_scale = 0.25f * PROCEDURAL_HEIGHT_SCALE;
-    if (!samples || terrimp_geomip_init(&field, QUADS, &tree) != TERRIMP_OK ||
-        tree.node_count > NODES || tree.scratch_count > sizeof scratch / sizeof *scratch)
+    if (!samples || terrimp_quadtree_init(&field, QUADS, &tree) != TERRIMP_OK ||
+        tree.node_count > NODES)
         return 1;
     tree.nodes = nodes;
     view.distances = distances, view.marks = marks, view.draws = draws, view.draw_capacity = NODES;

@@ -151,10 +151,12 @@ unknown_targets()
 
 dead_links()
 {
-    grep -oE '(\]\(|src=")[^)"#:]+[)"]' README.md | sed 's/^](//; s/^src="//; s/[)"]$//' |
-        while read -r path; do
-            [ -e "$path" ] || echo "README.md: no $path"
-        done
+    for page in README.md tests/results/README.md; do
+        grep -oE '(\]\(|src=")[^)"#:]+[)"]' $page | sed 's/^](//; s/^src="//; s/[)"]$//' |
+            while read -r path; do
+                [ -e "$(dirname $page)/$path" ] || echo "$page: no $path"
+            done
+    done
 }
 
 # Examples say in their first comment how they are built (tests/examples.sh does what they say).
@@ -174,7 +176,7 @@ if [ -f README.md ]; then
     readme_snippets
     check "README.md names the commands that work" prints_nothing promises_missing
     check "README.md names targets of the Makefile" prints_nothing unknown_targets
-    check "README.md links to what is there" prints_nothing dead_links
+    check "pages link to what is there" prints_nothing dead_links
     check "all versions are the same" prints_nothing versions_differ
 else
     check "there is a README.md" false

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Takes the figures of the last `make bench` over: keeps its tables and plots in tests/results and
-# renews the tables of README.md that stand between `<!-- figures NAME -->` and `<!-- end -->`.
+# renews the tables of README.md and of tests/results/README.md, which stand between
+# `<!-- figures NAME -->` and `<!-- end -->`.
 # Use: make figures
 
 cd "$(dirname "$0")/.." || exit 1
@@ -9,7 +10,7 @@ results=tests/results
 new=$bench/figures
 mkdir -p $results $new
 
-# ---- the tables of README.md, each from the TSV that it names
+# ---- the tables of both pages, each from the TSV that it names
 
 # Rows of frames.tsv: of a scene, the ways in the order of the list, one a line on standard input.
 ways() # scene columns
@@ -80,6 +81,16 @@ faster()
                   if (/trees/) scene = "trees" }
          /^How many times/ { on = 1 } /^Plot/ { on = 0 }
          on && /^\| (auto|impostor|Hess)/ { sub(/^\| /, "| " scene ": "); print }' $bench/frames.md
+}
+
+# The short table of README.md: of each scene the two settings that most hosts want.
+summary()
+{
+    echo "| scene | cost, full mesh 1 | PSNR | times as fast as our geomip, as good |" \
+        "at equal SSIM | as quoted engines |"
+    echo "|---|--:|--:|--:|--:|--:|"
+    faster | awk -F '|' '/: auto [12] px / {
+        printf "|%s|%s|%s|%s|%s|%s|\n", $2, $3, $4, $5, $7, $8 }'
 }
 
 circle()
@@ -170,20 +181,22 @@ for plot in $results/*.svg; do # shown where the text names it
 done
 
 # A table of which nothing was measured stays as it is: two lines are its headings.
-for name in $(sed -n 's/^<!-- figures \([a-z]*\) -->$/\1/p' README.md); do
-    $name > $new/$name.md 2> /dev/null
-    if [ "$(wc -l < $new/$name.md)" -lt 3 ]; then
-        echo "figures: $name: not measured, its table stays"
-        rm -f $new/$name.md
-    fi
+for page in README.md $results/README.md; do
+    for name in $(sed -n 's/^<!-- figures \([a-z]*\) -->$/\1/p' $page); do
+        $name > $new/$name.md 2> /dev/null
+        if [ "$(wc -l < $new/$name.md)" -lt 3 ]; then
+            echo "figures: $name: not measured, its table stays"
+            rm -f $new/$name.md
+        fi
+    done
+    awk -v new=$new '
+        /^<!-- figures / {
+            print
+            file = new "/" $3 ".md"
+            while ((getline line < file) > 0) { print line; skip = 1 }
+            close(file)
+            next
+        }
+        /^<!-- end -->/ { skip = 0 }
+        !skip' $page > $new/page.md && cp $new/page.md $page
 done
-awk -v new=$new '
-    /^<!-- figures / {
-        print
-        file = new "/" $3 ".md"
-        while ((getline line < file) > 0) { print line; skip = 1 }
-        close(file)
-        next
-    }
-    /^<!-- end -->/ { skip = 0 }
-    !skip' README.md > $new/README.md && cp $new/README.md README.md

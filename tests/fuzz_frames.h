@@ -189,7 +189,7 @@ static void pull_buffers(const terrimp_terrain *terrain)
                == TERRIMP_OK);
     for (i = 0; i < info.ground_index_count; i++)
         FUZZ_CHECK(patterns[i] < info.ground_vertex_count);
-    FUZZ_CHECK(terrimp_geomip_fill_weights(info.chunk_quads, TERRIMP_FORM_LIST, weights)
+    FUZZ_CHECK(terrimp_geomip_fill_weights(info.chunk_quads, weights)
                == TERRIMP_OK);
     free(weights);
     check_node(terrain, fuzz_u8() % info.node_count);

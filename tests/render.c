@@ -1092,7 +1092,7 @@ static uint32_t count_levels(const gl_geomip *g)
 {
     uint32_t seen = 0, count = 0, i;
     for (i = 0; i < g->view.draw_count; i++)
-        seen |= 1u << g->view.draws[i].level;
+        seen |= 1u << g->view.draws[i].node.level;
     for (; seen; seen >>= 1)
         count += seen & 1u;
     return count;

@@ -812,7 +812,7 @@ static void check_no_slot_is_lost(const flight *f)
 static void check_stats(flight *f)
 {
     const terrimp_stats *s = &f->stats;
-    uint32_t by_level[TERRIMP_GEOMIP_LEVELS] = {0}, i;
+    uint32_t by_level[TERRIMP_QUADTREE_LEVELS] = {0}, i;
     double slots = 0.0, all = (double)f->desc.atlas_size * (double)f->desc.atlas_size;
     for (i = 0; i < f->item_count; i++)
         if (f->items[i].is_impostor) {
@@ -1302,9 +1302,9 @@ static void flights_with_split_pictures_keep_every_law(void)
     uint32_t x, z;
     check_state = 20100611u;
     land_prepare(&l, 129, 129, TERRIMP_FORMAT_F32, LAND_FLAT);
-    for (z = 0; z < 129u; z++) /* ridges along x that meshes can follow */
+    for (z = 0; z < 129u; z++) /* a plain with ridges along x that meshes can follow */
         for (x = 0; x < 129u; x++)
-            l.samples[z * 129u + x] = fabsf((float)(z % 32u) - 16.0f);
+            l.samples[z * 129u + x] = fmaxf(0.0f, 16.0f - 2.0f * fabsf((float)(z % 32u) - 10.0f));
     l.desc.chunk_quads = 8;
     l.desc.triangle_budget = 100;
     d = eager_settings();
@@ -1705,7 +1705,7 @@ static void geomip_draws_the_selection(void)
 {
     flight *f = &flight_room;
     terrimp_view_desc d;
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view;
     float *scratch;
     land l;
@@ -1719,9 +1719,9 @@ static void geomip_draws_the_selection(void)
     d.ground_tolerance_px = view.tolerance_px = 2.0f;
     d.ground_rule = view.rule = TERRIMP_GEOMIP_BOUND;
     d.morph_ratio = view.morph_ratio = 1.4f;
-    CHECK(terrimp_geomip_init(&l.desc.field, l.desc.chunk_quads, &tree) == TERRIMP_OK);
+    CHECK(terrimp_quadtree_init(&l.desc.field, l.desc.chunk_quads, &tree) == TERRIMP_OK);
     tree.nodes = (terrimp_geomip_node *)flight_array(tree.node_count, sizeof *tree.nodes);
-    scratch = (float *)flight_array(tree.scratch_count, sizeof *scratch);
+    scratch = (float *)flight_array(tree.field.width + 2u * tree.chunk_quads + 2u, sizeof *scratch);
     CHECK(terrimp_geomip_build(&tree, scratch) == TERRIMP_OK);
     view.distances = (float *)flight_array(tree.node_count, sizeof *view.distances);
     view.marks = (terrimp_geomip_mark *)flight_array(tree.node_count, sizeof *view.marks);
@@ -1740,7 +1740,7 @@ static void geomip_draws_the_selection(void)
                 terrimp_pattern pattern;
                 CHECK(terrimp_pattern_find(tree.chunk_quads, TERRIMP_FORM_LIST,
                                            view.draws[i].pattern, &pattern) == TERRIMP_OK);
-                CHECK(c->node == view.draws[i].node && c->level == view.draws[i].level);
+                CHECK(c->node == view.draws[i].node.number && c->level == view.draws[i].node.level);
                 CHECK(c->first_index == pattern.first_index);
                 CHECK(c->index_count == pattern.index_count);
                 CHECK(c->morph == view.draws[i].morph);

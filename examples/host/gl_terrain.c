@@ -386,7 +386,7 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
     if (!weights)
         return "no memory for the morph weights";
     terrimp_terrain_get_info(g->terrain, &info);
-    terrimp_geomip_fill_weights(info.chunk_quads, TERRIMP_FORM_LIST, weights);
+    terrimp_geomip_fill_weights(info.chunk_quads, weights);
     g->morphing = make_shaded(g, gl_morphing_vertex, ground_main);
     glGenVertexArrays(1, &g->morphing_array);
     glBindVertexArray(g->morphing_array);
