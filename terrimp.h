@@ -114,9 +114,14 @@
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
-       as they were unless their comment says otherwise. NaN, infinities, null pointers, sizes out
-       of their limits and products that overflow are errors in every build; asserts are for this
-       header's own mistakes. terrimp_result_text says what to do.
+       as they were unless their comment says otherwise. Any of them may return, in every build,
+       and their comments do not repeat it:
+         E_NULL                a pointer is null that is not said to be optional
+         E_RANGE, E_NOT_FINITE a number is outside of its limits, or NaN or infinite
+         E_OVERFLOW, E_MEMORY  sizes multiply to more than size_t holds; a block is too small
+         E_ALIGN, E_CAPACITY   a pointer is not aligned for its type; an output array is too small
+         E_STATE               an object is not ready: before init, build_finish, the first update
+       Asserts are for this header's own mistakes. terrimp_result_text says what to do.
 
    THREADS AND DETERMINISM
        No globals, no statics that change. Nodes may be built by several threads at once, each
@@ -284,14 +289,9 @@ typedef struct terrimp_heightfield {
 
    in         what the caller filled in
    out        receives the effective descriptor; may be in itself
-   Errors     E_NULL  in, out or in->samples is null
-              E_RANGE a size, the format, a spacing or the scale is outside its limits; row_bytes is
-                      shorter than a row or no multiple of a sample; the spacing is so fine, or the
-                      origin so distant, that a float cannot tell neighbouring columns apart; a
-                      sample of the integer formats would get an infinite height
-              E_NOT_FINITE  a spacing, the scale, the offset or the origin is NaN or infinite
-              E_OVERFLOW    the samples span more than size_t holds
-              E_ALIGN       samples is not aligned for the format
+   Errors     E_RANGE also when row_bytes is shorter than a row or no multiple of a sample; when the
+              spacing is so fine, or the origin so distant, that a float cannot tell neighbouring
+              columns apart; when a sample of the integer formats would get an infinite height
    Cost       O(1); the samples are not read */
 TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield *in,
                                                        terrimp_heightfield *out);
@@ -300,8 +300,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
 
    x, z       receive its column and row on E_VOID, and on E_NOT_FINITE if a sample is the cause;
               NULL: not wanted
-   Errors     those of resolve; E_VOID  the sample is a void;
-              E_NOT_FINITE  the height of the sample is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample
    Cost       O(width * depth) */
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z);
@@ -312,9 +311,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
    cols, rows size of the tile in samples [Limits: >= 1]
    stride     steps of the field from one sample of the tile to the next [Limits: >= 1]
    out        [rows][cols] [wu] receives the heights; must not overlap the samples
-   Errors     those of resolve; E_NULL  out is null; E_RANGE  an argument is outside its limits;
-              E_OVERFLOW  the tile is larger than size_t holds; E_VOID  the tile has a void;
-              E_NOT_FINITE  a height of the tile is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample in the tile
    Cost       O(cols * rows), read twice: out is written only once the tile is known to be good */
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
                                                     uint32_t z, uint32_t cols, uint32_t rows,
@@ -325,8 +322,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
    x, z       column and row of the first sample [Limits: inside the field]
    cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
    low, high  [wu] receive the heights
-   Errors     those of resolve; E_NULL  low or high is null; E_RANGE  an argument is outside its
-              limits; E_VOID  every sample is a void; E_NOT_FINITE  a height is NaN or infinite
+   Errors     E_VOID when every sample is a void; E_NOT_FINITE for such a height
    Cost       O(cols * rows) */
 TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, uint32_t cols, uint32_t rows,
@@ -336,8 +332,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
 
    x, z       [wu] position; the outline of the field belongs to it
    height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_NOT_FINITE  x, z or a height of the
-              quad; E_MISS  the position is outside the field; E_VOID  the position is in a hole
+   Errors     E_MISS outside of the field; E_VOID in a hole; E_NOT_FINITE also for heights
    Cost       O(1) */
 TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield *field, float x,
                                                       float z, float *height);
@@ -366,9 +361,7 @@ typedef struct terrimp_ray_hit {
    direction     [3] any length but zero
    max_distance  [wu] end of the ray [Limits: > 0; FLT_MAX for no end]
    hit           receives the meeting; NULL: not wanted
-   Errors        those of resolve; E_NULL  origin or direction is null;
-                 E_NOT_FINITE  origin, direction or max_distance is NaN or infinite;
-                 E_RANGE  direction is zero or max_distance <= 0; E_MISS  the ray meets nothing
+   Errors        E_MISS when the ray meets nothing
    Cost          O(number of quads below the ray), at most width + depth
    Source        Amanatides and Woo 1987, A fast voxel traversal algorithm: the walk */
 TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield *field,
@@ -392,22 +385,21 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera.
-   Errors: E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits. */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
+   camera. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
 /* View and projection matrix, for column vectors, column-major.
 
    view          [16] out, world to eye space (x right, y up, looking along -z)
-   projection    [16] out, eye space to clip space
-   Errors        those of terrimp_camera_resolve */
+   projection    [16] out, eye space to clip space */
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16]);
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
    height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-   Errors: those of terrimp_camera_resolve. Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
+   Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
 /* The six planes of a viewing volume. A point p is inside plane i when
@@ -423,7 +415,7 @@ enum {
     TERRIMP_PLANES_OUTSIDE = -1
 };
 
-/* The planes of a camera. Errors: those of terrimp_camera_resolve. */
+/* The planes of a camera. */
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum);
 
@@ -456,8 +448,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE when a minimum exceeds its maximum; E_INSIDE when the
-              eye is in the box; E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
+              E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -467,13 +459,12 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
    sides touch their projections. The clip distances stay.
 
    xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
-   Errors       E_NULL; E_RANGE; E_BEHIND when a point is not in front of the eye: the capture is
-                unchanged
+   Errors       E_BEHIND when a point is not in front of the eye: the capture is unchanged
    Cost         O(count) */
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count);
 
-/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
+/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16]);
@@ -502,8 +493,7 @@ typedef struct terrimp_quadtree {
 /* Lays the quadtree out; nodes is left NULL for the caller to set.
 
    chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
-                fewer triangles, for the same picture
-   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
+                fewer triangles, for the same picture */
 TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
                                                  uint32_t chunk_quads, terrimp_quadtree *tree);
 
@@ -537,8 +527,7 @@ typedef struct terrimp_pattern {
 
    chunk_quads  quads along a node's side [Limits: even, 4..128]
    form         terrimp_form
-   pattern      [Limits: < TERRIMP_PATTERN_COUNT]
-   Errors       E_NULL; E_RANGE */
+   pattern      [Limits: < TERRIMP_PATTERN_COUNT] */
 TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, uint32_t pattern,
                                                 terrimp_pattern *found);
 
@@ -551,7 +540,6 @@ TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form)
    are transformed for each triangle at chunk_quads 16, 0.55 at 64.
 
    indices     [terrimp_pattern_index_count] out
-   Errors      E_NULL; E_RANGE; E_CAPACITY
    Source      de Boer 2000, section 2.3.2 (borders); Wagner 2003 (strips with degenerate joins) */
 TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
                                                 size_t capacity);
@@ -567,7 +555,7 @@ typedef struct terrimp_geomip_node {
     float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
 } terrimp_geomip_node;
 
-/* The box of a node. Errors: E_NULL; E_RANGE. */
+/* The box of a node. */
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box);
 
@@ -626,8 +614,8 @@ typedef struct terrimp_geomip_view {
    level, those outside of the camera's view are left out.
 
    view       in: settings and arrays; out: draws, draw_count, triangle_count
-   Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
-              before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
+   Errors     E_CAPACITY: draw_count is 0, draws_needed says how many there are. After others the
+              draws of the frame before stay
    Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
    Source     de Boer 2000, sections 2.2 and 2.3.1, equations 1 to 2 */
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
@@ -659,13 +647,12 @@ typedef struct terrimp_geomip_weights {
 /* Fills the vertices of a node of any level, row by row.
 
    xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
-   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
-   Errors     E_NULL (also when both are NULL); E_RANGE */
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted */
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices);
 
-/* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
+/* Fills the weights of a node's vertices, for all nodes the same.
 
    weights    [(chunk_quads + 1)^2] out */
 TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
@@ -678,7 +665,6 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
    vertices   [(chunk_quads + 1)^2] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
-   Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
@@ -703,7 +689,6 @@ typedef struct terrimp_rect {
    size             [2] out, width and height; rounded up
    scale            out, 1, or the factor by which the picture was reduced to keep to `largest`;
                     may be NULL
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equations 3.3 and 3.4 */
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
@@ -713,8 +698,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
    at its rim then stay inside the slot.
 
    capture    in and out
-   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin]
-   Errors     E_NULL; E_RANGE */
+   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin] */
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
@@ -724,7 +708,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
-   Errors          E_NULL; E_RANGE when the slot is empty or leaves the atlas
+   Errors          E_RANGE when the slot is empty or leaves the atlas
    Source          Hess 2010, section 3.4, made projective: interpolating s and t themselves would
                    bend the picture inside large triangles */
 TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
@@ -732,14 +716,13 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. Errors: E_NULL. */
+   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
                                                        size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
    angle_rad    out, 0..pi
-   Errors       E_NULL; E_NOT_FINITE
    Source       Hess 2010, section 3.5: all corners, since an eye can approach the centre of a large
                 impostor without turning around it */
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
@@ -754,7 +737,7 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
                   pass the vertical one: with meshes that stand proud the bound then held for every
                   sample that a capture saw, but at grazing angles (measured: up to 1.1 times it)
    error_px       out; +infinity when the eye is within `error` of the box and has moved
-   Errors         E_NULL; E_NOT_FINITE; E_RANGE when error < 0 or pixel_factor <= 0
+   Errors         E_RANGE when error < 0 or pixel_factor <= 0
    Source         own derivation, in the implementation; DESIGN: err * sin(theta) * K / d, with the
                   sine bounded over the whole box, not sampled at its corners */
 TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
@@ -767,7 +750,6 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
    max_angle_rad    [Limits: 0..pi]; from pi/2 on the angle needs a path of `distance`
    speed            [wu/s] of the eye [Limits: > 0]
    seconds          out
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equation 3.6: t = D sin(alpha) / S */
 TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_angle_rad,
                                                      float speed, float *seconds);
@@ -792,8 +774,7 @@ typedef struct terrimp_split {
               [Limits: > 0]
    overlap    [wu] by which each part goes beyond the place of the split, since the mesh is not the
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also for an index beyond the vertices or a count not of
-              triangles
+   Errors     E_RANGE, also for an index beyond the vertices or a count not of triangles
    Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
@@ -831,7 +812,7 @@ typedef struct terrimp_shelves {
 } terrimp_shelves;
 
 /* Empties an atlas. The array stays the caller's and outlives the shelves.
-   Errors: E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
+   Errors: E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
 TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity);
@@ -839,7 +820,7 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
 /* First fit: puts a rectangle on the lowest shelf with room for it, or on a new shelf.
 
    rect       in: width and height [Limits: > 0]; out: x and y
-   Errors     E_NULL; E_RANGE; E_CAPACITY when it fits nowhere: nothing is changed
+   Errors     E_CAPACITY when it fits nowhere: nothing is changed
    Cost       O(shelves) */
 TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect);
 
@@ -848,8 +829,8 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
    items      [count] in and out; the order is kept
    order      [count] out: the order of insertion, from the tallest
    placed     out, how many were placed; may be NULL
-   Errors     E_NULL; E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all
-              fit: those that did are flagged PLACED
+   Errors     E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all fit:
+              those that did are flagged PLACED
    Cost       O(n^1.5 + n * shelves), no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
@@ -887,7 +868,7 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
               out: rectangles
    order      [count] scratch
    scale      out, factor by which all sides were reduced, 1 when they fitted; may be NULL
-   Errors     E_NULL; E_CAPACITY when even one texel each does not fit: slots are left unassigned */
+   Errors     E_CAPACITY when even one texel each does not fit: slots are left unassigned */
 TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
                                                terrimp_pack_item *items, uint32_t count,
                                                uint32_t *order, float *scale);
@@ -898,7 +879,7 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
                                                uint32_t width, uint32_t height);
 
 /* Notes that the picture has been rendered into the slot of the newest atlas: it has moved.
-   Errors: E_NULL; E_STATE when the slot has no rectangle there. */
+   Errors: E_STATE when the slot has no rectangle there. */
 TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
                                              terrimp_pair_slot *slot);
 
@@ -940,26 +921,25 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 
    memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
    bytes      at least terrimp_live_atlas_bytes(desc)
-   Errors     E_NULL; E_RANGE; E_OVERFLOW; E_ALIGN; E_MEMORY
    Cost       O(max_slots) */
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes);
 
-/* Frees all slots and sets the failures to 0. Errors: E_NULL; E_STATE before init. */
+/* Frees all slots and sets the failures to 0. */
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas);
 
 /* Finds room for a rectangle and keeps it.
 
    slot       out: its handle, < max_slots, until it is freed
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it fits
-              nowhere or all slots are in use: counted as a failure, nothing else changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it fits nowhere or all slots are in
+              use: counted as a failure, nothing else changes
    Cost       O(free rectangles), which are about twice as many as slots */
 TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, uint32_t *slot);
 
 /* Frees a slot: what borders on it grows together with it.
-   Errors: E_NULL; E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
+   Errors: E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
@@ -973,7 +953,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
    width, height  the size wanted [Limits: 1..65536]
    size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
               its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
-   Errors     E_NULL; E_STATE before init; E_RANGE
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
@@ -987,14 +966,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
    victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
               only handles were wanting. Scratch: it changes on E_CAPACITY too
    count      out: how many
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
-              larger than the atlas or every such place holds a slot that stays: nothing changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it is larger than the atlas or every
+              such place holds a slot that stays: nothing changes
    Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count);
 
-/* What the atlas holds. Errors: E_NULL; E_STATE before init. Cost: O(free rectangles). */
+/* What the atlas holds. Cost: O(free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
                                                     terrimp_live_atlas_stats *stats);
 
@@ -1048,8 +1027,7 @@ typedef struct terrimp_terrain_info {
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
 
-/* Writes the effective descriptor, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_heightfield_resolve. */
+/* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
 
@@ -1060,7 +1038,7 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
    morph      nonzero: also the nodes beside them whose morph data has changed
    nodes      [capacity] out, rising; NULL: only counted
    count      out: how many there are, also when they are more than capacity
-   Errors     E_NULL; E_RANGE; E_STATE; E_CAPACITY: nodes is untouched
+   Errors     E_CAPACITY: nodes is untouched
    Cost       O(count) */
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, int morph,
@@ -1072,11 +1050,11 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
                                                     terrimp_terrain_info *info);
 
 /* The box of everything that is drawn of a node and of all nodes below it: samples, coarse meshes,
-   skirts. Errors: E_NULL; E_RANGE; E_STATE. */
+   skirts. */
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box);
 
-/* The place and the quality of a node's coarse mesh. Errors: E_NULL; E_RANGE; E_STATE. */
+/* The place and the quality of a node's coarse mesh. */
 typedef struct terrimp_mesh_info {
     uint32_t base_vertex, vertex_count; /* in the vertices of terrimp_terrain_fill_meshes */
     uint32_t first_index, index_count;  /* in its indices */
@@ -1091,8 +1069,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
    terrimp_terrain_fill_ground. Triangle list, counter-clockwise from above. First stand the
    patterns of terrimp_pattern_fill with TERRIMP_FORM_LIST, then the strips that captures draw.
 
-   indices    [ground_index_count] out
-   Errors     E_NULL; E_CAPACITY; E_STATE */
+   indices    [ground_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *terrain,
                                                         uint16_t *indices, size_t capacity);
 
@@ -1101,8 +1078,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
 
    node        of any level [Limits: < node_count]
    xyz         [ground_vertex_count][3] out
-   capacity    floats
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity    floats */
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity);
 
@@ -1110,8 +1086,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
    say the weights that terrimp_geomip_fill_weights gives for chunk_quads and TERRIMP_FORM_LIST.
 
    vertices   [ground_vertex_count] out
-   capacity   of vertices
-   Errors     E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity   of vertices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
                                                       uint32_t node,
                                                       terrimp_geomip_vertex *vertices,
@@ -1123,8 +1098,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
    node        [Limits: <= node_count] node_count: the floor, behind all others
    xyz         [mesh_vertex_stride][3] out; for the floor what is left of mesh_vertex_count
    indices     [mesh_index_stride] out; the same
-   capacities  floats, indices
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacities  floats, indices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                      float *xyz, size_t xyz_capacity,
                                                      uint16_t *indices, size_t index_capacity);
@@ -1133,8 +1107,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
    count from the base vertex of each mesh.
 
    xyz         [mesh_vertex_count][3] out
-   indices     [mesh_index_count] out
-   Errors      E_NULL; E_CAPACITY; E_STATE */
+   indices     [mesh_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *terrain, float *xyz,
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity);
@@ -1175,7 +1148,7 @@ typedef struct terrimp_bake_info {
 
    block      [bytes] aligned to 8 bytes
    info       out; NULL: not wanted
-   Errors     E_NULL; E_ALIGN; E_BAKE; E_ORDER when it has to be converted first
+   Errors     E_BAKE; E_ORDER when it has to be converted first
    Cost       O(nodes), about 1 us for each */
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
                                               terrimp_bake_info *info);
@@ -1185,7 +1158,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
 
    block      [bytes] aligned to 8 bytes
    out        [capacity] aligned to 8 bytes; may be block, else apart from it
-   Errors     E_NULL; E_ALIGN; E_CAPACITY; E_BAKE: out, if it is not block, may have changed */
+   Errors     E_BAKE: out, if it is not block, may have changed */
 TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
                                                 size_t capacity);
 
@@ -1208,7 +1181,7 @@ TERRIMP_API size_t terrimp_terrain_open_bytes(void);
    memory         [memory_bytes] aligned to 8 bytes, at least terrimp_terrain_open_bytes
    terrain        out: lies in memory
    Errors         those of check and of terrimp_heightfield_resolve; E_BAKE for a field of another
-                  size, format, scale or offset; E_MEMORY
+                  size, format, scale or offset
    Cost           that of check */
 TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field,
                                                 const void *block, size_t bytes, void *memory,
@@ -1386,8 +1359,7 @@ typedef struct terrimp_stats {
                                     enough, then draw with these; z_near is 0 within a box */
 } terrimp_stats;
 
-/* Writes the effective settings for a terrain, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; E_STATE when the terrain is not built. */
+/* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out);
@@ -1400,17 +1372,16 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 
    terrain    built; outlives the view
    memory     [bytes] aligned to 8 bytes
-   view       out: lies in memory
-   Errors     those of terrimp_view_desc_resolve; E_MEMORY; E_ALIGN */
+   view       out: lies in memory */
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
-   Errors     E_NULL; those of terrimp_camera_resolve; E_CAPACITY when more than max_ground chunks
-              are in sight in mode FULL or IMPOSTOR: the frame before stays. In GEOMIP and AUTO
-              E_CAPACITY when even ground at 1000 px needs more nodes: there is no frame then
+   Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR: the
+              frame before stays. In GEOMIP and AUTO E_CAPACITY when even ground at 1000 px needs
+              more nodes: there is no frame then
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
@@ -1423,7 +1394,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
-/* Errors: E_NULL; E_STATE before the first update. */
+/* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when the light has changed or textures were lost. */
@@ -1432,8 +1403,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
    x, z       column and row of the first sample [Limits: inside the field]
-   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
-   Errors     E_NULL; E_RANGE */
+   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut */
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows);
 
@@ -1576,7 +1546,6 @@ typedef struct terrimp_mesh {
                samples than that many points is kept whole, sample by sample
    points      [capacity] out; capacity of inner_limit + 2 (or count) is always enough
    point_count out: points written
-   Errors      NULL, RANGE, NOT_FINITE, CAPACITY; outputs untouched
    Cost        O(count^2), no allocation; about 20 us for 65 samples, 3 KB of stack
    Source      Hess 2010, section 3.1, fig. 3.2 */
 TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_t count,
@@ -1594,8 +1563,7 @@ TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
 
    triangle_budget   0 -> TERRIMP_TRIANGLE_BUDGET [Limits: ..TERRIMP_MAX_TRIANGLES]
    vertex_capacity   out
-   index_capacity    out
-   Errors            NULL, RANGE; outputs untouched */
+   index_capacity    out */
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                                                  uint32_t *vertex_capacity,
                                                  uint32_t *index_capacity);
@@ -1610,9 +1578,8 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
    scratch        [scratch_bytes] aligned for int64_t; contents need not outlive the call
    scratch_bytes  at least terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget)
    mesh           in: arrays and capacities; out: everything else
-   Errors         NULL; RANGE (sizes, budget too small for the borders, border positions that do
-                  not rise from 0 to the end, corners that disagree); NOT_FINITE; MEMORY; ALIGN;
-                  CAPACITY; the mesh is untouched then
+   Errors         E_RANGE also for a budget that is too small for the borders, border positions that
+                  do not rise from 0 to the end, corners that disagree
    Cost           O(cols rows + budget^2); about 0.65 ms for 65 x 65 at the default budget
    Source         Hess 2010, section 3.1; the fit of heights after Lindstrom and Turk's idea that
                   a moved vertex beats a chosen one, here along y alone */
@@ -1630,7 +1597,7 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
    upper   0: the lower skirt
    height  [wu] of the lower skirt, its bottom, as a rule the node's least height; a border vertex
            that lies lower gets a wall of no height. Of the upper one, its rise [Limits: >= 0]
-   Errors  NULL; NOT_FINITE; RANGE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
+   Errors  E_STATE when the mesh has no surface yet
    Source  Hess 2010, section 4.2 */
 TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
 
@@ -1653,7 +1620,7 @@ typedef struct terrimp_raise_desc {
    desc    how far
    mesh    in: a mesh of that tile without skirts; out: its heights
    work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
-   Errors  NULL; RANGE; NOT_FINITE; STATE when the mesh has no surface or has skirts; mesh untouched
+   Errors  E_STATE when the mesh has no surface or has skirts
    Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
    Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
@@ -1678,9 +1645,8 @@ TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, 
    scratch         aligned for float; NULL is E_NULL even if there is no void
    scratch_bytes   at least terrimp_heightfield_fill_voids_scratch_bytes(width, depth)
    filled_count    receives the number of filled samples, 0 without has_no_data; NULL: not wanted
-   Errors          those of resolve; E_NULL; E_RANGE  samples is not field->samples;
-                   E_ALIGN  scratch; E_MEMORY  scratch_bytes; E_VOID  no sample is valid;
-                   E_NOT_FINITE  a height is NaN or infinite. No sample changes on errors.
+   Errors          E_RANGE also when samples is not field->samples; E_VOID when no sample is valid;
+                   E_NOT_FINITE for such a height. No sample changes then
    Cost            O(width * depth); some 0.35 s for 3601 x 3601 samples of which half are void
    Source          Bornemann and Deuflhard 1996, The cascadic multigrid method: from coarse to fine,
                    with more relaxation the coarser the grid */
@@ -1695,15 +1661,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
    built at the same time by threads with scratch arrays of their own.
 
    scratch    [field.width + 2 * chunk_quads + 2]
-   Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
+   Errors     at level 0 E_VOID, E_NOT_FINITE for such a sample
    Cost       O(samples of the node) */
 TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch);
 
-/* Ends the building: parents hold what their children hold. Errors: E_NULL. */
+/* Ends the building: parents hold what their children hold. */
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
@@ -1717,8 +1683,7 @@ TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *des
 /* Lays a terrain out in the caller's block. No sample is read, nothing is built yet.
 
    memory     [bytes] aligned to 8 bytes; freed by the caller when the terrain is no longer used
-   terrain    out: lies in memory
-   Errors     those of terrimp_terrain_desc_resolve; E_MEMORY; E_ALIGN; E_OVERFLOW */
+   terrain    out: lies in memory */
 TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc, void *memory,
                                                 size_t bytes, terrimp_terrain **terrain);
 
@@ -1726,8 +1691,8 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
    can be built in any order and still meet. Looks at every sample, unless the descriptor names the
    range. To be called once, before any node is built.
 
-   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or
-              the sum of its squares over all samples
+   Errors     E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or the sum
+              of its squares over all samples
    Cost       O(width * depth), about 1.5 ns a sample; O(1) when the range is named */
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain);
 
@@ -1737,16 +1702,16 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 
    node       [Limits: < node_count]
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_RANGE, also for a sample outside of the named range; E_MEMORY; E_ALIGN;
-              E_STATE before build_begin; E_VOID, E_NOT_FINITE for such a sample
+   Errors     E_RANGE, also for a sample outside of the named range; E_VOID, E_NOT_FINITE for such a
+              sample
    Cost       1.4 ms for 64 x 64 quads at level 0; at every level that, and the visits to all of the
               node's samples, 25 ns for each
    Source     Hess 2010, section 6.5, asks for meshes of several chunks */
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
-/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_NULL;
-   E_STATE when a node has not been built. */
+/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_STATE when
+   a node has not been built. */
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain);
 
 /* Begins, builds all nodes, one after the other, and finishes. Errors: those of the three above. */
@@ -1762,9 +1727,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
    samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
               it begins inside the field]; what reaches over the last column and row is cut
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_MEMORY; E_ALIGN; E_RANGE for a rectangle outside of the limits or a height
-              outside of the range; E_VOID, E_NOT_FINITE for such a sample; E_STATE before
-              build_finish and for a terrain that uses a bake. Nothing has changed then
+   Errors     E_RANGE for a rectangle outside of the limits or a height outside of the range;
+              E_VOID, E_NOT_FINITE for such a sample; E_STATE before build_finish and for a terrain
+              that uses a bake. Nothing has changed then
    Cost       that of build_node for each such node: the root has every sample. A host that cannot
               wait calls build_node itself, a few nodes a frame, from the finest level up */
 TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
@@ -1792,7 +1757,6 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
-   Errors     E_NULL; E_STATE before build_finish; E_OVERFLOW; E_CAPACITY; E_ALIGN
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
