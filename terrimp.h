@@ -49,9 +49,11 @@
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
        >>view         the per-frame decision, the schedule, the draw commands
+       >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
 
@@ -78,16 +80,17 @@
 
               eye           fade_start    fade_end
                o=================|-------------|- - - - - - - - - - - - - - - ->
-                 ground, opaque   ground fades    impostors of growing nodes,
-                                  over impostors  or ground where that is cheaper
+                 ground           impostors       impostors of growing nodes,
+                                  fade in         or ground where that is cheaper
 
        A picture is renewed when the direction to the node has turned by max_angle_rad, when the
        parallax error could pass tolerance_px, or when the node has come so close that texels would
        show. It is made from a place ahead of the eye, where it lasts longer. What waits for its
        picture is drawn from those of its children or its parent, or as ground.
 
-       Impostors are drawn deeper than they are, so that ground covers them: give the projection
-       matrix the z_far of the statistics, or a generous one.
+       In the fade band a node is drawn as ground and, on a growing share of the pixels, as the
+       impostor, whose mesh stands just above that ground. So all lies at its own depth, and water,
+       houses and shadows meet it there.
 
                picture in the atlas             coarse mesh, a little proud of the terrain
               +--------------------+                 .--'`--.__         upper skirt
@@ -131,12 +134,10 @@
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
        A picture shows a hidden slope with the ridge before it smeared over it once the eye has
        moved; max_angle_rad bounds how far that goes, and pictures in two parts spare the worst.
-       What moves on the terrain belongs into the host's own draws, not into captures. Ground fades
-       by blending, and only whole nodes are sorted: in the fade band a hidden slope can shine
-       faintly through the ridge of its own node. Ground and impostors of one place are alike to
-       within the tolerances, not to the bit: where a node changes from one to the other beyond the
-       fade band, that much can be seen to change. From beside the terrain no floor is drawn, since
-       it would show below the border.
+       What moves on the terrain belongs into the host's own draws, not into captures. Ground and
+       impostors of one place are alike to within the tolerances, not to the bit: where a node
+       changes from one to the other beyond the fade band, that much can be seen to change. From
+       beside the terrain no floor is drawn, since it would show below the border.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -166,7 +167,9 @@
        de Boer  W. H. de Boer, Fast Terrain Rendering Using Geometrical MipMapping, 2000
        Wagner   D. Wagner, Terrain Geomorphing in the Vertex Shader, in ShaderX2, 2003
        FFDH     E. G. Coffman, M. R. Garey, D. S. Johnson, R. E. Tarjan, Performance Bounds for
-                Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980 */
+                Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980
+       Jeschke  S. Jeschke, Accelerating the Rendering Process Using Impostors, dissertation, TU
+                Wien, 2004: layers */
 
 /* ==== Configuration ====================================================== >>config */
 
@@ -1219,10 +1222,10 @@ typedef struct terrimp_view_desc {
     int ground_rule;        /* terrimp_geomip_rule */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
-    float fade_start;       /* [wu] from the eye: nodes that come closer are opaque ground
+    float fade_start;       /* [wu] from the eye: nodes that come closer are ground
                                [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
-                               ground fades over the impostors [Limits: > fade_start]
+                               impostors fade in over it [Limits: > fade_start]
                                [Default 0 -> 1.5 * fade_start; in AUTO 1.1] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
@@ -1259,8 +1262,6 @@ typedef struct terrimp_ground_command {
     uint32_t level;
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
-    float alpha;          /* 1: opaque; below: blended over what is there */
-    float depth_bias;     /* as for impostors; 0 but for ground beyond the fade band */
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
@@ -1268,7 +1269,7 @@ typedef struct terrimp_ground_command {
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
    it to the farthest depth and, when `clear` is set, to transparent black. The ground commands up
-   to end_capture are drawn with these matrices, opaque. */
+   to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
     uint32_t node;
     uint32_t level;
@@ -1287,11 +1288,9 @@ typedef struct terrimp_capture_command {
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
    texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. A vertex p is
-   drawn at eye + (p - eye) * (1 + depth_bias): at the same place of the screen, only deeper, so
-   that ground is drawn over it. Of a picture in two parts both are drawn, each only where r / q is
-   within 0..1: by a discard, or by the clip planes r >= 0 and q - r >= 0, which are rows of the
-   matrix. */
+   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
+   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
+   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1300,20 +1299,20 @@ typedef struct terrimp_impostor_command {
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
     uint32_t first_index;
     uint32_t index_count;
+    float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
+                             by a dither pattern: its ground shows on the others */
     float texture_matrix[16];
-    float depth_bias;
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain and has no gap. It comes after the impostors and shows only where none
    of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
    terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
-   border: there it is not drawn.) Vertices, indices, depth bias: as for impostors. */
+   border: there it is not drawn.) Vertices and indices as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
-    float depth_bias;
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1351,8 +1350,8 @@ typedef struct terrimp_stats {
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
-                                    drawn, depth bias included: update with a camera that sees far
-                                    enough, then draw with these; z_near is 0 within a box */
+                                    drawn: update with a camera that sees far enough, then draw with
+                                    these; z_near is 0 within a box */
 } terrimp_stats;
 
 /* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
@@ -1381,9 +1380,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Calls back with the frame's commands: captures, each with its ground; opaque ground; impostors
-   and the ground between them; the floor; fading ground. Each kind front to back: what is hidden by
-   something drawn before it need not be shaded.
+/* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
+   floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate and touch until the next one */
@@ -1415,6 +1413,59 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view);
 #endif /* TERRIMP_NO_MALLOC */
 
 /* ==== stop here if you only draw what has been built ====================== */
+
+/* ==== Layers ============================================================= >>layers */
+
+/* A piece of scenery, for instance a wood or a village, as pictures that stand one behind the
+   other: its layers. All are taken from one reference point, in the middle of the side of a view
+   cell that faces the scenery, and serve every eye in that cell. Each shows what lies between two
+   depths. They stand so close that between two of them nothing shows through, and so that nothing
+   appears farther than an allowed angle from where it is. Depths are measured from the reference
+   point along the direction of view. Room Layer builder makes them. */
+typedef struct terrimp_layers {
+    uint32_t count;        /* layer 0 is the closest */
+    uint32_t even_count;   /* this layer and those before it are evenly spaced in 1 / depth */
+    float start, end;      /* [wu] the depths that they stand for; end may be infinite */
+    float first, last;     /* 1 / depth of the first and of the last layer */
+    float step;            /* by which 1 / depth falls from one evenly spaced layer to the next */
+    float shrink, shift;   /* beyond: by which part of itself, and by how much else, it falls */
+    float texel;           /* tangent that one texel of each layer covers at the reference point */
+} terrimp_layers;
+
+/* The depth at which a layer stands [wu]. layers is not null, layer < its count. O(log(count)). */
+TERRIMP_API float terrimp_layer_depth(const terrimp_layers *layers, uint32_t layer);
+
+/* The depth at which layer - 1 ends and layer begins [wu]: start for 0, end for count. In between
+   what is off by parallax is shared equally: Jeschke 2004, equation 3.6, which at the reference
+   point is the middle in 1 / depth. */
+TERRIMP_API float terrimp_layer_border(const terrimp_layers *layers, uint32_t layer);
+
+/* The layer that stands for a depth; the first or the last one for depths out of the range.
+   O(log(count)^2). */
+TERRIMP_API uint32_t terrimp_layer_of(const terrimp_layers *layers, float depth);
+
+/* A rectangle of a layer that is drawn. */
+typedef struct terrimp_layer_quad {
+    terrimp_rect texels; /* of the layer's picture; row 0 is the lowest */
+    uint32_t layer;
+    uint32_t x, y;       /* where the atlas holds its lowest left texel */
+} terrimp_layer_quad;
+
+/* Corners and texture coordinates of a quad, counter-clockwise as the cell sees it. Its texture
+   needs no perspective: the quad is parallel to the picture.
+
+   picture     the capture of the layers: eye at the reference point; texels of layers->texel count
+               from tan_left and tan_down
+   atlas       [2] width and height of the atlas [texels]
+   xyz         [4][3] out [wu]
+   st          [4][2] out, 0..1 over the atlas; may be NULL
+   Errors      E_NULL; E_RANGE for a layer that is not there or an empty atlas
+   Cost        O(log(count)) */
+TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
+                                                 const terrimp_capture *picture,
+                                                 const terrimp_layer_quad *quad,
+                                                 const uint32_t atlas[2], float xyz[12],
+                                                 float st[8]);
 
 #ifndef TERRIMP_NO_BUILD
 
@@ -1694,6 +1745,126 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
+
+/* ==== Layer builder ====================================================== >>layer-builder */
+
+/* From where layers are to be seen, and what they show. The cell is a box, or a shaft that opens
+   away from the scenery; the reference point is the middle of its side that faces the scenery. */
+typedef struct terrimp_layers_desc {
+    float distance;      /* (required) [wu] from that side to the scenery [Limits: > 0] */
+    float depth;         /* [wu] of the scenery [Limits: >= 0, may be infinite] */
+    float cell_size[2];  /* [wu] width and height of that side [Limits: >= 0] */
+    float cell_depth;    /* [wu] of the cell [Limits: >= 0, may be infinite] */
+    float cell_tan[2];   /* by how much half its width and half its height grow on the way back: 0
+                            for a box [Limits: >= 0] */
+    float view_tan[2];   /* (required) largest offset of the scenery from the middle of the picture,
+                            to the side and up or down, as a tangent [Limits: > 0] */
+    float texel;         /* (required) tangent of a texel. 1 / K of the sharpest view, or less: then
+                            no eye of the cell sees a texel larger than a pixel [Limits: > 0] */
+    float tolerance_rad; /* largest angle between where a point is and where it appears
+                            [Limits: >= 0] [Default 0 -> texel] */
+    int even;            /* nonzero: all steps of 1 / depth are alike, so that planes stay planes in
+                            the grid of a depth mesh. Takes more layers for shafts, and for scenery
+                            wider than the cell */
+} terrimp_layers_desc;
+
+/* Places the layers. No line of sight from the cell passes a layer more than one texel, in either
+   direction, beside where it passes the next: so texels uncover at most what is right behind them.
+
+   layers     out. Its count is the answer for those that only want to know the price
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed, as for
+              scenery without end that is seen from a cell without end
+   Cost       O(log(count)), no list is made
+   Source     Jeschke 2004, equations 3.1 to 3.7, derived anew: implementation */
+TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
+                                               terrimp_layers *layers);
+
+/* --- hidden texels (Jeschke 3.4) --- */
+
+/* The opaque texels of a layer, in bits: bit x % 32 of word [y][x / 32] for texel (x, y), rows of
+   TERRIMP_MASK_WORDS(width) words. Bits beyond the width may be anything. */
+#define TERRIMP_MASK_WORDS(width) (((width) + 31u) / 32u)
+
+typedef enum terrimp_cull_rule {
+    TERRIMP_CULL_DEFAULT = 0, /* same as CORNERS */
+    TERRIMP_CULL_BLOCK,       /* hidden behind 3 x 3 texels: one mask of state */
+    TERRIMP_CULL_CORNERS,     /* hidden from each quarter of the cell behind 2 x 2 texels, which may
+                                 be others each time: finds more, four masks of state */
+    TERRIMP_CULL_COUNT
+} terrimp_cull_rule;
+
+/* Finds the texels of a layer that no eye of the cell can see, for the closer layers hide them.
+   Called for one layer after the other, the closest first; all of one size. What is hidden hides
+   what is behind it in turn. Never culls what can be seen, if the layers stand as planned, or
+   closer together.
+
+   opaque     [height][TERRIMP_MASK_WORDS(width)]
+   rule       terrimp_cull_rule
+   state      [1 or 4][height][TERRIMP_MASK_WORDS(width)] in and out; 0 before the first layer
+   visible    [height][TERRIMP_MASK_WORDS(width)] out: those opaque texels that can be seen; may be
+              opaque itself
+   Errors     E_NULL; E_RANGE for an empty layer or a rule that is none
+   Cost       O(width * height / 32): 0.05 ms for 512 x 512
+   Source     Jeschke 2004, sections 3.4 and 3.4.1 */
+TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
+                                              uint32_t height, int rule, uint32_t *state,
+                                              uint32_t *visible);
+
+/* --- rectangles that hold all opaque texels (Jeschke 3.5) --- */
+
+typedef struct terrimp_cover_desc {
+    const uint32_t *mask; /* (required) [height][TERRIMP_MASK_WORDS(width)] opaque texels */
+    uint32_t width;       /* (required) [texels] [Limits: 1..16384] */
+    uint32_t height;      /* (required) [texels] [Limits: 1..16384] */
+    uint32_t quad_cost;   /* what a rectangle costs, in texels: 20 for 80 bytes of vertices, if a
+                             texel has 4 [Limits: 1..2^24] [Default 0 -> 20] */
+    uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
+} terrimp_cover_desc;
+
+/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
+   numbers of the descriptor are outside of their limits or capacity is 0. */
+TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
+
+/* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
+   rectangles becomes small: cuts in two, where that leaves the fewest texels, until no cut can
+   pay; takes back the cuts that did not pay; then joins rectangles where that does.
+
+   scratch    aligned to 8 bytes
+   rects      [capacity] out, without gutter
+   count      out: how many there are; none for an empty mask
+   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY
+   Cost       about O(width * height / 32 * log(count)) */
+TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
+                                         size_t bytes, terrimp_rect *rects, uint32_t capacity,
+                                         uint32_t *count);
+
+/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
+   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
+
+   cell       [texels] side of a cell [Limits: 1..16384]
+   min_fill   [Limits: 0..1] he found 0.8 to work well
+   Errors     those of terrimp_cover
+   Source     Jeschke 2004, section 3.5 */
+TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
+                                              float min_fill, void *scratch, size_t bytes,
+                                              terrimp_rect *rects, uint32_t capacity,
+                                              uint32_t *count);
+
+/* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
+   fills with copies of its outermost texels. Never scales.
+
+   shelves     in: where; empty or partly filled; out: its top is the height that was needed
+   quads       [count] in: texels; out: x and y
+   gutter      [texels] [Limits: 0..64]
+   items       [count] scratch; out: PLACED in the flags of those that were
+   order       [count] scratch
+   Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
+               fit: quads are unchanged, and the shelves hold what did
+   Cost        that of terrimp_pack_ffdh
+   Source      Jeschke 2004, section 3.6, without his powers of two */
+TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+                                              uint32_t count, uint32_t gutter,
+                                              terrimp_pack_item *items, uint32_t *order);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -6218,6 +6389,7 @@ typedef struct terrimpi_record {
     uint32_t node;
     uint32_t seen;            /* the last frame that had a use for it; 0: the record is free */
     uint32_t listed;          /* the last frame that draws it */
+    float alpha;              /* the share of the pixels that it has in that frame */
     uint32_t part_count;      /* 0: no picture yet */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
@@ -6264,12 +6436,6 @@ typedef struct terrimpi_job {
     float wanted, cost;
 } terrimpi_job;
 
-/* What is drawn before the floor: an impostor or distant ground. */
-typedef struct terrimpi_item {
-    uint32_t index;  /* of the record or the ground draw */
-    int is_impostor;
-} terrimpi_item;
-
 struct terrimp_view {
     const terrimp_terrain *terrain;
     uint32_t frame;             /* updates so far */
@@ -6278,11 +6444,10 @@ struct terrimp_view {
     uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
     uint16_t *record_of;           /* [node_count] */
     unsigned char *prefers;        /* [node_count] the unit was drawn as impostors */
-    float *shown;                  /* [max_ground] alpha of each ground draw, 0: not drawn, -1:
-                                      opaque beyond the fade band */
+    unsigned char *shown;          /* [max_ground] nonzero: the ground draw is drawn */
     uint32_t *leaves;              /* [max_ground] ground draws, by unit */
     terrimpi_unit *units;          /* [max_ground] front to back */
-    terrimpi_item *items;          /* [max_ground + max_impostors] front to back */
+    uint32_t *items;               /* [max_impostors] records that are drawn, front to back */
     terrimpi_want *wants;          /* [max_impostors] by unit */
     uint32_t *queue;               /* [max_impostors] wants to capture, most urgent first */
     terrimpi_record *records;      /* [max_impostors] */
@@ -6295,7 +6460,6 @@ struct terrimp_view {
     terrimp_geomip_view ground;
     terrimp_view_desc desc;     /* resolved */
     float pixel_factor;
-    float depth_bias;
     float motion[3];            /* [wu] a frame, smoothed */
     float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
     terrimp_camera camera;      /* resolved, of the last update */
@@ -6418,10 +6582,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->leaf_at = (uint32_t *)terrimpi_take(&l, nodes, sizeof *v->leaf_at);
     v->record_of = (uint16_t *)terrimpi_take(&l, nodes, sizeof *v->record_of);
     v->prefers = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->prefers);
-    v->shown = (float *)terrimpi_take(&l, ground, sizeof *v->shown);
+    v->shown = (unsigned char *)terrimpi_take(&l, ground, sizeof *v->shown);
     v->leaves = (uint32_t *)terrimpi_take(&l, ground, sizeof *v->leaves);
     v->units = (terrimpi_unit *)terrimpi_take(&l, ground, sizeof *v->units);
-    v->items = (terrimpi_item *)terrimpi_take(&l, ground + impostors, sizeof *v->items);
+    v->items = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->items);
     v->wants = (terrimpi_want *)terrimpi_take(&l, impostors, sizeof *v->wants);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->records = (terrimpi_record *)terrimpi_take(&l, impostors, sizeof *v->records);
@@ -7531,15 +7695,17 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
-    if (record->listed == v->frame)
+    if (record->listed == v->frame) {
+        record->alpha = 1.0f;
         return 1;
+    }
     s = terrimpi_tree_node(&v->terrain->tree, node);
     eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
     record->listed = record->seen = v->frame;
-    v->items[v->item_count].index = index;
-    v->items[v->item_count++].is_impostor = 1;
+    record->alpha = 1.0f;
+    v->items[v->item_count++] = index;
     v->stats.impostors++;
     v->stats.impostors_by_level[s.level]++;
     return 1;
@@ -7593,20 +7759,16 @@ static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrim
 }
 
 /* Shows a unit's ground. */
-static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
+static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit)
 {
     terrimp_pattern pattern;
     uint32_t i;
-    for (i = 0; i < unit->leaf_count && alpha != 0.0f; i++) {
+    for (i = 0; i < unit->leaf_count; i++) {
         uint32_t leaf = v->leaves[unit->first_leaf + i];
-        v->shown[leaf] = alpha;
+        v->shown[leaf] = 1;
         terrimpi_ground_pattern(v, leaf, &pattern);
         v->stats.ground++;
         v->stats.triangles += pattern.triangle_count;
-        if (alpha < 0.0f) {
-            v->items[v->item_count].index = leaf;
-            v->items[v->item_count++].is_impostor = 0;
-        }
     }
 }
 
@@ -7614,54 +7776,46 @@ static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, flo
 static void terrimpi_unlist(terrimp_view *v, uint32_t first)
 {
     while (v->item_count > first) {
-        terrimpi_record *record = &v->records[v->items[--v->item_count].index];
+        terrimpi_record *record = &v->records[v->items[--v->item_count]];
         record->listed = 0;
         v->stats.impostors--;
         v->stats.impostors_by_level[terrimpi_tree_node(&v->terrain->tree, record->node).level]--;
     }
 }
 
-/* Settles what each unit is drawn as, now that it is known which pictures will exist. */
+/* Settles what each unit is drawn as, now that it is known which pictures will exist. An impostor
+   that is drawn for other units too does not fade. */
 static void terrimpi_settle(terrimp_view *v)
 {
-    float closest = v->desc.fade_end; /* of all impostors */
+    float band = v->desc.fade_end - v->desc.fade_start;
     uint32_t u, i;
     v->item_count = 0;
     for (u = 0; u < v->unit_count; u++) {
         const terrimpi_unit *unit = &v->units[u];
         uint32_t before = v->item_count;
-        int covered = unit->want_count > 0, impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
+        int covered = unit->want_count > 0;
         for (i = 0; i < unit->want_count; i++)
             covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
-        if (!covered) {
+        if (!covered)
             terrimpi_unlist(v, before);
-            terrimpi_show_ground(v, unit,
-                                 impostors && unit->closest >= v->desc.fade_end ? -1.0f : 1.0f);
-        } else
-            terrimpi_show_ground(v, unit,
-                                 terrimpi_max(0.0f, (v->desc.fade_end - unit->closest) /
-                                                        (v->desc.fade_end - v->desc.fade_start)));
+        if (!covered || unit->closest < v->desc.fade_end)
+            terrimpi_show_ground(v, unit);
+        for (i = before; i < v->item_count; i++)
+            v->records[v->items[i]].alpha =
+                terrimpi_min(1.0f, (unit->closest - v->desc.fade_start) / band);
     }
-    for (i = 0; i < v->item_count; i++)
-        if (v->items[i].is_impostor) {
-            terrimp_node s = terrimpi_tree_node(&v->terrain->tree,
-                                               v->records[v->items[i].index].node);
-            float angle, parallax;
-            terrimp_mesh_info mesh;
-            terrimp_box box;
-            uint32_t parts;
-            terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
-                           &parallax);
-            terrimpi_mesh_place(v->terrain, s.number, &mesh);
-            v->stats.triangles += mesh.index_count / 3u * parts;
-            v->stats.draws += parts;
-            v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
-            v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
-            terrimpi_site_box(v, &s, &box);
-            closest = terrimpi_min(closest, terrimp_box_distance(&box, v->camera.eye));
-        }
-    /* All impostors go behind all ground: the closest one is moved to the end of the fade band. */
-    v->depth_bias = v->desc.fade_end / terrimpi_max(closest, v->desc.fade_end / 8.0f) - 1.0f;
+    for (i = 0; i < v->item_count; i++) {
+        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, v->records[v->items[i]].node);
+        float angle, parallax;
+        terrimp_mesh_info mesh;
+        uint32_t parts;
+        terrimpi_judge(v, terrimpi_picture(v, v->items[i], &parts), &s, &angle, &parallax);
+        terrimpi_mesh_place(v->terrain, s.number, &mesh);
+        v->stats.triangles += mesh.index_count / 3u * parts;
+        v->stats.draws += parts;
+        v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
+        v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
+    }
 }
 
 /* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
@@ -7697,8 +7851,7 @@ static void terrimpi_count_frame(terrimp_view *v)
         terrimpi_site_box(v, &v->units[u].site, &box);
         if (u == 0 || v->units[u].closest < s->z_near)
             s->z_near = v->units[u].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye) *
-                                              (1.0f + v->depth_bias));
+        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye));
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
@@ -7820,7 +7973,6 @@ static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job,
     callbacks->begin_capture(callbacks->user, &command);
     memset(&ground, 0, sizeof ground);
     ground.level = job->source;
-    ground.alpha = 1.0f;
     for (k = job->cell_from; k < job->cell_to; k++) {
         if (!terrimpi_cell(v, job, k, &ground.node, &pattern) ||
             !terrimpi_cell_in_part(v, job, ground.node, part))
@@ -7862,7 +8014,7 @@ static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    command.depth_bias = v->depth_bias;
+    command.alpha = record->alpha;
     record->drawn_count++;
     for (part = 0; part < record->part_count; part++) {
         command.part = part;
@@ -7880,7 +8032,6 @@ static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks
     command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
     command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
     command.index_count = terrimpi_floor_indices(v->terrain);
-    command.depth_bias = v->depth_bias;
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -7896,8 +8047,6 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     command.level = draw->node.level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
-    command.alpha = v->shown[index] < 0.0f ? 1.0f : v->shown[index];
-    command.depth_bias = v->shown[index] < 0.0f ? v->depth_bias : 0.0f;
     command.morph = draw->morph;
     memcpy(command.side, draw->side, sizeof command.side);
     memcpy(command.side_coarse, draw->side_coarse, sizeof command.side_coarse);
@@ -7918,18 +8067,12 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         terrimpi_render_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
     for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] >= 1.0f)
+        if (view->shown[view->leaves[i]])
             terrimpi_render_ground(view, view->leaves[i], callbacks);
     for (i = 0; i < view->item_count; i++)
-        if (view->items[i].is_impostor)
-            terrimpi_render_impostor(view, &view->records[view->items[i].index], callbacks);
-        else
-            terrimpi_render_ground(view, view->items[i].index, callbacks);
+        terrimpi_render_impostor(view, &view->records[view->items[i]], callbacks);
     if (callbacks->draw_floor && terrimpi_floor_wanted(view))
         terrimpi_render_floor(view, callbacks);
-    for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] > 0.0f && view->shown[view->leaves[i]] < 1.0f)
-            terrimpi_render_ground(view, view->leaves[i], callbacks);
     return TERRIMP_OK;
 }
 
@@ -7982,6 +8125,99 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
 #endif /* TERRIMP_NO_MALLOC */
 
 /* ==== stop here if you only draw what has been built ====================== */
+
+/* ==== Layers ============================================================= >>impl-layers */
+/* Based on: Jeschke 2004, chapter 3. With the reference point on the cell's near side each of his
+   spacings is an affine step of 1 / depth, so that the n-th layer needs no sum over those before
+   it, and depths of thousands of layers do not drift. */
+
+/* 1 / depth after `count` steps d -> d - (shrink d + shift). Steps are doubled as powers are; what
+   they take off is kept apart, where 1 - shrink would lose its digits, and taken off at once. */
+static float terrimpi_layer_walk(float d, float shrink, float shift, uint32_t count)
+{
+    float shrinks = 0.0f, shifts = 0.0f;
+    for (; count > 0; count >>= 1) {
+        if (count & 1u) {
+            shrinks += shrink - shrink * shrinks;
+            shifts += shift - shrink * shifts;
+        }
+        shift *= 2.0f - shrink;
+        shrink *= 2.0f - shrink;
+    }
+    return d - (shrinks * d + shifts);
+}
+
+/* 1 / depth of a layer; the last one stands no farther than it must. */
+static float terrimpi_layer_inverse(const terrimp_layers *l, uint32_t layer)
+{
+    uint32_t even = terrimpi_min_u32(layer, l->even_count);
+    float d = l->first - (float)even * l->step;
+    if (layer + 1u >= l->count)
+        return l->last;
+    return terrimpi_layer_walk(d, l->shrink, l->shift, layer - even);
+}
+
+TERRIMP_API float terrimp_layer_depth(const terrimp_layers *layers, uint32_t layer)
+{
+    return 1.0f / terrimpi_layer_inverse(layers, layer);
+}
+
+TERRIMP_API float terrimp_layer_border(const terrimp_layers *layers, uint32_t layer)
+{
+    if (layer == 0)
+        return layers->start;
+    if (layer >= layers->count)
+        return layers->end;
+    return 2.0f / (terrimpi_layer_inverse(layers, layer - 1u) +
+                   terrimpi_layer_inverse(layers, layer));
+}
+
+TERRIMP_API uint32_t terrimp_layer_of(const terrimp_layers *layers, float depth)
+{
+    uint32_t low = 0, high = layers->count - 1u;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2u;
+        if (depth < terrimp_layer_border(layers, middle + 1u))
+            high = middle;
+        else
+            low = middle + 1u;
+    }
+    return low;
+}
+
+/* The world position of a point (u, v) of the picture, in texels, at a depth. */
+static void terrimpi_layer_point(const terrimp_capture *p, float texel, float u, float v,
+                                 float depth, float out[3])
+{
+    float right = (p->tan_left + u * texel) * depth, up = (p->tan_down + v * texel) * depth;
+    int k;
+    for (k = 0; k < 3; k++)
+        out[k] = p->eye[k] + right * p->right[k] + up * p->up[k] + depth * p->forward[k];
+}
+
+TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
+                                                 const terrimp_capture *picture,
+                                                 const terrimp_layer_quad *quad,
+                                                 const uint32_t atlas[2], float xyz[12],
+                                                 float st[8])
+{
+    float depth;
+    uint32_t i;
+    TERRIMPI_REFUSE(!layers || !picture || !quad || !atlas || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(quad->layer >= layers->count || !atlas[0] || !atlas[1], TERRIMP_E_RANGE);
+    depth = terrimp_layer_depth(layers, quad->layer);
+    for (i = 0; i < 4u; i++) {
+        uint32_t x = i == 1u || i == 2u ? quad->texels.width : 0u;
+        uint32_t y = i >= 2u ? quad->texels.height : 0u;
+        terrimpi_layer_point(picture, layers->texel, (float)(quad->texels.x + x),
+                             (float)(quad->texels.y + y), depth, xyz + 3u * i);
+        if (!st)
+            continue;
+        st[2u * i] = (float)(quad->x + x) / (float)atlas[0];
+        st[2u * i + 1u] = (float)(quad->y + y) / (float)atlas[1];
+    }
+    return TERRIMP_OK;
+}
 
 #ifndef TERRIMP_NO_BUILD
 
@@ -10954,6 +11190,898 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.checksum = terrimpi_bake_hash(&bake, terrain);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    return TERRIMP_OK;
+}
+
+/* ==== Layer builder ====================================================== >>impl-layer-builder */
+/* Based on: Jeschke 2004, chapters 3 and 4. What is said without a source is derived here.
+
+   Spacing. A line of sight meets the plane of depth 0 at x0 and a layer at depth t, in tangents of
+   the picture, at slope + x0 / t. So between two layers it moves by |x0| times the step of 1 / t,
+   which may be a texel at most: step = texel / largest |x0|. An eye h behind the cell's near side
+   stands at most size / 2 + h cell_tan beside the axis and looks at a point at most view_tan t
+   beside it, so |x0| <= (size / 2 + h q) t / (t + h), with q = cell_tan + view_tan. That is
+   monotone in h: either the near side rules (h = 0), where steps of 1 / t are all alike, or the far
+   side (h = cell_depth), where the step is affine in 1 / t.
+
+   Parallax. A point at depth t that appears on a plane at depth p misses its place by an angle of
+   at most |1/t - 1/p| r, with r = (|size| / 2 + h |q|) (end / (end + h))^2 at its largest: its
+   offset at the plane over its distance from the eye, both bounded over the depths up to end. */
+
+#define TERRIMPI_LAYERS_MAX 65535.0f
+
+/* What a descriptor comes to. */
+typedef struct terrimpi_spacing {
+    float start, end;    /* 1 / depth */
+    float spare;         /* by which 1 / depth may be off */
+    float texel;         /* or less, where half a texel in both directions is more than allowed */
+    float side;          /* largest |x0| from the near side of the cell */
+    float shrink, shift; /* of the step that the far side asks for */
+    float change;        /* 1 / depth below which that is the smaller one */
+} terrimpi_spacing;
+
+static float terrimpi_hypot(float a, float b)
+{
+    float v[3];
+    v[0] = a;
+    v[1] = b;
+    v[2] = 0.0f;
+    return terrimpi_length(v);
+}
+
+/* The largest r of the bound of parallax. Over h it has one peak, at end - 2 size / q. */
+static float terrimpi_layers_reach(const terrimp_layers_desc *d)
+{
+    float r = 0.5f * terrimpi_hypot(d->cell_size[0], d->cell_size[1]);
+    float q = terrimpi_hypot(d->cell_tan[0] + d->view_tan[0], d->cell_tan[1] + d->view_tan[1]);
+    float end = d->distance + d->depth, h, ratio;
+    if (!terrimpi_finite(end))
+        return r + d->cell_depth * q;
+    h = terrimpi_min(terrimpi_max(0.0f, end - 2.0f * r / q), d->cell_depth);
+    ratio = end / (end + h);
+    return (r + h * q) * ratio * ratio;
+}
+
+static void terrimpi_layers_spacing(const terrimp_layers_desc *d, terrimpi_spacing *s)
+{
+    float tolerance = d->tolerance_rad > 0.0f ? d->tolerance_rad : d->texel;
+    float q[2], m = d->cell_depth, sum, reach = terrimpi_layers_reach(d);
+    s->start = 1.0f / d->distance;
+    s->end = 1.0f / (d->distance + d->depth);
+    s->spare = reach > 0.0f ? tolerance / reach : s->start;
+    s->texel = 0.9998f * terrimpi_min(d->texel, 1.414f * tolerance); /* rounding of depths */
+    s->side = 0.5f * terrimpi_max(d->cell_size[0], d->cell_size[1]);
+    q[0] = d->cell_tan[0] + d->view_tan[0];
+    q[1] = d->cell_tan[1] + d->view_tan[1];
+    s->shift = 0.0f;
+    if (!terrimpi_finite(m)) {
+        s->shrink = s->texel / terrimpi_max(q[0], q[1]);
+        s->change = s->side > 0.0f ? terrimpi_max(q[0], q[1]) / s->side : TERRIMPI_INFINITY;
+    } else {
+        sum = terrimpi_max(0.5f * d->cell_size[0] + m * q[0], 0.5f * d->cell_size[1] + m * q[1]);
+        s->shift = sum > 0.0f ? s->texel / sum : 0.0f;
+        s->shrink = m * s->shift;
+        s->change = !(sum > s->side) ? -1.0f
+                    : s->side > 0.0f ? (sum / s->side - 1.0f) / m
+                                     : TERRIMPI_INFINITY;
+    }
+    s->shrink = terrimpi_min(s->shrink, 1.0f);
+}
+
+static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
+{
+    int k;
+    TERRIMPI_REFUSE(!terrimpi_finite(d->distance) || !terrimpi_finite(d->texel) ||
+                        !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
+                        d->cell_depth != d->cell_depth,
+                    TERRIMP_E_NOT_FINITE);
+    for (k = 0; k < 2; k++) {
+        float sum = d->cell_tan[k] + d->view_tan[k];
+        TERRIMPI_REFUSE(!terrimpi_finite2(d->cell_size[k], sum), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!(d->cell_size[k] >= 0.0f) || !(d->cell_tan[k] >= 0.0f) ||
+                            !(d->view_tan[k] > 0.0f),
+                        TERRIMP_E_RANGE);
+    }
+    TERRIMPI_REFUSE(!(d->distance > 0.0f) || !terrimpi_finite(1.0f / d->distance) ||
+                        !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
+                        !(d->tolerance_rad >= 0.0f),
+                    TERRIMP_E_RANGE);
+    return TERRIMP_OK;
+}
+
+/* How many steps of the far side take 1 / depth from d to the target or beyond. */
+static uint32_t terrimpi_layers_steps(float d, float shrink, float shift, float target)
+{
+    float shrinks[17], shifts[17];
+    uint32_t steps = 0;
+    int i;
+    for (i = 0; i < 17; i++) {
+        shrinks[i] = shrink;
+        shifts[i] = shift;
+        shift *= 2.0f - shrink;
+        shrink *= 2.0f - shrink;
+    }
+    for (i = 16; i >= 0; i--)
+        if (d - (shrinks[i] * d + shifts[i]) > target) {
+            d -= shrinks[i] * d + shifts[i];
+            steps += 1u << i;
+        }
+    return steps + 1u;
+}
+
+/* The number of layers, first those that the near side rules. */
+static terrimp_result terrimpi_layers_count(const terrimpi_spacing *s, terrimp_layers *l)
+{
+    float way = l->first - l->last, even = 0.0f, d;
+    uint32_t steps;
+    if (l->first > s->change) {
+        float needed = way / l->step, until = (l->first - s->change) / l->step;
+        if (needed <= until + 1.0f) {
+            TERRIMPI_REFUSE(!(needed < TERRIMPI_LAYERS_MAX), TERRIMP_E_RANGE);
+            l->even_count = terrimpi_ceil_u32(needed);
+            l->count = l->even_count + 1u;
+            l->step = way / (float)l->even_count;
+            return TERRIMP_OK;
+        }
+        TERRIMPI_REFUSE(!(until < TERRIMPI_LAYERS_MAX), TERRIMP_E_RANGE);
+        even = (float)((uint32_t)until + 1u);
+    }
+    d = even > 0.0f ? l->first - even * l->step : l->first;
+    steps = terrimpi_layers_steps(d, l->shrink, l->shift, l->last);
+    l->even_count = (uint32_t)even;
+    l->count = l->even_count + steps + 1u;
+    TERRIMPI_REFUSE((float)l->count > TERRIMPI_LAYERS_MAX, TERRIMP_E_RANGE);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
+                                               terrimp_layers *layers)
+{
+    terrimpi_spacing s;
+    terrimp_layers l;
+    TERRIMPI_REFUSE(!desc || !layers, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_layers_check(desc));
+    terrimpi_layers_spacing(desc, &s);
+    TERRIMPI_REFUSE(!(s.end + s.spare > 0.0f), TERRIMP_E_RANGE); /* no layer would be the last */
+    if (desc->even) { /* the far side's smallest step for all */
+        float small = s.shift + s.shrink * s.end;
+        s.side = terrimpi_max(s.side, small > 0.0f ? s.texel / small : TERRIMPI_INFINITY);
+        s.change = -1.0f;
+    }
+    l.start = desc->distance;
+    l.end = desc->distance + desc->depth;
+    l.texel = desc->texel;
+    l.first = terrimpi_max(s.start - s.spare, 0.5f * (s.start + s.end));
+    l.last = terrimpi_min(l.first, s.end + s.spare);
+    l.step = s.side > 0.0f ? s.texel / s.side : 0.0f;
+    l.shrink = s.shrink;
+    l.shift = s.shift;
+    l.count = 1;
+    l.even_count = 0;
+    if (l.first > l.last)
+        TERRIMPI_TRY(terrimpi_layers_count(&s, &l));
+    *layers = l;
+    return TERRIMP_OK;
+}
+
+/* --- hidden texels --- */
+
+/* The bits of the last word of a row that are texels. */
+static uint32_t terrimpi_mask_tail(uint32_t width)
+{
+    return 0xffffffffu >> (31u - (width - 1u) % 32u);
+}
+
+/* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
+static void terrimpi_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
+{
+    uint32_t words = TERRIMP_MASK_WORDS(width), i, other = 0;
+    row[words - 1u] &= terrimpi_mask_tail(width);
+    if (dx < 0)
+        for (i = 0; i < words; i++) {
+            uint32_t all = row[i] | opaque[i];
+            row[i] = all & (all << 1 | other);
+            other = all >> 31;
+        }
+    else
+        for (i = words; i-- > 0;) {
+            uint32_t all = row[i] | (i + 1u < words ? opaque[i]
+                                                    : opaque[i] & terrimpi_mask_tail(width));
+            row[i] = all & (all >> 1 | other);
+            other = all << 31;
+        }
+}
+
+/* One step of a mask of state from a layer to the next: what has neighbours at dx, dy and across
+   there hides what is behind it. */
+static void terrimpi_cull_step(const uint32_t *opaque, uint32_t width, uint32_t height, int dx,
+                               int dy, uint32_t *state)
+{
+    size_t words = TERRIMP_MASK_WORDS(width), y, i;
+    for (y = 0; y < height; y++)
+        terrimpi_cull_row(opaque + y * words, width, dx, state + y * words);
+    if (dy > 0) {
+        for (i = 0; i < (height - 1u) * words; i++)
+            state[i] &= state[i + words];
+        memset(state + i, 0, words * sizeof *state);
+        return;
+    }
+    for (i = height * words; i-- > words;)
+        state[i] &= state[i - words];
+    memset(state, 0, words * sizeof *state);
+}
+
+TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
+                                              uint32_t height, int rule, uint32_t *state,
+                                              uint32_t *visible)
+{
+    size_t count = (size_t)height * TERRIMP_MASK_WORDS(width), i;
+    int k;
+    TERRIMPI_REFUSE(!opaque || !state || !visible, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!width || !height || rule < 0 || rule >= TERRIMP_CULL_COUNT, TERRIMP_E_RANGE);
+    if (rule == TERRIMP_CULL_BLOCK) {
+        for (i = 0; i < count; i++)
+            visible[i] = opaque[i] & ~state[i];
+        terrimpi_cull_step(visible, width, height, 1, 1, state);
+        terrimpi_cull_step(state, width, height, -1, -1, state);
+        return TERRIMP_OK;
+    }
+    for (i = 0; i < count; i++)
+        visible[i] = opaque[i] & ~(state[i] & state[count + i] & state[2u * count + i] &
+                                   state[3u * count + i]);
+    for (k = 0; k < 4; k++) /* what was culled is in all four, and so is not missing in visible */
+        terrimpi_cull_step(visible, width, height, k & 1 ? 1 : -1, k & 2 ? 1 : -1,
+                           state + (size_t)k * count);
+    return TERRIMP_OK;
+}
+
+/* --- rectangles that hold all opaque texels --- */
+
+#define TERRIMPI_COVER_LINES 8u   /* a rectangle is cut along so many lines of a grid at once */
+#define TERRIMPI_COVER_SPANS 36u  /* from one of them to another */
+
+/* A rectangle that might be taken whole or in parts. */
+typedef struct terrimpi_cover_node {
+    terrimp_rect rect;
+    uint32_t cost, parts, part_count; /* where its parts stand; 0: none */
+} terrimpi_cover_node;
+
+/* What lies in a span of columns and a span of rows of the grid, and the cheapest way to cover it
+   with cuts along the grid. Corners of the opaque texels, ends excluded; x1 is 0 for none. */
+typedef struct terrimpi_cover_span {
+    uint16_t x0, y0, x1, y1;
+    uint32_t cost;
+    uint8_t cut_x, cut_y; /* the line of the first cut, or 0: whole */
+} terrimpi_cover_span;
+
+typedef struct terrimpi_cover {
+    terrimp_cover_desc desc;
+    terrimpi_cover_node *nodes;
+    uint32_t node_count, node_limit;
+    uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
+    uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
+    uint32_t *seen;       /* a row of bits */
+    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
+    terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
+} terrimpi_cover;
+
+static uint32_t terrimpi_bit_count(uint32_t bits)
+{
+    bits -= bits >> 1 & 0x55555555u;
+    bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
+    return ((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
+}
+
+/* The number of the lowest bit that is set, and clears it. */
+static uint32_t terrimpi_next_bit(uint32_t *bits)
+{
+    uint32_t below = terrimpi_bit_count((*bits & (0u - *bits)) - 1u);
+    *bits &= *bits - 1u;
+    return below;
+}
+
+/* A word of a mask's row y, without what lies outside of columns x to end. */
+static uint32_t terrimpi_mask_word(const terrimp_cover_desc *d, uint32_t y, uint32_t word,
+                                   uint32_t x, uint32_t end)
+{
+    uint32_t bits = d->mask[(size_t)y * TERRIMP_MASK_WORDS(d->width) + word];
+    if (word == x / 32u)
+        bits &= 0xffffffffu << x % 32u;
+    if (word == (end - 1u) / 32u)
+        bits &= terrimpi_mask_tail(end);
+    return bits;
+}
+
+/* Extents of the columns of a rectangle, in its rows; an empty one has low > high. */
+static void terrimpi_cover_columns(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t end = r->x + r->width, turn, i, word;
+    for (i = 0; i < r->width; i++) {
+        c->low[i] = 1;
+        c->high[i] = 0;
+    }
+    for (turn = 0; turn < 2u; turn++) {
+        memset(c->seen, 0, TERRIMP_MASK_WORDS(c->desc.width) * sizeof *c->seen);
+        for (i = 0; i < r->height; i++) {
+            uint32_t y = turn ? r->height - 1u - i : i;
+            for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
+                uint32_t fresh = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end);
+                fresh &= ~c->seen[word];
+                c->seen[word] |= fresh;
+                while (fresh)
+                    (turn ? c->high : c->low)[word * 32u + terrimpi_next_bit(&fresh) - r->x] = y;
+            }
+        }
+    }
+}
+
+/* The same of its rows; returns how many of its texels are opaque. */
+static uint32_t terrimpi_cover_rows(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t end = r->x + r->width, y, word, opaque = 0;
+    for (y = 0; y < r->height; y++) {
+        c->low[y] = 1;
+        c->high[y] = 0;
+        for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
+            uint32_t bits = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end), last = bits;
+            if (!bits)
+                continue;
+            opaque += terrimpi_bit_count(bits);
+            if (c->low[y] > c->high[y])
+                c->low[y] = word * 32u + terrimpi_next_bit(&bits) - r->x;
+            last |= last >> 1, last |= last >> 2, last |= last >> 4, last |= last >> 8;
+            last |= last >> 16;
+            c->high[y] = word * 32u + terrimpi_bit_count(last) - 1u - r->x;
+        }
+    }
+    return opaque;
+}
+
+/* A growing extent of rows or columns. */
+typedef struct terrimpi_extent {
+    uint32_t first, last, low, high;
+} terrimpi_extent;
+
+static uint32_t terrimpi_cover_cost(const terrimpi_cover *c, uint32_t width, uint32_t height)
+{
+    return (width + 2u * c->desc.gutter) * (height + 2u * c->desc.gutter) + c->desc.quad_cost;
+}
+
+/* Adds column or row i; returns what the rectangle of all so far costs. */
+static uint32_t terrimpi_extent_add(const terrimpi_cover *c, terrimpi_extent *e, uint32_t i)
+{
+    if (c->low[i] <= c->high[i]) {
+        if (e->first > e->last) {
+            e->first = e->last = i;
+            e->low = c->low[i];
+            e->high = c->high[i];
+        }
+        e->first = terrimpi_min_u32(e->first, i);
+        e->last = terrimpi_max_u32(e->last, i);
+        e->low = terrimpi_min_u32(e->low, c->low[i]);
+        e->high = terrimpi_max_u32(e->high, c->high[i]);
+    }
+    return e->first > e->last
+               ? 0u
+               : terrimpi_cover_cost(c, e->last - e->first + 1u, e->high - e->low + 1u);
+}
+
+/* The cut between `count` columns or rows with the cheapest two parts; returns their cost. */
+static uint32_t terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
+{
+    terrimpi_extent e = {1, 0, 0, 0};
+    uint32_t i, best = 0xffffffffu;
+    for (i = count; i-- > 0;)
+        c->beyond[i] = terrimpi_extent_add(c, &e, i);
+    e.first = 1;
+    e.last = 0;
+    for (i = 1; i < count; i++) {
+        uint32_t cost = terrimpi_extent_add(c, &e, i - 1u) + c->beyond[i];
+        if (cost < best) {
+            best = cost;
+            *at = i;
+        }
+    }
+    return best;
+}
+
+/* Shrinks a rectangle to its opaque texels; returns how many there are. */
+static uint32_t terrimpi_cover_tighten(terrimpi_cover *c, terrimp_rect *r)
+{
+    uint32_t opaque = terrimpi_cover_rows(c, r), y;
+    terrimpi_extent e = {1, 0, 0, 0};
+    for (y = 0; y < r->height; y++)
+        terrimpi_extent_add(c, &e, y);
+    if (opaque)
+        *r = terrimpi_rect(r->x + e.low, r->y + e.first, e.high - e.low + 1u,
+                           e.last - e.first + 1u);
+    return opaque;
+}
+
+/* The number of the span from line a to line b > a: after those that it is made of. */
+static uint32_t terrimpi_cover_span_of(uint32_t a, uint32_t b)
+{
+    return b * (b - 1u) / 2u + b - 1u - a;
+}
+
+static void terrimpi_cover_unite(const terrimpi_cover_span *a, const terrimpi_cover_span *b,
+                                 terrimpi_cover_span *out)
+{
+    terrimpi_cover_span u = *a;
+    if (!a->x1)
+        u = *b;
+    else if (b->x1) {
+        u.x0 = a->x0 < b->x0 ? a->x0 : b->x0;
+        u.y0 = a->y0 < b->y0 ? a->y0 : b->y0;
+        u.x1 = a->x1 > b->x1 ? a->x1 : b->x1;
+        u.y1 = a->y1 > b->y1 ? a->y1 : b->y1;
+    }
+    *out = u;
+}
+
+/* The spans of single cells of a rectangle's grid: of the texels of each. */
+static void terrimpi_cover_cells(terrimpi_cover *c, const terrimp_rect *r)
+{
+    const uint32_t n = TERRIMPI_COVER_LINES;
+    uint32_t i, k;
+    for (k = 0; k < n; k++)
+        for (i = 0; i < n; i++) {
+            terrimpi_cover_span *s = &c->spans[terrimpi_cover_span_of(k, k + 1u)]
+                                              [terrimpi_cover_span_of(i, i + 1u)];
+            uint32_t x = r->x + i * r->width / n, y = r->y + k * r->height / n;
+            terrimp_rect cell = terrimpi_rect(x, y, r->x + (i + 1u) * r->width / n - x,
+                                              r->y + (k + 1u) * r->height / n - y);
+            memset(s, 0, sizeof *s);
+            if (!cell.width || !cell.height || !terrimpi_cover_tighten(c, &cell))
+                continue;
+            s->x0 = (uint16_t)cell.x;
+            s->y0 = (uint16_t)cell.y;
+            s->x1 = (uint16_t)(cell.x + cell.width);
+            s->y1 = (uint16_t)(cell.y + cell.height);
+        }
+}
+
+/* Lowers the cost of a span to that of its best cut. */
+static void terrimpi_cover_best(terrimpi_cover *c, uint32_t a, uint32_t b, uint32_t p, uint32_t q)
+{
+    uint32_t columns = terrimpi_cover_span_of(a, b), rows = terrimpi_cover_span_of(p, q), m;
+    terrimpi_cover_span *s = &c->spans[rows][columns];
+    s->cut_x = s->cut_y = 0;
+    s->cost = s->x1 ? terrimpi_cover_cost(c, (uint32_t)s->x1 - s->x0, (uint32_t)s->y1 - s->y0) : 0u;
+    for (m = a + 1u; m < b; m++) {
+        uint32_t cost = c->spans[rows][terrimpi_cover_span_of(a, m)].cost +
+                        c->spans[rows][terrimpi_cover_span_of(m, b)].cost;
+        if (cost < s->cost) {
+            s->cost = cost;
+            s->cut_x = (uint8_t)m;
+        }
+    }
+    for (m = p + 1u; m < q; m++) {
+        uint32_t cost = c->spans[terrimpi_cover_span_of(p, m)][columns].cost +
+                        c->spans[terrimpi_cover_span_of(m, q)][columns].cost;
+        if (cost < s->cost) {
+            s->cost = cost;
+            s->cut_x = 0;
+            s->cut_y = (uint8_t)m;
+        }
+    }
+}
+
+/* The cheapest ways to cover all spans of a rectangle's grid, the smaller ones first. */
+static void terrimpi_cover_solve(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t a, b, p, q;
+    terrimpi_cover_cells(c, r);
+    for (q = 1; q <= TERRIMPI_COVER_LINES; q++)
+        for (p = q; p-- > 0;)
+            for (b = 1; b <= TERRIMPI_COVER_LINES; b++)
+                for (a = b; a-- > 0;) {
+                    uint32_t columns = terrimpi_cover_span_of(a, b);
+                    uint32_t rows = terrimpi_cover_span_of(p, q);
+                    terrimpi_cover_span *s = &c->spans[rows][columns];
+                    if (b - a > 1u)
+                        terrimpi_cover_unite(&c->spans[rows][terrimpi_cover_span_of(a, b - 1u)],
+                                             &c->spans[rows][terrimpi_cover_span_of(b - 1u, b)], s);
+                    else if (q - p > 1u)
+                        terrimpi_cover_unite(&c->spans[terrimpi_cover_span_of(p, q - 1u)][columns],
+                                             &c->spans[terrimpi_cover_span_of(q - 1u, q)][columns],
+                                             s);
+                    terrimpi_cover_best(c, a, b, p, q);
+                }
+}
+
+static int terrimpi_cover_add(terrimpi_cover *c, uint32_t node, const terrimp_rect *r)
+{
+    if (c->node_count == c->node_limit)
+        return 0;
+    c->nodes[node].part_count++;
+    c->nodes[c->node_count++].rect = *r;
+    return 1;
+}
+
+/* Makes parts of a node from the best cuts along its grid; returns 0 when there are none. */
+static int terrimpi_cover_by_grid(terrimpi_cover *c, uint32_t node)
+{
+    uint8_t stack[TERRIMPI_COVER_LINES * TERRIMPI_COVER_LINES][4];
+    uint32_t top = 1, k;
+    terrimpi_cover_solve(c, &c->nodes[node].rect);
+    memset(stack[0], 0, sizeof stack[0]);
+    stack[0][1] = stack[0][3] = TERRIMPI_COVER_LINES;
+    while (top) {
+        uint8_t *at = stack[--top];
+        const terrimpi_cover_span *s =
+            &c->spans[terrimpi_cover_span_of(at[2], at[3])][terrimpi_cover_span_of(at[0], at[1])];
+        uint8_t cut = s->cut_x ? s->cut_x : s->cut_y;
+        terrimp_rect r = terrimpi_rect(s->x0, s->y0, (uint32_t)s->x1 - s->x0,
+                                       (uint32_t)s->y1 - s->y0);
+        if (!cut && top == 0 && c->nodes[node].part_count == 0)
+            return 0;
+        if (!cut && s->x1 && !terrimpi_cover_add(c, node, &r)) {
+            c->node_count -= c->nodes[node].part_count;
+            c->nodes[node].part_count = 0;
+            return 0;
+        }
+        if (!cut)
+            continue;
+        k = s->cut_x ? 0 : 2;
+        memcpy(stack[top + 1u], at, sizeof stack[0]);
+        at[k] = cut; /* the part before the cut is the next one */
+        stack[top + 1u][k + 1u] = cut;
+        top += 2u;
+    }
+    return 1;
+}
+
+/* Makes two parts of a node, with the best cut between any two of its columns or rows. */
+static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
+{
+    terrimp_rect r = c->nodes[node].rect, part[2];
+    uint32_t x = 0, y = 0, by_y, k;
+    if (c->node_count + 2u > c->node_limit)
+        return;
+    terrimpi_cover_rows(c, &r);
+    by_y = terrimpi_cover_cut(c, r.height, &y);
+    terrimpi_cover_columns(c, &r);
+    part[0] = part[1] = r;
+    if (terrimpi_cover_cut(c, r.width, &x) < by_y) {
+        part[0].width = x;
+        part[1].x += x;
+        part[1].width -= x;
+    } else {
+        part[0].height = y;
+        part[1].y += y;
+        part[1].height -= y;
+    }
+    for (k = 0; k < 2u; k++) {
+        terrimpi_cover_tighten(c, &part[k]);
+        terrimpi_cover_add(c, node, &part[k]);
+    }
+}
+
+/* Cuts a node up, if more is lost in it than another rectangle costs. */
+static void terrimpi_cover_split(terrimpi_cover *c, uint32_t node)
+{
+    terrimpi_cover_node *n = &c->nodes[node];
+    uint32_t opaque = terrimpi_cover_rows(c, &n->rect);
+    n->cost = terrimpi_cover_cost(c, n->rect.width, n->rect.height);
+    n->parts = c->node_count;
+    n->part_count = 0;
+    if (n->rect.width * n->rect.height - opaque > c->desc.quad_cost &&
+        !terrimpi_cover_by_grid(c, node))
+        terrimpi_cover_in_two(c, node);
+}
+
+/* What a rectangle saves by taking the place of all that lie within it; less than 0 when it reaches
+   into others, which would then overlap. */
+static float terrimpi_cover_gain(const terrimpi_cover *c, const terrimp_rect *r,
+                                 const terrimp_rect *rects, uint32_t count)
+{
+    float gain = -(float)terrimpi_cover_cost(c, r->width, r->height);
+    uint32_t i;
+    for (i = 0; i < count; i++) {
+        const terrimp_rect *o = &rects[i];
+        if (o->x >= r->x + r->width || r->x >= o->x + o->width || o->y >= r->y + r->height ||
+            r->y >= o->y + o->height)
+            continue;
+        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
+            o->y + o->height > r->y + r->height)
+            return -1.0f;
+        gain += (float)terrimpi_cover_cost(c, o->width, o->height);
+    }
+    return gain;
+}
+
+static terrimp_rect terrimpi_rect_union(const terrimp_rect *a, const terrimp_rect *b)
+{
+    uint32_t x = terrimpi_min_u32(a->x, b->x), y = terrimpi_min_u32(a->y, b->y);
+    return terrimpi_rect(x, y, terrimpi_max_u32(a->x + a->width, b->x + b->width) - x,
+                         terrimpi_max_u32(a->y + a->height, b->y + b->height) - y);
+}
+
+/* Puts r in place of all that lie within it; returns how many rectangles are left. */
+static uint32_t terrimpi_cover_swallow(const terrimp_rect *r, terrimp_rect *rects, uint32_t count)
+{
+    uint32_t i, kept = 0, placed = 0;
+    for (i = 0; i < count; i++) {
+        const terrimp_rect *o = &rects[i];
+        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
+            o->y + o->height > r->y + r->height)
+            rects[kept++] = *o;
+        else if (!placed++)
+            rects[kept++] = *r;
+    }
+    return kept;
+}
+
+/* Joins rectangles as long as one in their place costs less than they do. */
+static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects, uint32_t count)
+{
+    uint32_t a, b, joined;
+    do {
+        joined = 0;
+        for (a = 0; a < count; a++)
+            for (b = a + 1u; b < count; b++) {
+                terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
+                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                    continue;
+                count = terrimpi_cover_swallow(&r, rects, count);
+                joined = 1;
+                b = a;
+            }
+    } while (joined);
+    return count;
+}
+
+/* Checks a descriptor and lays out the scratch memory; in base NULL only to count it. */
+static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void *base,
+                                           uint32_t capacity, terrimpi_cover *c, size_t *bytes)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    uint32_t longest = terrimpi_max_u32(desc->width, desc->height);
+    c->desc = *desc;
+    TERRIMPI_DEFAULT(c->desc.quad_cost, 20u);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(desc->width, 1, 16384) || desc->gutter > 64u ||
+                        !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
+                        c->desc.quad_cost > 1u << 24,
+                    TERRIMP_E_RANGE);
+    c->node_count = 0;
+    c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
+    c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
+    c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
+    c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
+    c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
+    c->cells = (uint32_t *)terrimpi_take(
+        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
+        sizeof *c->cells);
+    c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
+        &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
+    c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
+    *bytes = arena.bytes;
+    return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
+}
+
+TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity)
+{
+    terrimpi_cover c;
+    size_t bytes;
+    return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
+}
+
+/* What both ways to cover begin with. */
+static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
+                                          size_t bytes, const terrimp_rect *rects,
+                                          uint32_t capacity, const uint32_t *count,
+                                          terrimpi_cover *c)
+{
+    size_t needed;
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
+    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
+}
+
+/* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
+   room; returns how many they are. Parts stand behind what they are parts of. */
+static uint32_t terrimpi_cover_prune(terrimpi_cover *c, terrimp_rect *rects, uint32_t capacity)
+{
+    uint32_t i, kept = 0;
+    for (i = c->node_count; i-- > 0;) {
+        terrimpi_cover_node *n = &c->nodes[i];
+        uint32_t sum = 0, k;
+        for (k = 0; k < n->part_count; k++)
+            sum += c->nodes[n->parts + k].cost;
+        if (n->part_count && sum < n->cost)
+            n->cost = sum;
+        else
+            n->part_count = 0;
+    }
+    for (i = 0; i < c->node_count; i++)
+        c->nodes[i].cost = i == 0; /* from here on: whether it is left */
+    for (i = 0; i < c->node_count; i++) {
+        const terrimpi_cover_node *n = &c->nodes[i];
+        uint32_t k;
+        for (k = 0; n->cost && k < n->part_count; k++)
+            c->nodes[n->parts + k].cost = 1;
+        if (n->cost && !n->part_count && kept++ < capacity)
+            rects[kept - 1u] = n->rect;
+    }
+    return kept;
+}
+
+TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
+                                         size_t bytes, terrimp_rect *rects, uint32_t capacity,
+                                         uint32_t *count)
+{
+    terrimpi_cover c;
+    uint32_t i, kept;
+    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
+    c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
+    for (i = 0; i < c.node_count; i++)
+        terrimpi_cover_split(&c, i);
+    kept = terrimpi_cover_prune(&c, rects, capacity);
+    TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
+    *count = terrimpi_cover_join(&c, rects, kept);
+    return TERRIMP_OK;
+}
+
+/* A box of cells, ends excluded, and how many of them are filled. */
+typedef struct terrimpi_grow_box {
+    uint32_t x0, y0, x1, y1, filled;
+} terrimpi_grow_box;
+
+/* How many cells of a box are filled, on a grid that is a mask. */
+static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
+                                     uint32_t x1, uint32_t y1)
+{
+    uint32_t y, word, filled = 0;
+    for (y = y0; y < y1 && x0 < x1; y++)
+        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
+            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
+    return filled;
+}
+
+/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
+static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
+                              int dy, terrimpi_grow_box *out)
+{
+    *out = *b;
+    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
+        (dy > 0 && b->y1 == g->height))
+        return 0;
+    out->x0 -= dx < 0;
+    out->x1 += dx > 0;
+    out->y0 -= dy < 0;
+    out->y1 += dy > 0;
+    if (dx)
+        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
+                                            dx < 0 ? b->x0 : out->x1, out->y1);
+    if (dy)
+        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
+                                            dy < 0 ? b->y0 : out->y1);
+    return 1;
+}
+
+static float terrimpi_grow_area(const terrimpi_grow_box *b)
+{
+    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
+}
+
+/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
+static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
+                                 terrimpi_grow_box *box)
+{
+    for (;;) {
+        terrimpi_grow_box best = *box, next;
+        float best_ratio = 0.0f;
+        int k;
+        for (k = 0; k < 9; k++) {
+            float ratio;
+            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
+                continue;
+            ratio = (float)(next.filled - box->filled) /
+                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
+            if (ratio > best_ratio) {
+                best_ratio = ratio;
+                best = next;
+            }
+        }
+        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
+            return;
+        *box = best;
+    }
+}
+
+/* The mask of the cells that hold opaque texels. */
+static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
+{
+    terrimp_cover_desc g = c->desc;
+    uint32_t y, word;
+    g.mask = c->cells;
+    g.width = (c->desc.width - 1u) / cell + 1u;
+    g.height = (c->desc.height - 1u) / cell + 1u;
+    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
+    for (y = 0; y < c->desc.height; y++)
+        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
+            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
+            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
+            while (bits) {
+                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
+                row[x / 32u] |= 1u << x % 32u;
+            }
+        }
+    return g;
+}
+
+/* Grows a box from a cell, empties its cells, and returns it in texels. */
+static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
+                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
+{
+    terrimpi_grow_box b;
+    b.x0 = x;
+    b.y0 = y;
+    b.x1 = x + 1u;
+    b.y1 = y + 1u;
+    b.filled = 1;
+    terrimpi_grow_box_up(g, min_fill, &b);
+    for (y = b.y0; y < b.y1; y++)
+        for (x = b.x0; x < b.x1; x++)
+            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
+    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
+                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
+                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
+}
+
+TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
+                                              float min_fill, void *scratch, size_t bytes,
+                                              terrimp_rect *rects, uint32_t capacity,
+                                              uint32_t *count)
+{
+    terrimpi_cover c;
+    terrimp_cover_desc g;
+    uint32_t made = 0, y, word;
+    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
+                        !terrimpi_within_u32(cell, 1, 16384),
+                    TERRIMP_E_RANGE);
+    g = terrimpi_grow_grid(&c, cell);
+    for (y = 0; y < g.height; y++)
+        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
+            uint32_t bits;
+            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
+                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
+                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
+                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
+                terrimpi_cover_tighten(&c, &rects[made++]);
+            }
+        }
+    *count = made;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+                                              uint32_t count, uint32_t gutter,
+                                              terrimp_pack_item *items, uint32_t *order)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || !quads || !items || !order, TERRIMP_E_NULL);
+    for (i = 0; i < count; i++)
+        TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
+                            !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
+                        TERRIMP_E_RANGE);
+    for (i = 0; i < count; i++) {
+        items[i].rect = quads[i].texels;
+        items[i].rect.width += 2u * gutter;
+        items[i].rect.height += 2u * gutter;
+        TERRIMPI_REFUSE(items[i].rect.width > shelves->width ||
+                            items[i].rect.height > shelves->height,
+                        TERRIMP_E_CAPACITY); /* or it would be scaled */
+    }
+    TERRIMPI_TRY(terrimp_pack_ffdh(shelves, items, count, order, NULL));
+    for (i = 0; i < count; i++) {
+        quads[i].x = items[i].rect.x + gutter;
+        quads[i].y = items[i].rect.y + gutter;
+    }
     return TERRIMP_OK;
 }
 
