@@ -3,7 +3,7 @@
 ## make           builds the examples into build/; make NAME builds one program
 ## make deps      installs what is missing, on Debian: a compiler, libpng, OpenGL without a window
 ## make demo      flies over a terrain: pictures and a table of statistics, in build/demo/
-##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
+##                  DEM=FILE     over this elevation file instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
 ## make test      runs every test, as many suites at once as there are cores
 ##                  JOBS=N   so many at once; 1: one after the other
@@ -17,6 +17,7 @@
 ## make coverage  which lines and branches the unit tests reach
 ## make analyse   static analysis and valgrind
 ## make deps-portable    installs what these five use, on Debian
+## make golden    writes tests/golden.h anew, where what hosts get is meant to change
 ## make clean     removes build/
 ##
 ## With any of them: CC=clang, CFLAGS='...', CONFIG=release|debug|sanitize|coverage, and
@@ -56,6 +57,10 @@ GL_LIBS_egl     := -lEGL -lOpenGL
 # The benchmark compares with meshoptimizer where that is installed.
 BENCH_FLAGS = $(if $(call has_header,meshoptimizer.h),-DTERRIMP_HAVE_MESHOPT)
 BENCH_LIBS  = $(if $(call has_header,meshoptimizer.h),-lmeshoptimizer)
+
+# GeoTIFF is read where libtiff is installed.
+TIFF_FLAGS = $(if $(call has_header,tiffio.h),-DHOST_TIFF)
+TIFF_LIBS  = $(if $(call has_header,tiffio.h),-ltiff)
 
 EXAMPLES := $(patsubst examples/%.c,%,$(wildcard examples/*.c))
 EXAMPLES_CPP := $(patsubst examples/%.cpp,%,$(wildcard examples/*.cpp))
@@ -107,6 +112,11 @@ SECONDS ?= 60
 fuzz: | $(DEPS)
 	@sh tests/fuzz.sh $(SECONDS)
 
+# Into a file beside it first: the program that prints the new values has the old ones in it.
+golden: unit
+	@$(BUILD)/unit golden > $(BUILD)/golden.h && cp $(BUILD)/golden.h tests/golden.h
+	@git --no-pager diff --stat tests/golden.h
+
 clean:
 	rm -rf build
 
@@ -116,7 +126,8 @@ vpath %.cpp examples
 
 $(BUILD)/%: $(BUILD)/%.o $(BUILD)/host.a
 	@echo "link    $@"
-	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) -lpng -lm -o $@
+	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) $(TIFF_LIBS) -lpng -lm \
+	    -o $@
 
 $(BUILD)/host.a: $(HOST)
 	@rm -f $@
@@ -134,6 +145,8 @@ $(BUILD)/%.o: %.cpp | $(DEPS)
 	@$(CXX) -std=c++11 -pthread $(CXX_WARNINGS) $(CONFIG_$(CONFIG)) $(FLAGS) -I. -MMD -MP \
 	    $(CXXFLAGS) -c $< -o $@
 
+$(BUILD)/host/dem_tiff.o $(BUILD)/unit_host.o: FLAGS = $(TIFF_FLAGS)
+
 LINK = $(CC)
 $(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread
 
@@ -143,6 +156,6 @@ $(BUILD)/parallel_build: LIBS = -lpthread
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
-.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz \
+.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz golden \
         $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
 .SECONDARY:

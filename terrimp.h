@@ -42,6 +42,7 @@
        >>basics       result codes, boxes
        >>heightfield  a view of the caller's samples; heights, normals, rays
        >>camera       the frame's camera, culling, the frustum fitted to a box
+       >>quadtree     which node: its place, box, parent, neighbours, children closest first
        >>geomipmap    levels, crack-free index patterns, selection, morphing
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
        >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
@@ -49,9 +50,11 @@
        >>bake         what was built as one block: for a file, for read-only memory
        >>view         the per-frame decision, the schedule, the draw commands
        >>sorted       terrain in exact painter's order, for machines without a depth buffer
+       >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
 
@@ -78,16 +81,17 @@
 
               eye           fade_start    fade_end
                o=================|-------------|- - - - - - - - - - - - - - - ->
-                 ground, opaque   ground fades    impostors of growing nodes,
-                                  over impostors  or ground where that is cheaper
+                 ground           impostors       impostors of growing nodes,
+                                  fade in         or ground where that is cheaper
 
        A picture is renewed when the direction to the node has turned by max_angle_rad, when the
        parallax error could pass tolerance_px, or when the node has come so close that texels would
        show. It is made from a place ahead of the eye, where it lasts longer. What waits for its
        picture is drawn from those of its children or its parent, or as ground.
 
-       Impostors are drawn deeper than they are, so that ground covers them: give the projection
-       matrix the z_far of the statistics, or a generous one.
+       In the fade band a node is drawn as ground and, on a growing share of the pixels, as the
+       impostor, whose mesh stands just above that ground. So all lies at its own depth, and water,
+       houses and shadows meet it there.
 
                picture in the atlas             coarse mesh, a little proud of the terrain
               +--------------------+                 .--'`--.__         upper skirt
@@ -112,9 +116,14 @@
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
-       as they were unless their comment says otherwise. NaN, infinities, null pointers, sizes out
-       of their limits and products that overflow are errors in every build; asserts are for this
-       header's own mistakes. terrimp_result_text says what to do.
+       as they were unless their comment says otherwise. Any of them may return, in every build,
+       and their comments do not repeat it:
+         E_NULL                a pointer is null that is not said to be optional
+         E_RANGE, E_NOT_FINITE a number is outside of its limits, or NaN or infinite
+         E_OVERFLOW, E_MEMORY  sizes multiply to more than size_t holds; a block is too small
+         E_ALIGN, E_CAPACITY   a pointer is not aligned for its type; an output array is too small
+         E_STATE               an object is not ready: before init, build_finish, the first update
+       Asserts are for this header's own mistakes. terrimp_result_text says what to do.
 
    THREADS AND DETERMINISM
        No globals, no statics that change. Nodes may be built by several threads at once, each
@@ -126,12 +135,10 @@
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
        A picture shows a hidden slope with the ridge before it smeared over it once the eye has
        moved; max_angle_rad bounds how far that goes, and pictures in two parts spare the worst.
-       What moves on the terrain belongs into the host's own draws, not into captures. Ground fades
-       by blending, and only whole nodes are sorted: in the fade band a hidden slope can shine
-       faintly through the ridge of its own node. Ground and impostors of one place are alike to
-       within the tolerances, not to the bit: where a node changes from one to the other beyond the
-       fade band, that much can be seen to change. From beside the terrain no floor is drawn, since
-       it would show below the border.
+       What moves on the terrain belongs into the host's own draws, not into captures. Ground and
+       impostors of one place are alike to within the tolerances, not to the bit: where a node
+       changes from one to the other beyond the fade band, that much can be seen to change. From
+       beside the terrain no floor is drawn, since it would show below the border.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -163,7 +170,9 @@
        Finch    M. Finch, L. Bishop, Sorted Height Field Rendering, Numerical Design, 1998
        Wagner   D. Wagner, Terrain Geomorphing in the Vertex Shader, in ShaderX2, 2003
        FFDH     E. G. Coffman, M. R. Garey, D. S. Johnson, R. E. Tarjan, Performance Bounds for
-                Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980 */
+                Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980
+       Jeschke  S. Jeschke, Accelerating the Rendering Process Using Impostors, dissertation, TU
+                Wien, 2004: layers */
 
 /* ==== Configuration ====================================================== >>config */
 
@@ -233,6 +242,16 @@ typedef struct terrimp_box {
     float max[3];
 } terrimp_box;
 
+/* Sides of a node or of a tile of samples. Z0 and Z1 run along x; of either pair the odd one is the
+   last row or column. */
+enum {
+    TERRIMP_SIDE_Z0 = 0, /* towards -z */
+    TERRIMP_SIDE_Z1,
+    TERRIMP_SIDE_X0,     /* towards -x */
+    TERRIMP_SIDE_X1,
+    TERRIMP_SIDE_COUNT
+};
+
 /* ==== Heightfield ======================================================== >>heightfield */
 
 /* Storage of one sample. */
@@ -275,14 +294,9 @@ typedef struct terrimp_heightfield {
 
    in         what the caller filled in
    out        receives the effective descriptor; may be in itself
-   Errors     E_NULL  in, out or in->samples is null
-              E_RANGE a size, the format, a spacing or the scale is outside its limits; row_bytes is
-                      shorter than a row or no multiple of a sample; the spacing is so fine, or the
-                      origin so distant, that a float cannot tell neighbouring columns apart; a
-                      sample of the integer formats would get an infinite height
-              E_NOT_FINITE  a spacing, the scale, the offset or the origin is NaN or infinite
-              E_OVERFLOW    the samples span more than size_t holds
-              E_ALIGN       samples is not aligned for the format
+   Errors     E_RANGE also when row_bytes is shorter than a row or no multiple of a sample; when the
+              spacing is so fine, or the origin so distant, that a float cannot tell neighbouring
+              columns apart; when a sample of the integer formats would get an infinite height
    Cost       O(1); the samples are not read */
 TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield *in,
                                                        terrimp_heightfield *out);
@@ -291,21 +305,10 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
 
    x, z       receive its column and row on E_VOID, and on E_NOT_FINITE if a sample is the cause;
               NULL: not wanted
-   Errors     those of resolve; E_VOID  the sample is a void;
-              E_NOT_FINITE  the height of the sample is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample
    Cost       O(width * depth) */
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z);
-
-/* The world height of one sample.
-
-   x, z       column and row [Limits: inside the field]
-   height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_RANGE  x or z is outside;
-              E_VOID  the sample is a void; E_NOT_FINITE  its height is NaN or infinite
-   Cost       O(1) */
-TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
-                                                      uint32_t z, float *height);
 
 /* Reads a tile of world heights. A tile may reach over the last column and row: it repeats them.
 
@@ -313,9 +316,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield 
    cols, rows size of the tile in samples [Limits: >= 1]
    stride     steps of the field from one sample of the tile to the next [Limits: >= 1]
    out        [rows][cols] [wu] receives the heights; must not overlap the samples
-   Errors     those of resolve; E_NULL  out is null; E_RANGE  an argument is outside its limits;
-              E_OVERFLOW  the tile is larger than size_t holds; E_VOID  the tile has a void;
-              E_NOT_FINITE  a height of the tile is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample in the tile
    Cost       O(cols * rows), read twice: out is written only once the tile is known to be good */
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
                                                     uint32_t z, uint32_t cols, uint32_t rows,
@@ -326,8 +327,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
    x, z       column and row of the first sample [Limits: inside the field]
    cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
    low, high  [wu] receive the heights
-   Errors     those of resolve; E_NULL  low or high is null; E_RANGE  an argument is outside its
-              limits; E_VOID  every sample is a void; E_NOT_FINITE  a height is NaN or infinite
+   Errors     E_VOID when every sample is a void; E_NOT_FINITE for such a height
    Cost       O(cols * rows) */
 TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, uint32_t cols, uint32_t rows,
@@ -337,8 +337,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
 
    x, z       [wu] position; the outline of the field belongs to it
    height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_NOT_FINITE  x, z or a height of the
-              quad; E_MISS  the position is outside the field; E_VOID  the position is in a hole
+   Errors     E_MISS outside of the field; E_VOID in a hole; E_NOT_FINITE also for heights
    Cost       O(1) */
 TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield *field, float x,
                                                       float z, float *height);
@@ -368,9 +367,7 @@ typedef struct terrimp_ray_hit {
    max_distance  [wu] end of the ray [Limits: > 0; FLT_MAX for no end. In a field that wraps, where
                  a level ray would go on for ever, up to 2^20 spacings]
    hit           receives the meeting; NULL: not wanted
-   Errors        those of resolve; E_NULL  origin or direction is null;
-                 E_NOT_FINITE  origin, direction or max_distance is NaN or infinite;
-                 E_RANGE  direction is zero or max_distance <= 0; E_MISS  the ray meets nothing
+   Errors        E_MISS when the ray meets nothing
    Cost          O(number of quads below the ray), at most width + depth
    Source        Amanatides and Woo 1987, A fast voxel traversal algorithm: the walk */
 TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield *field,
@@ -394,22 +391,21 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera.
-   Errors: E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits. */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
+   camera. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
 /* View and projection matrix, for column vectors, column-major.
 
    view          [16] out, world to eye space (x right, y up, looking along -z)
-   projection    [16] out, eye space to clip space
-   Errors        those of terrimp_camera_resolve */
+   projection    [16] out, eye space to clip space */
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16]);
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
    height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-   Errors: those of terrimp_camera_resolve. Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
+   Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
 /* The six planes of a viewing volume. A point p is inside plane i when
@@ -425,7 +421,7 @@ enum {
     TERRIMP_PLANES_OUTSIDE = -1
 };
 
-/* The planes of a camera. Errors: those of terrimp_camera_resolve. */
+/* The planes of a camera. */
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum);
 
@@ -458,8 +454,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE when a minimum exceeds its maximum; E_INSIDE when the
-              eye is in the box; E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
+              E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -469,50 +465,62 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
    sides touch their projections. The clip distances stay.
 
    xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
-   Errors       E_NULL; E_RANGE; E_BEHIND when a point is not in front of the eye: the capture is
-                unchanged
+   Errors       E_BEHIND when a point is not in front of the eye: the capture is unchanged
    Cost         O(count) */
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count);
 
-/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
+/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16]);
 
+/* ==== Quadtree =========================================================== >>quadtree */
+
+#define TERRIMP_QUADTREE_LEVELS 17u /* 65537 samples in chunks of 4 quads have 15 */
+
+/* A node and where it lies: its column and row among the nodes of its level. */
+typedef struct terrimp_node {
+    uint32_t number, level, x, z;
+} terrimp_node;
+
+/* The nodes over a heightfield. A node of level L covers (chunk_quads << L)^2 quads of the field,
+   fewer at the far edges. Nodes are numbered level by level from the finest up, each level row by
+   row; the last one is the root. Read-only once built, for any number of views and threads. */
+typedef struct terrimp_quadtree {
+    terrimp_heightfield field; /* resolved; its samples outlive the tree */
+    uint32_t chunk_quads;
+    uint32_t level_count, node_count;
+    uint32_t level_first[TERRIMP_QUADTREE_LEVELS + 1u]; /* number of a level's first node */
+    uint32_t level_x[TERRIMP_QUADTREE_LEVELS], level_z[TERRIMP_QUADTREE_LEVELS]; /* its nodes */
+    struct terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
+} terrimp_quadtree;
+
+/* Lays the quadtree out; nodes is left NULL for the caller to set.
+
+   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
+                fewer triangles, for the same picture */
+TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
+                                                 uint32_t chunk_quads, terrimp_quadtree *tree);
+
 /* ==== Geomipmap ========================================================== >>geomipmap */
 
-/* Geometrical mipmapping alone: a quadtree of nodes over a heightfield. A node of level L covers
-   (chunk_quads << L)^2 quads of the field and is always drawn as chunk_quads x chunk_quads quads,
-   every 2^L-th sample; vertices beyond the last column or row stand on it. So one shared index
-   buffer serves every node. Nodes are numbered level by level from the finest up, each level row by
-   row; the last one is the root.
+/* Geometrical mipmapping alone. A node is always drawn as chunk_quads x chunk_quads quads of every
+   2^level-th sample; vertices beyond the last column or row stand on it. So one shared index buffer
+   serves every node.
 
-   How to use it: init, build (both once), then select each frame: it lists the nodes to draw. */
+   How to use it: terrimp_quadtree_init and build once, then select each frame: it lists the nodes
+   to draw. */
 
 /* --- patterns: the shared index buffer --- */
 
-/* Borders of a node, and the bit that a pattern has for each where the neighbour is one level
-   coarser: there the node leaves out its odd border vertices, which the neighbour lacks. */
-enum {
-    TERRIMP_SIDE_Z0 = 0, /* towards -z */
-    TERRIMP_SIDE_Z1,
-    TERRIMP_SIDE_X0,     /* towards -x */
-    TERRIMP_SIDE_X1,
-    TERRIMP_SIDE_COUNT,
-    TERRIMP_PATTERN_COUNT = 16 /* bit i of a pattern: side i is coarse */
-};
+/* Bit i of a pattern says that the neighbour at side i is one level coarser: there the node leaves
+   out its odd border vertices, which the neighbour lacks. */
+#define TERRIMP_PATTERN_COUNT 16u
 
 typedef enum terrimp_form { /* of the index buffer */
     TERRIMP_FORM_LIST = 0, /* triangle lists */
     TERRIMP_FORM_STRIP,    /* each pattern is one triangle strip */
-    TERRIMP_FORM_STITCHED, /* lists for morphing without any pop: odd vertices of coarse borders
-                              are kept, on the neighbour's edge, and triangles of no area close what
-                              rounding could open (a rasteriser was seen to leave one pixel in ten
-                              million open beside them). LIST leaves none open, but to leave a
-                              vertex out shows where the triangles beside it have not morphed */
-    TERRIMP_FORM_FITTED,   /* lists for trees with fits, morphing or not: coarse borders stand on
-                              vertices of their own, at the neighbour's heights */
     TERRIMP_FORM_COUNT
 } terrimp_form;
 
@@ -521,17 +529,11 @@ typedef struct terrimp_pattern {
     uint32_t triangle_count; /* without those of no area */
 } terrimp_pattern;
 
-/* Vertices of a node: the grid, column i of row j being vertex j * (chunk_quads + 1) + i. With
-   FORM_FITTED there follow, for each side in turn, those between its ends that a coarse border
-   consists of, chunk_quads / 2 - 1 a side. Returns 0 when an argument is outside its limits. */
-TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form);
-
 /* The place of a pattern.
 
    chunk_quads  quads along a node's side [Limits: even, 4..128]
    form         terrimp_form
-   pattern      [Limits: < TERRIMP_PATTERN_COUNT]
-   Errors       E_NULL; E_RANGE */
+   pattern      [Limits: < TERRIMP_PATTERN_COUNT] */
 TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, uint32_t pattern,
                                                 terrimp_pattern *found);
 
@@ -544,14 +546,11 @@ TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form)
    are transformed for each triangle at chunk_quads 16, 0.55 at 64.
 
    indices     [terrimp_pattern_index_count] out
-   Errors      E_NULL; E_RANGE; E_CAPACITY
    Source      de Boer 2000, section 2.3.2 (borders); Wagner 2003 (strips with degenerate joins) */
 TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
                                                 size_t capacity);
 
-/* --- the quadtree and its errors --- */
-
-#define TERRIMP_GEOMIP_LEVELS 17u /* 65537 samples in chunks of 4 quads have 15 */
+/* --- errors --- */
 
 /* What is kept of a node. */
 typedef struct terrimp_geomip_node {
@@ -562,34 +561,8 @@ typedef struct terrimp_geomip_node {
     float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
 } terrimp_geomip_node;
 
-/* The quadtree: what init fills in. Read-only once built, for any number of views and threads. */
-typedef struct terrimp_geomip {
-    terrimp_heightfield field; /* resolved; its samples outlive the tree */
-    uint32_t chunk_quads;
-    uint32_t level_count, node_count;
-    uint32_t level_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* node (x, z) of a level is number
-                                                         level_first + z * level_x + x */
-    uint32_t level_x[TERRIMP_GEOMIP_LEVELS], level_z[TERRIMP_GEOMIP_LEVELS];
-    uint32_t scratch_count;     /* floats that building a node needs */
-    terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
-    float *fits;                /* [fit_count] the caller's: vertices above level 0 get the heights
-                                   that fit the samples best by least squares, which want
-                                   FORM_FITTED; pictures are 1 to 2 dB closer to the full mesh,
-                                   BOUND needs half the triangles. NULL: all stand on samples */
-    uint32_t fit_count;         /* a third of the samples; 0: there is but one level */
-    uint32_t fit_first[TERRIMP_GEOMIP_LEVELS + 1u]; /* private: where a level's fits begin */
-} terrimp_geomip;
-
-/* Lays the quadtree out; nodes and fits are left NULL for the caller to set.
-
-   chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
-                fewer triangles, for the same picture
-   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
-TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
-                                               uint32_t chunk_quads, terrimp_geomip *tree);
-
-/* The box of a node. Errors: E_NULL; E_RANGE. */
-TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
+/* The box of a node. */
+TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box);
 
 /* --- selection --- */
@@ -605,8 +578,7 @@ typedef enum terrimp_geomip_rule {
 } terrimp_geomip_rule;
 
 typedef struct terrimp_geomip_draw {
-    uint32_t node, level;
-    uint32_t x, z;       /* column and row among the nodes of its level */
+    terrimp_node node;
     uint32_t pattern;
     float error_px;      /* by the rule, <= tolerance_px; 0 at level 0 */
     float morph;         /* 0: as it is .. 1: the shape of its parent; 0 without morphing */
@@ -631,7 +603,9 @@ typedef struct terrimp_geomip_view {
                            not morph] */
     float hysteresis;   /* without morphing: a split node stays split until its error is below
                            tolerance / (1 + hysteresis) [Limits: 0..1] */
-    float *distances;             /* (required) [node_count] */
+    float *distances;             /* (required) [node_count] squares of those at which nodes stop
+                                     being drawn as they are, 1e30 at most; de Boer's D_n^2 for the
+                                     level above. Remade when what they depend on has changed */
     terrimp_geomip_mark *marks;   /* (required) [node_count] zero before the first frame */
     terrimp_geomip_draw *draws;   /* (required) [draw_capacity] out: front to back */
     uint32_t draw_capacity;
@@ -642,28 +616,15 @@ typedef struct terrimp_geomip_view {
     uint32_t frame;               /* private */
 } terrimp_geomip_view;
 
-/* The distance at which each node stops being drawn as it is, squared: de Boer's D_n^2 for its
-   parent's level. Called by select when settings, screen or field of view have changed; here for
-   hosts that select by themselves.
-
-   pixel_factor  K [Limits: > 0]
-   distances     [node_count] out: D^2, at most 1e30. A parent's D is at least morph_ratio times
-                 that of each child.
-   Errors        E_NULL; E_RANGE; E_NOT_FINITE
-   Source        de Boer 2000, equations 1, 1a to 1c and 2 */
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances);
-
 /* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
    level, those outside of the camera's view are left out.
 
    view       in: settings and arrays; out: draws, draw_count, triangle_count
-   Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
-              before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
+   Errors     E_CAPACITY: draw_count is 0, draws_needed says how many there are. After others the
+              draws of the frame before stay
    Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
-   Source     de Boer 2000, sections 2.2 and 2.3.1 */
-TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
+   Source     de Boer 2000, sections 2.2 and 2.3.1, equations 1 to 2 */
+TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera);
 
@@ -672,9 +633,8 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
 /* A node's vertex: what it moves by when its factors are 1. */
 typedef struct terrimp_geomip_vertex {
     float height;    /* [wu] */
-    float move;      /* [wu] to the parent's shape; for even vertices on a border without fits, for
-                        corners, and for those of coarse borders: from there to the shape of the
-                        parent's parent */
+    float move;      /* [wu] to the parent's shape; for even vertices on a border, from there to the
+                        shape of the parent's parent */
     float beside[2]; /* [wu] what is added to move where the border vertices that an odd vertex
                         stands between move themselves: those of a border along x, along z */
 } terrimp_geomip_vertex;
@@ -690,37 +650,31 @@ typedef struct terrimp_geomip_weights {
     uint8_t self, unused[3];
 } terrimp_geomip_weights;
 
-/* Fills the vertices of a node of any level, row by row; in a tree with fits those of coarse
-   borders follow.
+/* Fills the vertices of a node of any level, row by row.
 
-   xyz        [terrimp_pattern_vertex_count][3] out: unmorphed positions [wu]; NULL: not wanted;
-              (chunk_quads + 1)^2 without fits
-   vertices   [as many] out; NULL: not wanted
-   Errors     E_NULL (also when both are NULL); E_RANGE */
-TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
+   xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted */
+TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices);
 
-/* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
+/* Fills the weights of a node's vertices, for all nodes the same.
 
-   form       terrimp_form
-   weights    [terrimp_pattern_vertex_count] out */
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
+   weights    [(chunk_quads + 1)^2] out */
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
                                                        terrimp_geomip_weights *weights);
 
 /* Morphs a node's vertices on the CPU, for hosts without shaders. Vertices that neighbours share
    come out equal, bit for bit.
 
-   form       terrimp_form; FITTED exactly when the tree has fits
    draw       from select
-   vertices   [terrimp_pattern_vertex_count] of that node
+   vertices   [(chunk_quads + 1)^2] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
-   Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride);
@@ -741,7 +695,6 @@ typedef struct terrimp_rect {
    size             [2] out, width and height; rounded up
    scale            out, 1, or the factor by which the picture was reduced to keep to `largest`;
                     may be NULL
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equations 3.3 and 3.4 */
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
@@ -751,8 +704,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
    at its rim then stay inside the slot.
 
    capture    in and out
-   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin]
-   Errors     E_NULL; E_RANGE */
+   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin] */
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
@@ -762,7 +714,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
-   Errors          E_NULL; E_RANGE when the slot is empty or leaves the atlas
+   Errors          E_RANGE when the slot is empty or leaves the atlas
    Source          Hess 2010, section 3.4, made projective: interpolating s and t themselves would
                    bend the picture inside large triangles */
 TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
@@ -770,14 +722,13 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. Errors: E_NULL. */
+   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
                                                        size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
    angle_rad    out, 0..pi
-   Errors       E_NULL; E_NOT_FINITE
    Source       Hess 2010, section 3.5: all corners, since an eye can approach the centre of a large
                 impostor without turning around it */
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
@@ -792,7 +743,7 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
                   pass the vertical one: with meshes that stand proud the bound then held for every
                   sample that a capture saw, but at grazing angles (measured: up to 1.1 times it)
    error_px       out; +infinity when the eye is within `error` of the box and has moved
-   Errors         E_NULL; E_NOT_FINITE; E_RANGE when error < 0 or pixel_factor <= 0
+   Errors         E_RANGE when error < 0 or pixel_factor <= 0
    Source         own derivation, in the implementation; DESIGN: err * sin(theta) * K / d, with the
                   sine bounded over the whole box, not sampled at its corners */
 TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
@@ -805,22 +756,9 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
    max_angle_rad    [Limits: 0..pi]; from pi/2 on the angle needs a path of `distance`
    speed            [wu/s] of the eye [Limits: > 0]
    seconds          out
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equation 3.6: t = D sin(alpha) / S */
 TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_angle_rad,
                                                      float speed, float *seconds);
-
-/* For planning: the most captures per second that a set of impostors can ask for, whatever way the
-   eye moves: the sum of 1 / lifetime over the boxes that lie beyond a distance.
-
-   boxes            [count]
-   distance         [wu] boxes closer than this are not impostors; > 0
-   Errors           those of terrimp_impostor_lifetime
-   Source           Hess 2010, section 3.5.1 */
-TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t count,
-                                                const float eye[3], float distance,
-                                                float max_angle_rad, float speed,
-                                                float *captures_per_s);
 
 /* What a mesh hides from a capture and an eye that moves comes to see, and where the picture would
    best be split in two. */
@@ -842,9 +780,8 @@ typedef struct terrimp_split {
               [Limits: > 0]
    overlap    [wu] by which each part goes beyond the place of the split, since the mesh is not the
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also for an index beyond the vertices or a count not of
-              triangles
-   Cost       O(triangles^2): 0.1 to 0.4 ms for 85 triangles
+   Errors     E_RANGE, also for an index beyond the vertices or a count not of triangles
+   Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
                                                  uint32_t vertex_count, const uint16_t *indices,
@@ -881,7 +818,7 @@ typedef struct terrimp_shelves {
 } terrimp_shelves;
 
 /* Empties an atlas. The array stays the caller's and outlives the shelves.
-   Errors: E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
+   Errors: E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
 TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity);
@@ -889,7 +826,7 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
 /* First fit: puts a rectangle on the lowest shelf with room for it, or on a new shelf.
 
    rect       in: width and height [Limits: > 0]; out: x and y
-   Errors     E_NULL; E_RANGE; E_CAPACITY when it fits nowhere: nothing is changed
+   Errors     E_CAPACITY when it fits nowhere: nothing is changed
    Cost       O(shelves) */
 TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect);
 
@@ -898,8 +835,8 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
    items      [count] in and out; the order is kept
    order      [count] out: the order of insertion, from the tallest
    placed     out, how many were placed; may be NULL
-   Errors     E_NULL; E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all
-              fit: those that did are flagged PLACED
+   Errors     E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all fit:
+              those that did are flagged PLACED
    Cost       O(n^1.5 + n * shelves), no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
@@ -937,7 +874,7 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
               out: rectangles
    order      [count] scratch
    scale      out, factor by which all sides were reduced, 1 when they fitted; may be NULL
-   Errors     E_NULL; E_CAPACITY when even one texel each does not fit: slots are left unassigned */
+   Errors     E_CAPACITY when even one texel each does not fit: slots are left unassigned */
 TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
                                                terrimp_pack_item *items, uint32_t count,
                                                uint32_t *order, float *scale);
@@ -948,7 +885,7 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
                                                uint32_t width, uint32_t height);
 
 /* Notes that the picture has been rendered into the slot of the newest atlas: it has moved.
-   Errors: E_NULL; E_STATE when the slot has no rectangle there. */
+   Errors: E_STATE when the slot has no rectangle there. */
 TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
                                              terrimp_pair_slot *slot);
 
@@ -990,26 +927,25 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 
    memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
    bytes      at least terrimp_live_atlas_bytes(desc)
-   Errors     E_NULL; E_RANGE; E_OVERFLOW; E_ALIGN; E_MEMORY
    Cost       O(max_slots) */
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes);
 
-/* Frees all slots and sets the failures to 0. Errors: E_NULL; E_STATE before init. */
+/* Frees all slots and sets the failures to 0. */
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas);
 
 /* Finds room for a rectangle and keeps it.
 
    slot       out: its handle, < max_slots, until it is freed
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it fits
-              nowhere or all slots are in use: counted as a failure, nothing else changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it fits nowhere or all slots are in
+              use: counted as a failure, nothing else changes
    Cost       O(free rectangles), which are about twice as many as slots */
 TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, uint32_t *slot);
 
 /* Frees a slot: what borders on it grows together with it.
-   Errors: E_NULL; E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
+   Errors: E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
@@ -1023,7 +959,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
    width, height  the size wanted [Limits: 1..65536]
    size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
               its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
-   Errors     E_NULL; E_STATE before init; E_RANGE
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
@@ -1037,14 +972,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
    victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
               only handles were wanting. Scratch: it changes on E_CAPACITY too
    count      out: how many
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
-              larger than the atlas or every such place holds a slot that stays: nothing changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it is larger than the atlas or every
+              such place holds a slot that stays: nothing changes
    Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count);
 
-/* What the atlas holds. Errors: E_NULL; E_STATE before init. Cost: O(free rectangles). */
+/* What the atlas holds. Cost: O(free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
                                                     terrimp_live_atlas_stats *stats);
 
@@ -1098,8 +1033,7 @@ typedef struct terrimp_terrain_info {
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
 
-/* Writes the effective descriptor, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_heightfield_resolve. */
+/* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
 
@@ -1110,7 +1044,7 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
    morph      nonzero: also the nodes beside them whose morph data has changed
    nodes      [capacity] out, rising; NULL: only counted
    count      out: how many there are, also when they are more than capacity
-   Errors     E_NULL; E_RANGE; E_STATE; E_CAPACITY: nodes is untouched
+   Errors     E_CAPACITY: nodes is untouched
    Cost       O(count) */
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, int morph,
@@ -1122,11 +1056,11 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
                                                     terrimp_terrain_info *info);
 
 /* The box of everything that is drawn of a node and of all nodes below it: samples, coarse meshes,
-   skirts. Errors: E_NULL; E_RANGE; E_STATE. */
+   skirts. */
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box);
 
-/* The place and the quality of a node's coarse mesh. Errors: E_NULL; E_RANGE; E_STATE. */
+/* The place and the quality of a node's coarse mesh. */
 typedef struct terrimp_mesh_info {
     uint32_t base_vertex, vertex_count; /* in the vertices of terrimp_terrain_fill_meshes */
     uint32_t first_index, index_count;  /* in its indices */
@@ -1141,8 +1075,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
    terrimp_terrain_fill_ground. Triangle list, counter-clockwise from above. First stand the
    patterns of terrimp_pattern_fill with TERRIMP_FORM_LIST, then the strips that captures draw.
 
-   indices    [ground_index_count] out
-   Errors     E_NULL; E_CAPACITY; E_STATE */
+   indices    [ground_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *terrain,
                                                         uint16_t *indices, size_t capacity);
 
@@ -1151,8 +1084,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
 
    node        of any level [Limits: < node_count]
    xyz         [ground_vertex_count][3] out
-   capacity    floats
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity    floats */
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity);
 
@@ -1160,8 +1092,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
    say the weights that terrimp_geomip_fill_weights gives for chunk_quads and TERRIMP_FORM_LIST.
 
    vertices   [ground_vertex_count] out
-   capacity   of vertices
-   Errors     E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity   of vertices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
                                                       uint32_t node,
                                                       terrimp_geomip_vertex *vertices,
@@ -1173,8 +1104,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
    node        [Limits: <= node_count] node_count: the floor, behind all others
    xyz         [mesh_vertex_stride][3] out; for the floor what is left of mesh_vertex_count
    indices     [mesh_index_stride] out; the same
-   capacities  floats, indices
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacities  floats, indices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                      float *xyz, size_t xyz_capacity,
                                                      uint16_t *indices, size_t index_capacity);
@@ -1183,8 +1113,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
    count from the base vertex of each mesh.
 
    xyz         [mesh_vertex_count][3] out
-   indices     [mesh_index_count] out
-   Errors      E_NULL; E_CAPACITY; E_STATE */
+   indices     [mesh_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *terrain, float *xyz,
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity);
@@ -1225,7 +1154,7 @@ typedef struct terrimp_bake_info {
 
    block      [bytes] aligned to 8 bytes
    info       out; NULL: not wanted
-   Errors     E_NULL; E_ALIGN; E_BAKE; E_ORDER when it has to be converted first
+   Errors     E_BAKE; E_ORDER when it has to be converted first
    Cost       O(nodes), about 1 us for each */
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
                                               terrimp_bake_info *info);
@@ -1235,7 +1164,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
 
    block      [bytes] aligned to 8 bytes
    out        [capacity] aligned to 8 bytes; may be block, else apart from it
-   Errors     E_NULL; E_ALIGN; E_CAPACITY; E_BAKE: out, if it is not block, may have changed */
+   Errors     E_BAKE: out, if it is not block, may have changed */
 TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
                                                 size_t capacity);
 
@@ -1258,7 +1187,7 @@ TERRIMP_API size_t terrimp_terrain_open_bytes(void);
    memory         [memory_bytes] aligned to 8 bytes, at least terrimp_terrain_open_bytes
    terrain        out: lies in memory
    Errors         those of check and of terrimp_heightfield_resolve; E_BAKE for a field of another
-                  size, format, scale or offset; E_MEMORY
+                  size, format, scale or offset
    Cost           that of check */
 TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field,
                                                 const void *block, size_t bytes, void *memory,
@@ -1300,10 +1229,10 @@ typedef struct terrimp_view_desc {
     int ground_rule;        /* terrimp_geomip_rule */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
-    float fade_start;       /* [wu] from the eye: nodes that come closer are opaque ground
+    float fade_start;       /* [wu] from the eye: nodes that come closer are ground
                                [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
-                               ground fades over the impostors [Limits: > fade_start]
+                               impostors fade in over it [Limits: > fade_start]
                                [Default 0 -> 1.5 * fade_start; in AUTO 1.1] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
@@ -1340,8 +1269,6 @@ typedef struct terrimp_ground_command {
     uint32_t level;
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
-    float alpha;          /* 1: opaque; below: blended over what is there */
-    float depth_bias;     /* as for impostors; 0 but for ground beyond the fade band */
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
@@ -1349,7 +1276,7 @@ typedef struct terrimp_ground_command {
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
    it to the farthest depth and, when `clear` is set, to transparent black. The ground commands up
-   to end_capture are drawn with these matrices, opaque. */
+   to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
     uint32_t node;
     uint32_t level;
@@ -1368,11 +1295,9 @@ typedef struct terrimp_capture_command {
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
    texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. A vertex p is
-   drawn at eye + (p - eye) * (1 + depth_bias): at the same place of the screen, only deeper, so
-   that ground is drawn over it. Of a picture in two parts both are drawn, each only where r / q is
-   within 0..1: by a discard, or by the clip planes r >= 0 and q - r >= 0, which are rows of the
-   matrix. */
+   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
+   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
+   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1381,20 +1306,20 @@ typedef struct terrimp_impostor_command {
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
     uint32_t first_index;
     uint32_t index_count;
+    float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
+                             by a dither pattern: its ground shows on the others */
     float texture_matrix[16];
-    float depth_bias;
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain and has no gap. It comes after the impostors and shows only where none
    of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
    terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
-   border: there it is not drawn.) Vertices, indices, depth bias: as for impostors. */
+   border: there it is not drawn.) Vertices and indices as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
-    float depth_bias;
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1413,7 +1338,7 @@ typedef struct terrimp_stats {
     uint32_t visible;            /* nodes of which it was decided what they are drawn as */
     uint32_t ground;             /* ground nodes drawn */
     uint32_t impostors;          /* impostors drawn */
-    uint32_t impostors_by_level[TERRIMP_GEOMIP_LEVELS];
+    uint32_t impostors_by_level[TERRIMP_QUADTREE_LEVELS];
     uint32_t waiting;            /* impostors that were wanted and have no picture yet */
     uint32_t draws;              /* commands on the screen */
     uint32_t triangles;          /* of those */
@@ -1432,12 +1357,11 @@ typedef struct terrimp_stats {
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
-                                    drawn, depth bias included: update with a camera that sees far
-                                    enough, then draw with these; z_near is 0 within a box */
+                                    drawn: update with a camera that sees far enough, then draw with
+                                    these; z_near is 0 within a box */
 } terrimp_stats;
 
-/* Writes the effective settings for a terrain, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; E_STATE when the terrain is not built. */
+/* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out);
@@ -1450,30 +1374,28 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 
    terrain    built; outlives the view
    memory     [bytes] aligned to 8 bytes
-   view       out: lies in memory
-   Errors     those of terrimp_view_desc_resolve; E_MEMORY; E_ALIGN */
+   view       out: lies in memory */
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
-   Errors     E_NULL; those of terrimp_camera_resolve; E_CAPACITY when more than max_ground chunks
-              are in sight in mode FULL or IMPOSTOR: the frame before stays. In GEOMIP and AUTO
-              E_CAPACITY when even ground at 1000 px needs more nodes: there is no frame then
+   Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR: the
+              frame before stays. In GEOMIP and AUTO E_CAPACITY when even ground at 1000 px needs
+              more nodes: there is no frame then
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Calls back with the frame's commands: captures, each with its ground; opaque ground; impostors
-   and the ground between them; the floor; fading ground. Each kind front to back: what is hidden by
-   something drawn before it need not be shaded.
+/* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
+   floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate and touch until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
-/* Errors: E_NULL; E_STATE before the first update. */
+/* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when the light has changed or textures were lost. */
@@ -1482,8 +1404,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
    x, z       column and row of the first sample [Limits: inside the field]
-   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
-   Errors     E_NULL; E_RANGE */
+   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut */
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows);
 
@@ -1628,25 +1549,21 @@ typedef struct terrimp_sorted {
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
-   Errors: E_NULL; E_RANGE for a field outside its limits, a table that does not rise enough, a field that
-   wraps but not in whole pages, or F32 with TERRIMP_FIXED; E_NOT_FINITE; those of
-   terrimp_heightfield_resolve. */
+   Errors: E_RANGE also for a table that does not rise enough, and for F32 with TERRIMP_FIXED. */
 TERRIMP_API terrimp_result terrimp_sorted_desc_resolve(const terrimp_sorted_desc *in,
                                                        terrimp_sorted_desc *out);
 
 /* Makes the state ready for frames.
 
-   Errors     those of terrimp_sorted_desc_resolve; where the field is read for low and high, also
-              those of terrimp_heightfield_validate. sorted is as it was
+   Errors     where the field is read for low and high, E_VOID, E_NOT_FINITE for such a sample
    Cost       O(width * depth) if low and high are 0, else O(1) */
 TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
                                                terrimp_sorted *sorted);
 
 /* Begins a frame: finds the footprint of the camera and, with max_triangles, the scale.
 
-   Errors     E_NULL; those of terrimp_camera_resolve; E_RANGE  the eye is more than 2^23 samples
-              from the origin, or z_far reaches over more than 2^17 quads (TERRIMP_FIXED: 1900):
-              next then returns 0
+   Errors     E_RANGE also when the eye is more than 2^23 samples from the origin, or z_far reaches
+              over more than 2^27 quads, with TERRIMP_FIXED 2000; after any, next returns 0
    Cost       about 2 us; with max_triangles one to two thirds of what next takes for the whole
               frame, more for the first
    Source     Finch and Bishop 1998, sections 4.3 and 4.10 */
@@ -1669,6 +1586,59 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 
 /* ==== stop here if you only draw what has been built ====================== */
 
+/* ==== Layers ============================================================= >>layers */
+
+/* A piece of scenery, for instance a wood or a village, as pictures that stand one behind the
+   other: its layers. All are taken from one reference point, in the middle of the side of a view
+   cell that faces the scenery, and serve every eye in that cell. Each shows what lies between two
+   depths. They stand so close that between two of them nothing shows through, and so that nothing
+   appears farther than an allowed angle from where it is. Depths are measured from the reference
+   point along the direction of view. Room Layer builder makes them. */
+typedef struct terrimp_layers {
+    uint32_t count;        /* layer 0 is the closest */
+    uint32_t even_count;   /* this layer and those before it are evenly spaced in 1 / depth */
+    float start, end;      /* [wu] the depths that they stand for; end may be infinite */
+    float first, last;     /* 1 / depth of the first and of the last layer */
+    float step;            /* by which 1 / depth falls from one evenly spaced layer to the next */
+    float shrink, shift;   /* beyond: by which part of itself, and by how much else, it falls */
+    float texel;           /* tangent that one texel of each layer covers at the reference point */
+} terrimp_layers;
+
+/* The depth at which a layer stands [wu]. layers is not null, layer < its count. O(log(count)). */
+TERRIMP_API float terrimp_layer_depth(const terrimp_layers *layers, uint32_t layer);
+
+/* The depth at which layer - 1 ends and layer begins [wu]: start for 0, end for count. In between
+   what is off by parallax is shared equally: Jeschke 2004, equation 3.6, which at the reference
+   point is the middle in 1 / depth. */
+TERRIMP_API float terrimp_layer_border(const terrimp_layers *layers, uint32_t layer);
+
+/* The layer that stands for a depth; the first or the last one for depths out of the range.
+   O(log(count)^2). */
+TERRIMP_API uint32_t terrimp_layer_of(const terrimp_layers *layers, float depth);
+
+/* A rectangle of a layer that is drawn. */
+typedef struct terrimp_layer_quad {
+    terrimp_rect texels; /* of the layer's picture; row 0 is the lowest */
+    uint32_t layer;
+    uint32_t x, y;       /* where the atlas holds its lowest left texel */
+} terrimp_layer_quad;
+
+/* Corners and texture coordinates of a quad, counter-clockwise as the cell sees it. Its texture
+   needs no perspective: the quad is parallel to the picture.
+
+   picture     the capture of the layers: eye at the reference point; texels of layers->texel count
+               from tan_left and tan_down
+   atlas       [2] width and height of the atlas [texels]
+   xyz         [4][3] out [wu]
+   st          [4][2] out, 0..1 over the atlas; may be NULL
+   Errors      E_NULL; E_RANGE for a layer that is not there or an empty atlas
+   Cost        O(log(count)) */
+TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
+                                                 const terrimp_capture *picture,
+                                                 const terrimp_layer_quad *quad,
+                                                 const uint32_t atlas[2], float xyz[12],
+                                                 float st[8]);
+
 #ifndef TERRIMP_NO_BUILD
 
 /* ==== Simplifier ========================================================= >>simplifier */
@@ -1682,20 +1652,11 @@ typedef struct terrimp_border_point {
     float height; /* [wu] fitted; at both ends the sample's own height */
 } terrimp_border_point;
 
-/* One border polyline of a tile: `at` rises from 0 to the last sample of that border. */
+/* One border polyline of a tile: `at` rises, along +x or +z, from 0 to the last sample. */
 typedef struct terrimp_border {
     const terrimp_border_point *points; /* (required) [point_count] */
     uint32_t point_count;               /* [Limits: 2..samples of the border] */
 } terrimp_border;
-
-/* Which border of a tile is which. Points run along +x or +z, never around the tile. */
-enum {
-    TERRIMP_BORDER_Z0 = 0, /* row 0, along +x */
-    TERRIMP_BORDER_Z1,     /* last row, along +x */
-    TERRIMP_BORDER_X0,     /* column 0, along +z */
-    TERRIMP_BORDER_X1,     /* last column, along +z */
-    TERRIMP_BORDER_COUNT
-};
 
 typedef struct terrimp_simplify_desc {
     const float *heights; /* (required) [rows][cols] of the tile, packed, finite [wu] */
@@ -1704,7 +1665,7 @@ typedef struct terrimp_simplify_desc {
     uint32_t triangle_budget; /* surface triangles at most [Limits: at least the border's own
                                  need, that is border vertices - 2; ..TERRIMP_MAX_TRIANGLES]
                                  [Default 0 -> TERRIMP_TRIANGLE_BUDGET] */
-    terrimp_border borders[TERRIMP_BORDER_COUNT]; /* (required) the four polylines; where two
+    terrimp_border borders[TERRIMP_SIDE_COUNT]; /* (required) the four polylines; where two
                                                      meet, both have the same height */
 } terrimp_simplify_desc;
 
@@ -1728,9 +1689,6 @@ typedef struct terrimp_mesh {
     uint32_t vertex_count;          /* out: all vertices */
     uint32_t surface_index_count;   /* out: indices of the surface */
     uint32_t index_count;           /* out: all indices */
-    float error_above;              /* out: [wu] largest height of a sample over the surface */
-    float error_below;              /* out: [wu] largest depth of a sample under the surface */
-    float error_rms;                /* out: [wu] root mean square over all samples */
 } terrimp_mesh;
 
 /* Simplifies one border of a tile on its own. The result depends on these samples alone, so two
@@ -1745,7 +1703,6 @@ typedef struct terrimp_mesh {
                samples than that many points is kept whole, sample by sample
    points      [capacity] out; capacity of inner_limit + 2 (or count) is always enough
    point_count out: points written
-   Errors      NULL, RANGE, NOT_FINITE, CAPACITY; outputs untouched
    Cost        O(count^2), no allocation; about 20 us for 65 samples, 3 KB of stack
    Source      Hess 2010, section 3.1, fig. 3.2 */
 TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_t count,
@@ -1763,8 +1720,7 @@ TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
 
    triangle_budget   0 -> TERRIMP_TRIANGLE_BUDGET [Limits: ..TERRIMP_MAX_TRIANGLES]
    vertex_capacity   out
-   index_capacity    out
-   Errors            NULL, RANGE; outputs untouched */
+   index_capacity    out */
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                                                  uint32_t *vertex_capacity,
                                                  uint32_t *index_capacity);
@@ -1773,16 +1729,14 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
    polylines. A tile whose samples all fit the budget is returned whole; ground that is met without
    error may take fewer triangles, and one triangle stays over where the count does not work out.
    The mesh covers the tile's rectangle one to one: no triangle has a normal with y <= 0,
-   which is tested in integers. Two triangles share each inner edge, vertices stand on samples, and
-   the reported errors are those of all samples against the final surface.
+   which is tested in integers. Two triangles share each inner edge, vertices stand on samples.
 
    desc           what to simplify
    scratch        [scratch_bytes] aligned for int64_t; contents need not outlive the call
    scratch_bytes  at least terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget)
    mesh           in: arrays and capacities; out: everything else
-   Errors         NULL; RANGE (sizes, budget too small for the borders, border positions that do
-                  not rise from 0 to the end, corners that disagree); NOT_FINITE; MEMORY; ALIGN;
-                  CAPACITY; the mesh is untouched then
+   Errors         E_RANGE also for a budget that is too small for the borders, border positions that
+                  do not rise from 0 to the end, corners that disagree
    Cost           O(cols rows + budget^2); about 0.65 ms for 65 x 65 at the default budget
    Source         Hess 2010, section 3.1; the fit of heights after Lindstrom and Turk's idea that
                   a moved vertex beats a chosen one, here along y alone */
@@ -1791,24 +1745,18 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
 
 /* --- skirts (Hess 4.2) --- */
 
-/* Appends the lower skirt: a wall from the border down to one height, facing outwards. It fills
-   the gap to a neighbour of another level. Each skirt has as many vertices as the loop, and two
-   triangles for each of them.
+/* Appends a skirt: a wall along the border, of as many vertices as its loop and two triangles for
+   each of them. The lower one fills the gap to a neighbour of another level and faces outwards; the
+   upper one catches those pixels of a picture that lie above a border that is too low, and faces
+   inwards: keep it small.
 
    mesh    in: a surface, perhaps with skirts; out: the same and the wall
-   height  [wu] the bottom, as a rule the node's least height; a border vertex that lies lower
-           gets a wall of no height
-   Errors  NULL; NOT_FINITE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
+   upper   0: the lower skirt
+   height  [wu] of the lower skirt, its bottom, as a rule the node's least height; a border vertex
+           that lies lower gets a wall of no height. Of the upper one, its rise [Limits: >= 0]
+   Errors  E_STATE when the mesh has no surface yet
    Source  Hess 2010, section 4.2 */
-TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height);
-
-/* Appends the upper skirt: a wall that rises from the border, facing inwards. It catches those
-   pixels of a picture that lie above a border that is too low; keep it small.
-
-   rise    [wu] height of the wall [Limits: >= 0]
-   Errors  NULL; NOT_FINITE; RANGE; STATE; CAPACITY; mesh untouched
-   Source  Hess 2010, section 4.2 */
-TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise);
+TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
 
 /* --- standing proud (Hess 6.1) --- */
 
@@ -1827,9 +1775,9 @@ typedef struct terrimp_raise_desc {
    largest shortfall round it and lowers them together as far as the samples let it.
 
    desc    how far
-   mesh    in: a mesh of that tile without skirts; out: heights and errors
+   mesh    in: a mesh of that tile without skirts; out: its heights
    work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
-   Errors  NULL; RANGE; NOT_FINITE; STATE when the mesh has no surface or has skirts; mesh untouched
+   Errors  E_STATE when the mesh has no surface or has skirts
    Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
    Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
@@ -1854,9 +1802,8 @@ TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, 
    scratch         aligned for float; NULL is E_NULL even if there is no void
    scratch_bytes   at least terrimp_heightfield_fill_voids_scratch_bytes(width, depth)
    filled_count    receives the number of filled samples, 0 without has_no_data; NULL: not wanted
-   Errors          those of resolve; E_NULL; E_RANGE  samples is not field->samples;
-                   E_ALIGN  scratch; E_MEMORY  scratch_bytes; E_VOID  no sample is valid;
-                   E_NOT_FINITE  a height is NaN or infinite. No sample changes on errors.
+   Errors          E_RANGE also when samples is not field->samples; E_VOID when no sample is valid;
+                   E_NOT_FINITE for such a height. No sample changes then
    Cost            O(width * depth); some 0.35 s for 3601 x 3601 samples of which half are void
    Source          Bornemann and Deuflhard 1996, The cascadic multigrid method: from coarse to fine,
                    with more relaxation the coarser the grid */
@@ -1867,29 +1814,21 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 
 /* --- heights and errors of the ground --- */
 
-/* Fills in the fits, if there are any; before any node is built: the L2 projection on linear finite
-   elements, as in any book on these.
-
-   scratch    [scratch_count]
-   Errors     E_NULL
-   Cost       O(samples); about 0.35 s for 4097 x 4097 */
-TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch);
-
-/* Finds heights, error and rms of one node, from samples and fits alone: different nodes may be
+/* Finds heights, error and rms of one node, from samples alone: different nodes may be
    built at the same time by threads with scratch arrays of their own.
 
-   scratch    [scratch_count]
-   Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
+   scratch    [field.width + 2 * chunk_quads + 2]
+   Errors     at level 0 E_VOID, E_NOT_FINITE for such a sample
    Cost       O(samples of the node) */
-TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch);
 
-/* Ends the building: parents hold what their children hold. Errors: E_NULL. */
-TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree);
+/* Ends the building: parents hold what their children hold. */
+TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Fits, builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
-TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch);
+TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
 /* --- terrain --- */
 
@@ -1901,8 +1840,7 @@ TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *des
 /* Lays a terrain out in the caller's block. No sample is read, nothing is built yet.
 
    memory     [bytes] aligned to 8 bytes; freed by the caller when the terrain is no longer used
-   terrain    out: lies in memory
-   Errors     those of terrimp_terrain_desc_resolve; E_MEMORY; E_ALIGN; E_OVERFLOW */
+   terrain    out: lies in memory */
 TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc, void *memory,
                                                 size_t bytes, terrimp_terrain **terrain);
 
@@ -1910,8 +1848,8 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
    can be built in any order and still meet. Looks at every sample, unless the descriptor names the
    range. To be called once, before any node is built.
 
-   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or
-              the sum of its squares over all samples
+   Errors     E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or the sum
+              of its squares over all samples
    Cost       O(width * depth), about 1.5 ns a sample; O(1) when the range is named */
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain);
 
@@ -1921,16 +1859,16 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 
    node       [Limits: < node_count]
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_RANGE, also for a sample outside of the named range; E_MEMORY; E_ALIGN;
-              E_STATE before build_begin; E_VOID, E_NOT_FINITE for such a sample
+   Errors     E_RANGE, also for a sample outside of the named range; E_VOID, E_NOT_FINITE for such a
+              sample
    Cost       1.4 ms for 64 x 64 quads at level 0; at every level that, and the visits to all of the
               node's samples, 25 ns for each
    Source     Hess 2010, section 6.5, asks for meshes of several chunks */
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
-/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_NULL;
-   E_STATE when a node has not been built. */
+/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_STATE when
+   a node has not been built. */
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain);
 
 /* Begins, builds all nodes, one after the other, and finishes. Errors: those of the three above. */
@@ -1946,9 +1884,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
    samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
               it begins inside the field]; what reaches over the last column and row is cut
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_MEMORY; E_ALIGN; E_RANGE for a rectangle outside of the limits or a height
-              outside of the range; E_VOID, E_NOT_FINITE for such a sample; E_STATE before
-              build_finish and for a terrain that uses a bake. Nothing has changed then
+   Errors     E_RANGE for a rectangle outside of the limits or a height outside of the range;
+              E_VOID, E_NOT_FINITE for such a sample; E_STATE before build_finish and for a terrain
+              that uses a bake. Nothing has changed then
    Cost       that of build_node for each such node: the root has every sample. A host that cannot
               wait calls build_node itself, a few nodes a frame, from the finest level up */
 TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
@@ -1976,10 +1914,129 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
-   Errors     E_NULL; E_STATE before build_finish; E_OVERFLOW; E_CAPACITY; E_ALIGN
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
+
+/* ==== Layer builder ====================================================== >>layer-builder */
+
+/* From where layers are to be seen, and what they show. The cell is a box, or a shaft that opens
+   away from the scenery; the reference point is the middle of its side that faces the scenery. */
+typedef struct terrimp_layers_desc {
+    float distance;      /* (required) [wu] from that side to the scenery [Limits: > 0] */
+    float depth;         /* [wu] of the scenery [Limits: >= 0, may be infinite] */
+    float cell_size[2];  /* [wu] width and height of that side [Limits: >= 0] */
+    float cell_depth;    /* [wu] of the cell [Limits: >= 0, may be infinite] */
+    float cell_tan[2];   /* by how much half its width and half its height grow on the way back: 0
+                            for a box [Limits: >= 0] */
+    float view_tan[2];   /* (required) largest offset of the scenery from the middle of the picture,
+                            to the side and up or down, as a tangent [Limits: > 0] */
+    float texel;         /* (required) tangent of a texel. 1 / K of the sharpest view, or less: then
+                            no eye of the cell sees a texel larger than a pixel [Limits: > 0] */
+    float tolerance_rad; /* largest angle between where a point is and where it appears
+                            [Limits: >= 0] [Default 0 -> texel] */
+    int even;            /* nonzero: all steps of 1 / depth are alike, so that planes stay planes in
+                            the grid of a depth mesh. Takes more layers for shafts, and for scenery
+                            wider than the cell */
+} terrimp_layers_desc;
+
+/* Places the layers. No line of sight from the cell passes a layer more than one texel, in either
+   direction, beside where it passes the next: so texels uncover at most what is right behind them.
+
+   layers     out. Its count is the answer for those that only want to know the price
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed, as for
+              scenery without end that is seen from a cell without end
+   Cost       O(log(count)), no list is made
+   Source     Jeschke 2004, equations 3.1 to 3.7, derived anew: implementation */
+TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
+                                               terrimp_layers *layers);
+
+/* --- hidden texels (Jeschke 3.4) --- */
+
+/* The opaque texels of a layer, in bits: bit x % 32 of word [y][x / 32] for texel (x, y), rows of
+   TERRIMP_MASK_WORDS(width) words. Bits beyond the width may be anything. */
+#define TERRIMP_MASK_WORDS(width) (((width) + 31u) / 32u)
+
+typedef enum terrimp_cull_rule {
+    TERRIMP_CULL_DEFAULT = 0, /* same as CORNERS */
+    TERRIMP_CULL_BLOCK,       /* hidden behind 3 x 3 texels: one mask of state */
+    TERRIMP_CULL_CORNERS,     /* hidden from each quarter of the cell behind 2 x 2 texels, which may
+                                 be others each time: finds more, four masks of state */
+    TERRIMP_CULL_COUNT
+} terrimp_cull_rule;
+
+/* Finds the texels of a layer that no eye of the cell can see, for the closer layers hide them.
+   Called for one layer after the other, the closest first; all of one size. What is hidden hides
+   what is behind it in turn. Never culls what can be seen, if the layers stand as planned, or
+   closer together.
+
+   opaque     [height][TERRIMP_MASK_WORDS(width)]
+   rule       terrimp_cull_rule
+   state      [1 or 4][height][TERRIMP_MASK_WORDS(width)] in and out; 0 before the first layer
+   visible    [height][TERRIMP_MASK_WORDS(width)] out: those opaque texels that can be seen; may be
+              opaque itself
+   Errors     E_NULL; E_RANGE for an empty layer or a rule that is none
+   Cost       O(width * height / 32): 0.05 ms for 512 x 512
+   Source     Jeschke 2004, sections 3.4 and 3.4.1 */
+TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
+                                              uint32_t height, int rule, uint32_t *state,
+                                              uint32_t *visible);
+
+/* --- rectangles that hold all opaque texels (Jeschke 3.5) --- */
+
+typedef struct terrimp_cover_desc {
+    const uint32_t *mask; /* (required) [height][TERRIMP_MASK_WORDS(width)] opaque texels */
+    uint32_t width;       /* (required) [texels] [Limits: 1..16384] */
+    uint32_t height;      /* (required) [texels] [Limits: 1..16384] */
+    uint32_t quad_cost;   /* what a rectangle costs, in texels: 20 for 80 bytes of vertices, if a
+                             texel has 4 [Limits: 1..2^24] [Default 0 -> 20] */
+    uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
+} terrimp_cover_desc;
+
+/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
+   numbers of the descriptor are outside of their limits or capacity is 0. */
+TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
+
+/* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
+   rectangles becomes small: cuts in two, where that leaves the fewest texels, until no cut can
+   pay; takes back the cuts that did not pay; then joins rectangles where that does.
+
+   scratch    aligned to 8 bytes
+   rects      [capacity] out, without gutter
+   count      out: how many there are; none for an empty mask
+   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY
+   Cost       about O(width * height / 32 * log(count)) */
+TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
+                                         size_t bytes, terrimp_rect *rects, uint32_t capacity,
+                                         uint32_t *count);
+
+/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
+   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
+
+   cell       [texels] side of a cell [Limits: 1..16384]
+   min_fill   [Limits: 0..1] he found 0.8 to work well
+   Errors     those of terrimp_cover
+   Source     Jeschke 2004, section 3.5 */
+TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
+                                              float min_fill, void *scratch, size_t bytes,
+                                              terrimp_rect *rects, uint32_t capacity,
+                                              uint32_t *count);
+
+/* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
+   fills with copies of its outermost texels. Never scales.
+
+   shelves     in: where; empty or partly filled; out: its top is the height that was needed
+   quads       [count] in: texels; out: x and y
+   gutter      [texels] [Limits: 0..64]
+   items       [count] scratch; out: PLACED in the flags of those that were
+   order       [count] scratch
+   Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
+               fit: quads are unchanged, and the shelves hold what did
+   Cost        that of terrimp_pack_ffdh
+   Source      Jeschke 2004, section 3.6, without his powers of two */
+TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+                                              uint32_t count, uint32_t gutter,
+                                              terrimp_pack_item *items, uint32_t *order);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -2097,6 +2154,11 @@ static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
+static float terrimpi_clamp(float value, float low, float high)
+{
+    return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
+}
+
 static uint32_t terrimpi_clamp_u32(uint32_t value, uint32_t low, uint32_t high)
 {
     return terrimpi_min_u32(terrimpi_max_u32(value, low), high);
@@ -2162,6 +2224,14 @@ static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
 {
     size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
     return arena->base && arena->ok ? arena->base + at : NULL;
+}
+
+/* Whether a block of memory of the caller's will do. */
+static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
+{
+    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
+    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 static float terrimpi_dot(const float a[3], const float b[3])
@@ -2231,6 +2301,39 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
     terrimpi_cross(right, forward, up);
 }
 
+/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
+   extra memory. */
+static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
+                          int (*after)(const void *items, uint32_t a, uint32_t b))
+{
+    uint32_t i, k, gap;
+    for (gap = 1; gap < count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < count; i++) {
+            uint32_t moved = order[i];
+            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
+                order[k] = order[k - gap];
+            order[k] = moved;
+        }
+}
+
+/* Whether a side runs along x. */
+static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
+
+/* Twice the area of a triangle of samples (x, z); positive when it is counter-clockwise from above:
+   when its normal has y > 0. */
+static int64_t terrimpi_twice_area(const int64_t a[2], const int64_t b[2], const int64_t c[2])
+{
+    return (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1]);
+}
+
+/* Where point k of a lattice of every 2^level-th sample lies; beyond the last sample, on it. */
+static uint32_t terrimpi_lattice(uint32_t k, uint32_t level, uint32_t last)
+{
+    return k > (last >> level) ? last : k << level;
+}
+
 static terrimp_rect terrimpi_rect(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
 {
     terrimp_rect rect;
@@ -2257,11 +2360,6 @@ static void terrimpi_widen(float *low, float *high, float slope)
 
    A raw value is a sample as stored, converted to float: exact for all formats. Voids are told by
    raw values; two different raw values may well share one world height. */
-
-static float terrimpi_clamp(float value, float low, float high)
-{
-    return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
-}
 
 /* Bytes of one sample of an effective format. */
 static size_t terrimpi_sample_bytes(int format)
@@ -2508,12 +2606,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
             *z = scan.z;
     }
     return result;
-}
-
-TERRIMP_API terrimp_result terrimp_heightfield_sample(const terrimp_heightfield *field, uint32_t x,
-                                                      uint32_t z, float *height)
-{
-    return terrimp_heightfield_read(field, x, z, 1, 1, 1, height);
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
@@ -3227,6 +3319,201 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     return TERRIMP_OK;
 }
 
+/* ==== Quadtree =========================================================== >>impl-quadtree */
+
+static int terrimpi_tree_quads_fit(uint32_t quads)
+{
+    return quads >= 4u && quads <= 128u && quads % 2u == 0;
+}
+
+TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
+                                                 uint32_t chunk_quads, terrimp_quadtree *tree)
+{
+    terrimp_quadtree t;
+    uint32_t x, z, level;
+    TERRIMPI_REFUSE(!field || !tree, TERRIMP_E_NULL);
+    memset(&t, 0, sizeof t);
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &t.field));
+    t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(t.chunk_quads), TERRIMP_E_RANGE);
+    x = (t.field.width - 2u) / t.chunk_quads + 1u;
+    z = (t.field.depth - 2u) / t.chunk_quads + 1u;
+    for (level = 0;; level++) {
+        TERRIMP_ASSERT(level < TERRIMP_QUADTREE_LEVELS);
+        t.level_x[level] = x;
+        t.level_z[level] = z;
+        t.level_first[level + 1u] = t.level_first[level] + x * z;
+        if (x == 1u && z == 1u)
+            break;
+        x = (x + 1u) / 2u;
+        z = (z + 1u) / 2u;
+    }
+    t.level_count = level + 1u;
+    t.node_count = t.level_first[t.level_count];
+    *tree = t;
+    return TERRIMP_OK;
+}
+
+/* ---- which node ---- */
+
+static terrimp_node terrimpi_tree_at(const terrimp_quadtree *t, uint32_t level, uint32_t x,
+                                     uint32_t z)
+{
+    terrimp_node n;
+    n.number = t->level_first[level] + z * t->level_x[level] + x;
+    n.level = level;
+    n.x = x;
+    n.z = z;
+    return n;
+}
+
+static terrimp_node terrimpi_tree_node(const terrimp_quadtree *t, uint32_t number)
+{
+    uint32_t level = 0, k;
+    while (number >= t->level_first[level + 1u])
+        level++;
+    k = number - t->level_first[level];
+    return terrimpi_tree_at(t, level, k % t->level_x[level], k / t->level_x[level]);
+}
+
+static terrimp_node terrimpi_tree_root(const terrimp_quadtree *t)
+{
+    return terrimpi_tree_at(t, t->level_count - 1u, 0, 0);
+}
+
+static int terrimpi_tree_has(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z)
+{
+    return x < t->level_x[level] && z < t->level_z[level];
+}
+
+/* The parent of a node that is not the root. */
+static terrimp_node terrimpi_tree_parent(const terrimp_quadtree *t, const terrimp_node *n)
+{
+    return terrimpi_tree_at(t, n->level + 1u, n->x / 2u, n->z / 2u);
+}
+
+static uint32_t terrimpi_tree_parent_number(const terrimp_quadtree *t, uint32_t number)
+{
+    terrimp_node n = terrimpi_tree_node(t, number);
+    return terrimpi_tree_parent(t, &n).number;
+}
+
+/* The node of the same level beyond a side; returns 0 where the terrain ends. */
+static int terrimpi_tree_beyond(const terrimp_quadtree *t, const terrimp_node *n, int side,
+                                terrimp_node *beyond)
+{
+    uint32_t step = side & 1 ? 1u : (uint32_t)-1; /* from 0 it leads to a number too large */
+    uint32_t x = terrimpi_along_x(side) ? n->x : n->x + step;
+    uint32_t z = terrimpi_along_x(side) ? n->z + step : n->z;
+    if (!terrimpi_tree_has(t, n->level, x, z))
+        return 0;
+    *beyond = terrimpi_tree_at(t, n->level, x, z);
+    return 1;
+}
+
+/* ---- where it lies ---- */
+
+/* Column and row of lattice position (i, j) of a level. */
+static uint32_t terrimpi_tree_col(const terrimp_quadtree *t, uint32_t level, uint32_t i)
+{
+    return terrimpi_lattice(i, level, t->field.width - 1u);
+}
+
+static uint32_t terrimpi_tree_row(const terrimp_quadtree *t, uint32_t level, uint32_t j)
+{
+    return terrimpi_lattice(j, level, t->field.depth - 1u);
+}
+
+/* World x and z of lattice position (i, j) of a level. */
+static float terrimpi_tree_x(const terrimp_quadtree *t, uint32_t level, uint32_t i)
+{
+    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_tree_col(t, level, i));
+}
+
+static float terrimpi_tree_z(const terrimp_quadtree *t, uint32_t level, uint32_t j)
+{
+    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_tree_row(t, level, j));
+}
+
+/* The box of a node whose heights are low to high. */
+static void terrimpi_tree_box(const terrimp_quadtree *t, const terrimp_node *n, float low,
+                              float high, terrimp_box *box)
+{
+    uint32_t i = n->x * t->chunk_quads, j = n->z * t->chunk_quads;
+    box->min[0] = terrimpi_tree_x(t, n->level, i);
+    box->max[0] = terrimpi_tree_x(t, n->level, i + t->chunk_quads);
+    box->min[1] = low;
+    box->max[1] = high;
+    box->min[2] = terrimpi_tree_z(t, n->level, j);
+    box->max[2] = terrimpi_tree_z(t, n->level, j + t->chunk_quads);
+}
+
+/* ---- its children, closest first ---- */
+
+/* The children of a node above level 0, in the order in which an eye comes upon them: none hides
+   one before it. Returns how many there are. */
+static uint32_t terrimpi_tree_children(const terrimp_quadtree *t, const terrimp_node *n,
+                                       const float eye[3], terrimp_node children[4])
+{
+    uint32_t level = n->level - 1u, x = n->x * 2u, z = n->z * 2u, i, count = 0, first;
+    first = (eye[0] >= terrimpi_tree_x(t, level, (x + 1u) * t->chunk_quads) ? 1u : 0u) |
+            (eye[2] >= terrimpi_tree_z(t, level, (z + 1u) * t->chunk_quads) ? 2u : 0u);
+    for (i = 0; i < 4u; i++) {
+        uint32_t child_x = x + ((first ^ i) & 1u), child_z = z + ((first ^ i) >> 1);
+        if (terrimpi_tree_has(t, level, child_x, child_z))
+            children[count++] = terrimpi_tree_at(t, level, child_x, child_z);
+    }
+    return count;
+}
+
+/* A node on its way through the tree, and the planes that it has to be tested against. */
+typedef struct terrimpi_tree_visit {
+    terrimp_node node;
+    int planes;
+} terrimpi_tree_visit;
+
+/* A walk from the root down, closest first: `next` takes a node, `enter` adds its children. The
+   stack is enough for going down one child while the other three wait. */
+typedef struct terrimpi_tree_walk {
+    const terrimp_quadtree *tree;
+    const float *eye;
+    uint32_t depth;
+    terrimpi_tree_visit stack[3u * TERRIMP_QUADTREE_LEVELS + 1u];
+} terrimpi_tree_walk;
+
+static void terrimpi_tree_begin(terrimpi_tree_walk *walk, const terrimp_quadtree *tree,
+                                const float eye[3], int planes)
+{
+    walk->tree = tree;
+    walk->eye = eye;
+    walk->depth = 1;
+    walk->stack[0].node = terrimpi_tree_root(tree);
+    walk->stack[0].planes = planes;
+}
+
+/* Returns 0 at the end of the walk. */
+static int terrimpi_tree_next(terrimpi_tree_walk *walk, terrimpi_tree_visit *visit)
+{
+    if (walk->depth == 0)
+        return 0;
+    *visit = walk->stack[--walk->depth];
+    return 1;
+}
+
+/* The children of a node come next, to be tested against the planes that are left. */
+static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_visit *visit)
+{
+    terrimp_node children[4];
+    uint32_t count;
+    if (visit->node.level == 0)
+        return;
+    count = terrimpi_tree_children(walk->tree, &visit->node, walk->eye, children);
+    while (count > 0) {
+        walk->stack[walk->depth].node = children[--count];
+        walk->stack[walk->depth++].planes = visit->planes;
+    }
+}
+
 /* ==== Geomipmap ========================================================== >>impl-geomipmap */
 /* Based on: de Boer 2000 (errors, distances, patterns, morphing); Wagner 2003 (strips, factors of
    the borders).
@@ -3236,8 +3523,6 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
    that both get the same floats. */
 
 #define TERRIMPI_MIP_COLUMN 14u      /* 14 + 2 vertices: what a cache of 16 can hold of two rows */
-#define TERRIMPI_MIP_STITCH_COLUMN 12u /* leaves room for vertices of stitches: with 13 the order of
-                                          the cache is lost, and ACMR is 0.99 */
 #define TERRIMPI_MIP_MOST 1e30f      /* for squares that would overflow */
 #ifndef TERRIMP_NO_MORPH
 #define TERRIMPI_MIP_MORPH_MOST 4.0f
@@ -3251,49 +3536,22 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
 #endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
-/* Whether a side of a node, or a border of a tile, runs along x: Z0 and Z1 do. Of either pair the
-   odd one is the last row or column. */
-static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
-
 /* ---- patterns ---- */
-
-static int terrimpi_mip_quads_fit(uint32_t quads)
-{
-    return quads >= 4u && quads <= 128u && quads % 2u == 0;
-}
 
 static int terrimpi_mip_form_fits(uint32_t quads, int form)
 {
-    return terrimpi_mip_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
+    return terrimpi_tree_quads_fit(quads) && form >= 0 && form < (int)TERRIMP_FORM_COUNT;
 }
 
-static uint32_t terrimpi_mip_columns(uint32_t quads, int form)
+static uint32_t terrimpi_mip_columns(uint32_t quads)
 {
-    uint32_t most = TERRIMPI_MIP_COLUMN;
-    if (form == TERRIMP_FORM_STITCHED)
-        most = TERRIMPI_MIP_STITCH_COLUMN;
-    return (quads + most - 1u) / most;
-}
-
-/* Vertices that a coarse border has between its ends. */
-static uint32_t terrimpi_mip_border_vertices(uint32_t quads)
-{
-    return quads / 2u - 1u;
-}
-
-TERRIMP_API uint32_t terrimp_pattern_vertex_count(uint32_t chunk_quads, int form)
-{
-    uint32_t grid = (chunk_quads + 1u) * (chunk_quads + 1u);
-    if (!terrimpi_mip_form_fits(chunk_quads, form))
-        return 0;
-    return form == TERRIMP_FORM_FITTED
-               ? grid + 4u * terrimpi_mip_border_vertices(chunk_quads) : grid;
+    return (quads + TERRIMPI_MIP_COLUMN - 1u) / TERRIMPI_MIP_COLUMN;
 }
 
 /* First quad of a column: columns are as equally wide as can be. */
-static uint32_t terrimpi_mip_column(uint32_t quads, int form, uint32_t column)
+static uint32_t terrimpi_mip_column(uint32_t quads, uint32_t column)
 {
-    return quads * column / terrimpi_mip_columns(quads, form);
+    return quads * column / terrimpi_mip_columns(quads);
 }
 
 static uint32_t terrimpi_mip_coarse_sides(uint32_t pattern)
@@ -3310,13 +3568,11 @@ static uint32_t terrimpi_mip_triangles(uint32_t quads, uint32_t pattern)
 static uint32_t terrimpi_mip_indices(uint32_t quads, int form, uint32_t pattern)
 {
     uint32_t column, ahead = 0, triangles = terrimpi_mip_triangles(quads, pattern);
-    if (form == TERRIMP_FORM_STITCHED) /* plus one for each odd border vertex, not minus one */
-        triangles += quads * terrimpi_mip_coarse_sides(pattern);
     if (form == TERRIMP_FORM_STRIP) /* each row: its zigzag and two indices to join the next */
-        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads, form)) - 1u;
-    for (column = 0; column < terrimpi_mip_columns(quads, form); column++)
-        ahead += (terrimpi_mip_column(quads, form, column + 1u) -
-                  terrimpi_mip_column(quads, form, column) + 2u) / 2u;
+        return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads)) - 1u;
+    for (column = 0; column < terrimpi_mip_columns(quads); column++)
+        ahead += (terrimpi_mip_column(quads, column + 1u) -
+                  terrimpi_mip_column(quads, column) + 2u) / 2u;
     return 3u * (triangles + ahead);
 }
 
@@ -3331,8 +3587,7 @@ TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, 
         first += terrimpi_mip_indices(chunk_quads, form, i);
     found->first_index = first;
     found->index_count = terrimpi_mip_indices(chunk_quads, form, pattern);
-    found->triangle_count =
-        terrimpi_mip_triangles(chunk_quads, form == TERRIMP_FORM_STITCHED ? 0 : pattern);
+    found->triangle_count = terrimpi_mip_triangles(chunk_quads, pattern);
     return TERRIMP_OK;
 }
 
@@ -3351,31 +3606,20 @@ typedef struct terrimpi_mip_writer {
     uint16_t *start, *out;
 } terrimpi_mip_writer;
 
-static int terrimpi_mip_coarse(const terrimpi_mip_writer *w, int side)
-{
-    return (int)(w->pattern >> side & 1u);
-}
-
 /* The index of vertex (i, j), or of the one that it is moved to when a coarse side leaves it out:
    towards -x on +z, towards +z on -x and so on, which keeps the diagonal of every coarse quad an
-   edge. In fitted patterns coarse sides have vertices of their own between their ends. */
+   edge. */
 static uint16_t terrimpi_mip_index(const terrimpi_mip_writer *w, uint32_t i, uint32_t j)
 {
-    uint32_t row = w->quads + 1u, border = terrimpi_mip_border_vertices(w->quads);
-    uint32_t own = row * row; /* the first of the side's own vertices */
     int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++, own += border) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         int along_x = terrimpi_along_x(side), last = side & 1;
         uint32_t *along = along_x ? &i : &j;
-        if (w->form == TERRIMP_FORM_STITCHED || !terrimpi_mip_coarse(w, side) ||
-            (along_x ? j : i) != (last ? w->quads : 0u))
-            continue;
-        if (*along & 1u)
+        if ((w->pattern >> side & 1u) && (along_x ? j : i) == (last ? w->quads : 0u) &&
+            (*along & 1u))
             *along = last ? *along - 1u : *along + 1u;
-        if (w->form == TERRIMP_FORM_FITTED && *along != 0 && *along != w->quads)
-            return (uint16_t)(own + *along / 2u - 1u);
     }
-    return (uint16_t)(j * row + i);
+    return (uint16_t)(j * (w->quads + 1u) + i);
 }
 
 static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b, uint16_t c)
@@ -3385,22 +3629,6 @@ static void terrimpi_mip_triangle(terrimpi_mip_writer *w, uint16_t a, uint16_t b
     *w->out++ = a;
     *w->out++ = b;
     *w->out++ = c;
-}
-
-/* After quad (i, j): what stitches its borders to a neighbour's edge, two quads long. */
-static void terrimpi_mip_stitch(terrimpi_mip_writer *w, uint32_t i, uint32_t j)
-{
-    uint16_t at = (uint16_t)(j * (w->quads + 1u) + i), row = (uint16_t)(w->quads + 1u);
-    if (i == 0 && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X0))
-        terrimpi_mip_triangle(w, (uint16_t)(at + row), at, (uint16_t)(at - row));
-    at = (uint16_t)(at + 1u);
-    if (i + 1u == w->quads && (j & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_X1))
-        terrimpi_mip_triangle(w, (uint16_t)(at - row), at, (uint16_t)(at + row));
-    if (j == 0 && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z0))
-        terrimpi_mip_triangle(w, (uint16_t)(at - 1u), at, (uint16_t)(at + 1u));
-    at = (uint16_t)(at + row);
-    if (j + 1u == w->quads && !(i & 1u) && terrimpi_mip_coarse(w, TERRIMP_SIDE_Z1))
-        terrimpi_mip_triangle(w, (uint16_t)(at + 1u), at, (uint16_t)(at - 1u));
 }
 
 /* A column of quads as a list. Rows run from +x to -x, so that a quad's diagonal needs no vertex
@@ -3421,8 +3649,6 @@ static void terrimpi_mip_list_column(terrimpi_mip_writer *w, uint32_t from, uint
             uint16_t c = terrimpi_mip_index(w, i + 1u, j + 1u);
             terrimpi_mip_triangle(w, a, c, terrimpi_mip_index(w, i + 1u, j));
             terrimpi_mip_triangle(w, a, b, c);
-            if (w->form == TERRIMP_FORM_STITCHED)
-                terrimpi_mip_stitch(w, i, j);
         }
 }
 
@@ -3447,9 +3673,9 @@ static void terrimpi_mip_fill_pattern(terrimpi_mip_writer *w)
 {
     uint32_t column, j;
     w->start = w->out;
-    for (column = 0; column < terrimpi_mip_columns(w->quads, w->form); column++) {
-        uint32_t from = terrimpi_mip_column(w->quads, w->form, column);
-        uint32_t to = terrimpi_mip_column(w->quads, w->form, column + 1u);
+    for (column = 0; column < terrimpi_mip_columns(w->quads); column++) {
+        uint32_t from = terrimpi_mip_column(w->quads, column);
+        uint32_t to = terrimpi_mip_column(w->quads, column + 1u);
         if (w->form != TERRIMP_FORM_STRIP) {
             terrimpi_mip_list_column(w, from, to);
             continue;
@@ -3476,180 +3702,38 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
     return TERRIMP_OK;
 }
 
-/* ---- the quadtree ---- */
+/* ---- boxes ---- */
 
-TERRIMP_API terrimp_result terrimp_geomip_init(const terrimp_heightfield *field,
-                                               uint32_t chunk_quads, terrimp_geomip *tree)
+static void terrimpi_mip_box(const terrimp_quadtree *t, const terrimp_node *n, terrimp_box *box)
 {
-    terrimp_geomip t;
-    uint32_t x, z, level;
-    TERRIMPI_REFUSE(!field || !tree, TERRIMP_E_NULL);
-    memset(&t, 0, sizeof t);
-    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &t.field));
-    t.chunk_quads = chunk_quads == 0 ? 64u : chunk_quads;
-    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(t.chunk_quads), TERRIMP_E_RANGE);
-    x = (t.field.width - 2u) / t.chunk_quads + 1u;
-    z = (t.field.depth - 2u) / t.chunk_quads + 1u;
-    for (level = 0;; level++) {
-        TERRIMP_ASSERT(level < TERRIMP_GEOMIP_LEVELS);
-        t.level_x[level] = x;
-        t.level_z[level] = z;
-        t.level_first[level + 1u] = t.level_first[level] + x * z;
-        if (x == 1u && z == 1u)
-            break;
-        x = (x + 1u) / 2u;
-        z = (z + 1u) / 2u;
-    }
-    t.level_count = level + 1u;
-    t.node_count = t.level_first[t.level_count];
-    t.scratch_count = 5u * t.field.width + 2u * (t.chunk_quads + 1u);
-    for (level = 1; level < t.level_count; level++)
-        t.fit_first[level + 1u] =
-            t.fit_first[level] + (((t.field.width - 1u) >> level) + 1u) *
-                                     (((t.field.depth - 1u) >> level) + 1u);
-    t.fit_count = t.fit_first[t.level_count];
-    *tree = t;
-    return TERRIMP_OK;
-}
-
-/* A node by its place. */
-typedef struct terrimpi_mip_place {
-    uint32_t level, x, z;
-} terrimpi_mip_place;
-
-static uint32_t terrimpi_mip_number(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
-{
-    return t->level_first[level] + z * t->level_x[level] + x;
-}
-
-static terrimpi_mip_place terrimpi_mip_place_of(const terrimp_geomip *t, uint32_t node)
-{
-    terrimpi_mip_place p;
-    p.level = 0;
-    while (node >= t->level_first[p.level + 1u])
-        p.level++;
-    node -= t->level_first[p.level];
-    p.x = node % t->level_x[p.level];
-    p.z = node / t->level_x[p.level];
-    return p;
-}
-
-/* The parent of a node that is not the root. */
-static uint32_t terrimpi_mip_parent(const terrimp_geomip *t, uint32_t node)
-{
-    terrimpi_mip_place p = terrimpi_mip_place_of(t, node);
-    return terrimpi_mip_number(t, p.level + 1u, p.x / 2u, p.z / 2u);
-}
-
-/* Column and row of lattice position (i, j) of a level. */
-static uint32_t terrimpi_mip_col(const terrimp_geomip *t, uint32_t level, uint32_t i)
-{
-    uint32_t last = t->field.width - 1u;
-    return i > (last >> level) ? last : i << level;
-}
-
-static uint32_t terrimpi_mip_row(const terrimp_geomip *t, uint32_t level, uint32_t j)
-{
-    uint32_t last = t->field.depth - 1u;
-    return j > (last >> level) ? last : j << level;
-}
-
-/* World x and z of lattice position (i, j) of a level. */
-static float terrimpi_mip_x(const terrimp_geomip *t, uint32_t level, uint32_t i)
-{
-    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_mip_col(t, level, i));
-}
-
-static float terrimpi_mip_z(const terrimp_geomip *t, uint32_t level, uint32_t j)
-{
-    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_mip_row(t, level, j));
-}
-
-static void terrimpi_mip_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
-{
-    const terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, p.level, p.x, p.z)];
-    uint32_t i = p.x * t->chunk_quads, j = p.z * t->chunk_quads;
-    box->min[0] = terrimpi_mip_x(t, p.level, i);
-    box->max[0] = terrimpi_mip_x(t, p.level, i + t->chunk_quads);
-    box->min[1] = node->low;
-    box->max[1] = node->high;
-    box->min[2] = terrimpi_mip_z(t, p.level, j);
-    box->max[2] = terrimpi_mip_z(t, p.level, j + t->chunk_quads);
+    terrimpi_tree_box(t, n, t->nodes[n->number].low, t->nodes[n->number].high, box);
 }
 
 /* The box within which a node's error holds: half a quad larger all round, for what finer
    neighbours draw up to it. */
-static void terrimpi_mip_error_box(const terrimp_geomip *t, terrimpi_mip_place p, terrimp_box *box)
+static void terrimpi_mip_error_box(const terrimp_quadtree *t, const terrimp_node *n,
+                                   terrimp_box *box)
 {
-    float half = 0.5f * (float)(1u << p.level);
-    terrimpi_mip_box(t, p, box);
+    float half = 0.5f * (float)(1u << n->level);
+    terrimpi_mip_box(t, n, box);
     box->min[0] -= half * t->field.spacing_x;
     box->max[0] += half * t->field.spacing_x;
     box->min[2] -= half * t->field.spacing_z;
     box->max[2] += half * t->field.spacing_z;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box)
 {
+    terrimp_node n;
     TERRIMPI_REFUSE(!tree || !box || !tree->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    terrimpi_mip_box(tree, terrimpi_mip_place_of(tree, node), box);
+    n = terrimpi_tree_node(tree, node);
+    terrimpi_mip_box(tree, &n, box);
     return TERRIMP_OK;
 }
 
-/* Which of a node's four children is closest to the eye: bit 0 the one farther along x, bit 1 the
-   one farther along z. */
-static uint32_t terrimpi_mip_closest(const terrimp_geomip *t, uint32_t level, uint32_t x,
-                                     uint32_t z, const float eye[3])
-{
-    const terrimp_heightfield *f = &t->field;
-    uint32_t i = terrimpi_mip_col(t, level - 1u, (x * 2u + 1u) * t->chunk_quads);
-    uint32_t j = terrimpi_mip_row(t, level - 1u, (z * 2u + 1u) * t->chunk_quads);
-    return (eye[0] >= terrimpi_line(f->origin_x, f->spacing_x, i) ? 1u : 0u) |
-           (eye[2] >= terrimpi_line(f->origin_z, f->spacing_z, j) ? 2u : 0u);
-}
-
-/* The place next to a node beyond a side; returns 0 where the terrain ends. */
-static int terrimpi_mip_beyond(const terrimp_geomip *t, terrimpi_mip_place p, int side,
-                               terrimpi_mip_place *beyond)
-{
-    uint32_t *across = terrimpi_along_x(side) ? &p.z : &p.x;
-    *across += side & 1 ? 1u : (uint32_t)-1; /* below 0 it is too large */
-    *beyond = p;
-    return p.x < t->level_x[p.level] && p.z < t->level_z[p.level];
-}
-
-/* ---- fits ---- */
-
-/* What is minimised is the integral of the squared difference of two surfaces, that of the samples
-   and that of a level. Its normal equations have seven terms each: the products of a vertex's hat
-   function with its own and its six neighbours'. The right-hand sides, here called loads, are the
-   products of the hats with the surface of the samples. As every hat is a sum of hats of the next
-   finer level, so is a load of finer loads. Gauss and Seidel's method then gains a digit in two
-   sweeps.
-
-   Some vertices stay on their samples: those at the terrain's edge, beside which the sums would be
-   special, and those at the corners and half-way points of nodes. A corner is shared with a node
-   that no side is shared with, whose level a pattern does not tell: so it stands where it stands in
-   all levels that can meet there. */
-
-#define TERRIMPI_MIP_SWEEPS 4u
-
-/* Columns of a level's lattice without what is off it at the far edges. */
-static uint32_t terrimpi_mip_cols(const terrimp_geomip *t, uint32_t level)
-{
-    return ((t->field.width - 1u) >> level) + 1u;
-}
-
-/* Height of a level's lattice at sample (x, z), which belongs to that lattice. */
-static float terrimpi_mip_stand(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
-{
-    uint32_t between = (1u << level) - 1u;
-    if (!t->fits || level == 0 || level >= t->level_count || ((x | z) & between) != 0)
-        return terrimpi_sample(&t->field, x, z); /* or at the far edges, off the lattice */
-    return t->fits[t->fit_first[level] + (z >> level) * terrimpi_mip_cols(t, level) + (x >> level)];
-}
+/* ---- heights ---- */
 
 /* Height on the edge from a to b, k of n steps along it; exact at its ends. */
 static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
@@ -3658,12 +3742,12 @@ static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
 }
 
 /* Height of the triangles of a level at a sample. */
-static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z)
+static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z)
 {
     uint32_t i = x >> level, j = z >> level;
-    uint32_t x0 = terrimpi_mip_col(t, level, i), x1 = terrimpi_mip_col(t, level, i + 1u);
-    uint32_t z0 = terrimpi_mip_row(t, level, j), z1 = terrimpi_mip_row(t, level, j + 1u);
-    float a = terrimpi_mip_stand(t, level, x0, z0), d = terrimpi_mip_stand(t, level, x1, z1);
+    uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
+    uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
+    float a = terrimpi_sample(&t->field, x0, z0), d = terrimpi_sample(&t->field, x1, z1);
     float b, c, u, v;
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
@@ -3672,8 +3756,8 @@ static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32
                                                                   diagonal */
         return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
                          : terrimpi_mip_between(a, d, right, wide);
-    b = terrimpi_mip_stand(t, level, x1, z0);
-    c = terrimpi_mip_stand(t, level, x0, z1);
+    b = terrimpi_sample(&t->field, x1, z0);
+    c = terrimpi_sample(&t->field, x0, z1);
     if (right == 0)
         return terrimpi_mip_between(a, c, down, deep);
     if (down == 0)
@@ -3686,8 +3770,8 @@ static float terrimpi_mip_height(const terrimp_geomip *t, uint32_t level, uint32
 /* ---- distances ---- */
 
 /* D of one node, squared, before its children have a say. */
-static float terrimpi_mip_distance(const terrimp_geomip *t, uint32_t level, uint32_t node, int rule,
-                                   float tolerance_px, float pixel_factor)
+static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, uint32_t node,
+                                   int rule, float tolerance_px, float pixel_factor)
 {
     const terrimp_geomip_node *n = &t->nodes[node];
     float d;
@@ -3716,8 +3800,7 @@ static int terrimpi_mip_rule_fits(int rule)
            (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
 }
 
-/* Checks the settings that selection and distances share. */
-static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, float tolerance_px,
+static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
     TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
@@ -3728,8 +3811,8 @@ static terrimp_result terrimpi_mip_check(const terrimp_geomip *t, int rule, floa
     return TERRIMP_OK;
 }
 
-/* terrimp_geomip_distances of checked settings. */
-static void terrimpi_mip_distances(const terrimp_geomip *tree, int rule, float tolerance_px,
+/* The distances of all nodes; a parent's are at least what its children ask for. */
+static void terrimpi_mip_distances(const terrimp_quadtree *tree, int rule, float tolerance_px,
                                    float morph_ratio, float pixel_factor, float *distances)
 {
     uint32_t level, node;
@@ -3739,21 +3822,9 @@ static void terrimpi_mip_distances(const terrimp_geomip *tree, int rule, float t
                 terrimpi_mip_distance(tree, level, node, rule, tolerance_px, pixel_factor);
     for (node = 0; node + 1u < tree->node_count; node++) {
         float least = distances[node] * morph_ratio * morph_ratio;
-        float *d = &distances[terrimpi_mip_parent(tree, node)];
+        float *d = &distances[terrimpi_tree_parent_number(tree, node)];
         *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
     }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, int rule,
-                                                    float tolerance_px, float morph_ratio,
-                                                    float pixel_factor, float *distances)
-{
-    TERRIMPI_TRY(terrimpi_mip_check(tree, rule, tolerance_px, morph_ratio));
-    TERRIMPI_REFUSE(!distances, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(pixel_factor), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(pixel_factor > 0.0f), TERRIMP_E_RANGE);
-    terrimpi_mip_distances(tree, rule, tolerance_px, morph_ratio, pixel_factor, distances);
-    return TERRIMP_OK;
 }
 
 /* ---- selection ---- */
@@ -3763,7 +3834,7 @@ TERRIMP_API terrimp_result terrimp_geomip_distances(const terrimp_geomip *tree, 
    and q the parts of r along and across the horizontal heading, and forward = (heading * level,
    steep), the product's length is sqrt(p^2 + (steep q)^2). */
 typedef struct terrimpi_mip_frame {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
     terrimp_geomip_view *view;
     terrimp_frustum frustum;
     float eye[3], forward[3];
@@ -3773,7 +3844,7 @@ typedef struct terrimpi_mip_frame {
                                   seen there, and across it */
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
-    uint32_t first[TERRIMP_GEOMIP_LEVELS]; /* lists of marks; ends with node_count */
+    uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
 /* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
@@ -3865,18 +3936,18 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 }
 
 /* Square of a node's error over the tolerance, when it is drawn as it is; 0 when it is out of view.
-   *mask: planes to test against, and those that are left for its parts. */
-static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node,
-                                  int *mask)
+   *planes: those to test against, and those that are left for its parts. */
+static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_node *node,
+                                  int *planes)
 {
-    float d2, measure, split2 = f->view->distances[node];
+    float d2, measure, split2 = f->view->distances[node->number];
     terrimp_box box;
     if (!(split2 > 0.0f))
         return 0.0f;
-    terrimpi_mip_error_box(f->tree, p, &box);
-    if (*mask) {
-        *mask = terrimp_frustum_test(&f->frustum, &box, *mask);
-        if (*mask == TERRIMP_PLANES_OUTSIDE)
+    terrimpi_mip_error_box(f->tree, node, &box);
+    if (*planes) {
+        *planes = terrimp_frustum_test(&f->frustum, &box, *planes);
+        if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
     d2 = terrimpi_mip_distance2(&box, f->eye);
@@ -3886,14 +3957,14 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, terrimpi_mip_plac
 }
 
 /* Raises a node's measure, and enters the node into the list of its level. */
-static void terrimpi_mip_raise(terrimpi_mip_frame *f, uint32_t level, uint32_t node, float measure)
+static void terrimpi_mip_raise(terrimpi_mip_frame *f, const terrimp_node *node, float measure)
 {
-    terrimp_geomip_mark *mark = &f->view->marks[node];
+    terrimp_geomip_mark *mark = &f->view->marks[node->number];
     if (mark->frame != f->view->frame) {
         mark->frame = f->view->frame;
         mark->measure = 0.0f;
-        mark->next = f->first[level];
-        f->first[level] = node;
+        mark->next = f->first[node->level];
+        f->first[node->level] = node->number;
     }
     mark->measure = terrimpi_max(mark->measure, measure);
 }
@@ -3905,65 +3976,27 @@ static float terrimpi_mip_marked(const terrimpi_mip_frame *f, uint32_t node)
     return mark->frame == f->view->frame ? mark->measure : 0.0f;
 }
 
-/* A node on its way through the quadtree, and the planes that it still has to be tested against. */
-typedef struct terrimpi_mip_visit {
-    terrimpi_mip_place place;
-    int mask;
-} terrimpi_mip_visit;
-
-/* Enough for a walk that goes down one child and keeps the other three. */
-#define TERRIMPI_MIP_STACK (3u * TERRIMP_GEOMIP_LEVELS + 1u)
-
-/* Begins a walk at the root; returns the depth of the stack. */
-static uint32_t terrimpi_mip_push_root(const terrimp_geomip *t, terrimpi_mip_visit *stack, int mask)
-{
-    stack->place.level = t->level_count - 1u;
-    stack->place.x = stack->place.z = 0;
-    stack->mask = mask;
-    return 1;
-}
-
-/* Pushes the children of a node, `first` (bit 0: x, bit 1: z) last, so that it is visited first. */
-static uint32_t terrimpi_mip_push_children(const terrimp_geomip *t, terrimpi_mip_visit v,
-                                           uint32_t first, terrimpi_mip_visit *stack,
-                                           uint32_t depth)
-{
-    terrimpi_mip_place p = v.place;
-    uint32_t i;
-    v.place.level--;
-    for (i = 4u; i-- > 0;) {
-        v.place.x = p.x * 2u + ((first ^ i) & 1u);
-        v.place.z = p.z * 2u + ((first ^ i) >> 1);
-        if (v.place.x < t->level_x[v.place.level] && v.place.z < t->level_z[v.place.level])
-            stack[depth++] = v;
-    }
-    return depth;
-}
-
 /* Marks the nodes whose own error asks for a split, and those that are close to it. Measures never
    grow towards the leaves, so what lies below an unsplit node asks for nothing. What is out of view
    asks for nothing either, unless nodes morph: then a border would jump when one of its nodes
    leaves the view. */
 static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
 {
-    const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
     float stay = 1.0f + f->view->hysteresis;
     float worth = 1.0f / (f->view->morph_ratio * f->view->morph_ratio);
-    uint32_t depth = terrimpi_mip_push_root(t, stack, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
-    while (depth > 0) {
-        terrimpi_mip_visit v = stack[--depth];
-        terrimpi_mip_place p = v.place;
-        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
-        const terrimp_geomip_mark *mark = &f->view->marks[node];
-        float measure = p.level == 0 ? 0.0f : terrimpi_mip_measure(f, p, node, &v.mask);
+    terrimpi_tree_begin(&walk, f->tree, f->eye, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
+    while (terrimpi_tree_next(&walk, &v)) {
+        const terrimp_geomip_mark *mark = &f->view->marks[v.node.number];
+        float measure = v.node.level == 0 ? 0.0f : terrimpi_mip_measure(f, &v.node, &v.planes);
         if (mark->frame == f->view->frame - 1u && mark->measure >= 1.0f && worth >= 1.0f)
             measure *= stay * stay;
         if (measure < worth)
             continue;
-        terrimpi_mip_raise(f, p.level, node, measure);
-        if (measure >= 1.0f && p.level > 1u)
-            depth = terrimpi_mip_push_children(t, v, 0, stack, depth);
+        terrimpi_mip_raise(f, &v.node, measure);
+        if (measure >= 1.0f && v.node.level > 1u)
+            terrimpi_tree_enter(&walk, &v);
     }
 }
 
@@ -3975,31 +4008,30 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
    children, which lets nodes cease to morph before they split. */
 static void terrimpi_mip_balance(terrimpi_mip_frame *f)
 {
-    const terrimp_geomip *t = f->tree;
-    uint32_t level, node;
+    const terrimp_quadtree *t = f->tree;
+    uint32_t level, number;
     int side;
     for (level = 1; level + 1u < t->level_count; level++)
-        for (node = f->first[level]; node != t->node_count; node = f->view->marks[node].next) {
-            terrimpi_mip_place p = terrimpi_mip_place_of(t, node), beyond;
+        for (number = f->first[level]; number != t->node_count;
+             number = f->view->marks[number].next) {
+            terrimp_node node = terrimpi_tree_node(t, number), beyond;
             for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-                if (terrimpi_mip_beyond(t, p, side, &beyond))
-                    terrimpi_mip_raise(f, level + 1u,
-                                       terrimpi_mip_number(t, level + 1u, beyond.x / 2u,
-                                                           beyond.z / 2u),
-                                       f->view->marks[node].measure);
+                if (terrimpi_tree_beyond(t, &node, side, &beyond)) {
+                    terrimp_node parent = terrimpi_tree_parent(t, &beyond);
+                    terrimpi_mip_raise(f, &parent, f->view->marks[number].measure);
+                }
         }
 }
 
 /* How far a node has morphed into the shape of its parent, from the parent's measure: from 1 where
    the parent splits to 0 at morph_ratio times less distance, linear in the distance. */
-static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_place p)
+static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, const terrimp_node *node)
 {
     float ratio = f->view->morph_ratio, measure;
     if (TERRIMPI_MIP_MORPH_MOST <= 1.0f || !(ratio > 1.0f) ||
-        p.level + 1u >= f->tree->level_count)
+        node->level + 1u >= f->tree->level_count)
         return 0.0f;
-    measure = terrimpi_mip_marked(
-        f, terrimpi_mip_number(f->tree, p.level + 1u, p.x / 2u, p.z / 2u));
+    measure = terrimpi_mip_marked(f, terrimpi_tree_parent(f->tree, node).number);
     if (measure >= ratio * ratio)
         return 0.0f;
     return measure > 1.0f ? (ratio / TERRIMP_SQRTF(measure) - 1.0f) / (ratio - 1.0f) : 1.0f;
@@ -4007,48 +4039,42 @@ static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, terrimpi_mip_pla
 
 /* What a node's side needs: whether the neighbour is coarser, and the factors of the border. With a
    neighbour of the same level the larger fraction holds for both; a coarser neighbour dictates. */
-static void terrimpi_mip_side(const terrimpi_mip_frame *f, terrimpi_mip_place p, int side,
-                              terrimp_geomip_draw *draw)
+static void terrimpi_mip_side(const terrimpi_mip_frame *f, int side, terrimp_geomip_draw *draw)
 {
-    const terrimp_geomip *t = f->tree;
-    terrimpi_mip_place beyond, parent;
+    const terrimp_node *node = &draw->node;
+    terrimp_node beyond, parent;
     draw->side[side] = draw->morph;
     draw->side_coarse[side] = 0.0f;
-    if (!terrimpi_mip_beyond(t, p, side, &beyond))
+    if (!terrimpi_tree_beyond(f->tree, node, side, &beyond))
         return;
-    parent.level = p.level + 1u;
-    parent.x = beyond.x / 2u;
-    parent.z = beyond.z / 2u;
-    if (parent.x == p.x / 2u && parent.z == p.z / 2u)
+    parent = terrimpi_tree_parent(f->tree, &beyond);
+    if (parent.x == node->x / 2u && parent.z == node->z / 2u)
         return; /* a sibling, or its children: the same fraction, or 0 */
-    if (terrimpi_mip_marked(f, terrimpi_mip_number(t, parent.level, parent.x, parent.z)) < 1.0f) {
+    if (terrimpi_mip_marked(f, parent.number) < 1.0f) {
         draw->pattern |= 1u << side;
-        draw->side_coarse[side] = terrimpi_mip_fraction(f, parent);
-        draw->side[side] = 1.0f; /* left out, or in stitched patterns on the neighbour's edge */
+        draw->side_coarse[side] = terrimpi_mip_fraction(f, &parent);
+        draw->side[side] = 1.0f; /* they are left out */
     } else {
-        draw->side[side] = terrimpi_max(draw->morph, terrimpi_mip_fraction(f, beyond));
+        draw->side[side] = terrimpi_max(draw->morph, terrimpi_mip_fraction(f, &beyond));
     }
 }
 
-static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint32_t node)
+static void terrimpi_mip_emit(terrimpi_mip_frame *f, const terrimp_node *node)
 {
     terrimp_geomip_view *v = f->view;
     terrimp_geomip_draw *draw;
-    int side, whole = 0;
+    int side, planes = 0;
     if (v->draws_needed++ >= v->draw_capacity)
         return;
     draw = &v->draws[v->draws_needed - 1u];
-    draw->node = node;
-    draw->level = p.level;
-    draw->x = p.x;
-    draw->z = p.z;
+    draw->node = *node;
     draw->pattern = 0;
     draw->error_px = 0.0f;
-    if (p.level > 0)
-        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, p, node, &whole));
-    draw->morph = terrimpi_mip_fraction(f, p);
+    if (node->level > 0)
+        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, node, &planes));
+    draw->morph = terrimpi_mip_fraction(f, node);
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        terrimpi_mip_side(f, p, side, draw);
+        terrimpi_mip_side(f, side, draw);
     v->triangle_count += terrimpi_mip_triangles(f->tree->chunk_quads, draw->pattern);
 }
 
@@ -4057,27 +4083,22 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, terrimpi_mip_place p, uint3
    and above, was measured and left out: 0.042 against 0.045 ms a frame, which is noise. */
 static void terrimpi_mip_collect(terrimpi_mip_frame *f)
 {
-    const terrimp_geomip *t = f->tree;
-    terrimpi_mip_visit stack[TERRIMPI_MIP_STACK];
-    uint32_t depth = terrimpi_mip_push_root(t, stack, TERRIMP_PLANES_ALL);
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
     f->view->draws_needed = f->view->triangle_count = 0;
-    while (depth > 0) {
-        terrimpi_mip_visit v = stack[--depth];
-        terrimpi_mip_place p = v.place;
-        terrimp_box box;
-        uint32_t node = terrimpi_mip_number(t, p.level, p.x, p.z);
-        if (v.mask) {
-            terrimpi_mip_box(t, p, &box);
-            v.mask = terrimp_frustum_test(&f->frustum, &box, v.mask);
-            if (v.mask == TERRIMP_PLANES_OUTSIDE)
+    terrimpi_tree_begin(&walk, f->tree, f->eye, TERRIMP_PLANES_ALL);
+    while (terrimpi_tree_next(&walk, &v)) {
+        if (v.planes) {
+            terrimp_box box;
+            terrimpi_mip_box(f->tree, &v.node, &box);
+            v.planes = terrimp_frustum_test(&f->frustum, &box, v.planes);
+            if (v.planes == TERRIMP_PLANES_OUTSIDE)
                 continue;
         }
-        if (p.level == 0 || terrimpi_mip_marked(f, node) < 1.0f) {
-            terrimpi_mip_emit(f, p, node);
-            continue;
-        }
-        depth = terrimpi_mip_push_children(t, v, terrimpi_mip_closest(t, p.level, p.x, p.z, f->eye),
-                                           stack, depth);
+        if (v.node.level == 0 || terrimpi_mip_marked(f, v.node.number) < 1.0f)
+            terrimpi_mip_emit(f, &v.node);
+        else
+            terrimpi_tree_enter(&walk, &v);
     }
 }
 
@@ -4099,7 +4120,7 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
-static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
+static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
                                                 terrimp_geomip_view *view)
 {
     TERRIMPI_DEFAULT(view->rule, TERRIMP_GEOMIP_PICTURE);
@@ -4112,7 +4133,7 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_geomip *tree,
 }
 
 /* terrimp_geomip_select with resolved settings and camera. */
-static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_geomip_view *view,
+static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_geomip_view *view,
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
@@ -4137,7 +4158,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_geomip *tree, terrimp_ge
     return TERRIMP_E_CAPACITY;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
+TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
                                                  terrimp_geomip_view *view,
                                                  const terrimp_camera *camera)
 {
@@ -4159,26 +4180,26 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_geomip *tree,
 /* ---- vertices and morphing ---- */
 
 /* How far a vertex of a level's lattice moves between the levels `from` and `from` + 1 above. */
-static float terrimpi_mip_move(const terrimp_geomip *t, uint32_t level, uint32_t i, uint32_t j,
+static float terrimpi_mip_move(const terrimp_quadtree *t, uint32_t level, uint32_t i, uint32_t j,
                                uint32_t from)
 {
-    uint32_t x = terrimpi_mip_col(t, level, i), z = terrimpi_mip_row(t, level, j);
+    uint32_t x = terrimpi_tree_col(t, level, i), z = terrimpi_tree_row(t, level, j);
     return terrimpi_mip_height(t, level + from + 1u, x, z) -
            terrimpi_mip_height(t, level + from, x, z);
 }
 
 /* The moves of a node's vertex (i, j); (i0, j0) is the node's first one on the lattice. */
-static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_t i0, uint32_t j0,
+static void terrimpi_mip_vertex(const terrimp_quadtree *t, uint32_t level, uint32_t i0, uint32_t j0,
                                 uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
 {
     uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
     int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
-    vertex->height = terrimpi_mip_stand(t, level, terrimpi_mip_col(t, level, i0 + i),
-                                        terrimpi_mip_row(t, level, j0 + j));
+    vertex->height = terrimpi_sample(&t->field, terrimpi_tree_col(t, level, i0 + i),
+                                        terrimpi_tree_row(t, level, j0 + j));
     vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
-    if ((along_x && along_z) || (!odd && !t->fits && (along_x || along_z)))
+    if ((along_x && along_z) || (!odd && (along_x || along_z)))
         vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 1);
-    else if (odd || t->fits)
+    else if (odd)
         vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 0);
     if (!odd)
         return;
@@ -4198,97 +4219,59 @@ static void terrimpi_mip_vertex(const terrimp_geomip *t, uint32_t level, uint32_
                                     terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
 }
 
-/* Writes one position, and moves on to the next. */
-static void terrimpi_mip_position(const terrimp_geomip *t, uint32_t level, uint32_t x, uint32_t z,
-                                  float **xyz)
-{
-    if (!*xyz)
-        return;
-    (*xyz)[0] = terrimpi_line(t->field.origin_x, t->field.spacing_x, x);
-    (*xyz)[1] = terrimpi_mip_stand(t, level, x, z);
-    (*xyz)[2] = terrimpi_line(t->field.origin_z, t->field.spacing_z, z);
-    *xyz += 3;
-}
-
-/* The vertices of coarse borders: they stand as the neighbour's do, a level further up. */
-static void terrimpi_mip_fill_borders(const terrimp_geomip *t, terrimpi_mip_place p, float *xyz,
-                                      terrimp_geomip_vertex *vertices)
-{
-    uint32_t quads = t->chunk_quads, along;
-    int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        for (along = 2; along < quads; along += 2u) {
-            uint32_t across = side & 1 ? quads : 0u;
-            uint32_t i = p.x * quads + (terrimpi_along_x(side) ? along : across);
-            uint32_t j = p.z * quads + (terrimpi_along_x(side) ? across : along);
-            uint32_t x = terrimpi_mip_col(t, p.level, i), z = terrimpi_mip_row(t, p.level, j);
-            terrimpi_mip_position(t, p.level + 1u, x, z, &xyz);
-            if (!vertices)
-                continue;
-            vertices->height = terrimpi_mip_stand(t, p.level + 1u, x, z);
-            vertices->move = terrimpi_mip_move(t, p.level, i, j, 1);
-            vertices->beside[0] = vertices->beside[1] = 0.0f;
-            vertices++;
-        }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices)
 {
-    terrimpi_mip_place p;
+    terrimp_node n;
     uint32_t i, j, i0, j0;
     TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    p = terrimpi_mip_place_of(tree, node);
-    i0 = p.x * tree->chunk_quads;
-    j0 = p.z * tree->chunk_quads;
+    n = terrimpi_tree_node(tree, node);
+    i0 = n.x * tree->chunk_quads;
+    j0 = n.z * tree->chunk_quads;
     for (j = 0; j <= tree->chunk_quads; j++)
         for (i = 0; i <= tree->chunk_quads; i++) {
-            terrimpi_mip_position(tree, p.level, terrimpi_mip_col(tree, p.level, i0 + i),
-                                  terrimpi_mip_row(tree, p.level, j0 + j), &xyz);
+            if (xyz) {
+                *xyz++ = terrimpi_tree_x(tree, n.level, i0 + i);
+                *xyz++ = terrimpi_sample(&tree->field, terrimpi_tree_col(tree, n.level, i0 + i),
+                                         terrimpi_tree_row(tree, n.level, j0 + j));
+                *xyz++ = terrimpi_tree_z(tree, n.level, j0 + j);
+            }
             if (vertices)
-                terrimpi_mip_vertex(tree, p.level, i0, j0, i, j, vertices++);
+                terrimpi_mip_vertex(tree, n.level, i0, j0, i, j, vertices++);
         }
-    if (tree->fits)
-        terrimpi_mip_fill_borders(tree, p, xyz, vertices);
     return TERRIMP_OK;
 }
 
-/* The weights of vertex k, of the grid or of a coarse border. With fits every vertex moves to the
-   parent's shape, without them only odd ones do. */
-static void terrimpi_mip_weights(uint32_t quads, int form, uint32_t k, terrimp_geomip_weights *w)
+/* The weights of vertex k: odd vertices move to the parent's shape. */
+static void terrimpi_mip_weights(uint32_t quads, uint32_t k, terrimp_geomip_weights *w)
 {
     uint32_t row = quads + 1u, i = k % row, j = k / row, from[TERRIMP_SIDE_COUNT], side;
-    int odd = (i | j) & 1u, fitted = form == TERRIMP_FORM_FITTED;
-    int corner = (i == 0 || i == quads) && (j == 0 || j == quads);
+    uint8_t odd = (i | j) & 1u;
     memset(w, 0, sizeof *w);
-    if (k >= row * row) {
-        w->even[(k - row * row) / terrimpi_mip_border_vertices(quads)] = 1;
-        return;
-    }
     from[TERRIMP_SIDE_Z0] = j;
     from[TERRIMP_SIDE_Z1] = quads - j;
     from[TERRIMP_SIDE_X0] = i;
     from[TERRIMP_SIDE_X1] = quads - i;
-    w->self = odd || fitted;
+    w->self = odd;
     for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
         w->beside[side] = from[side] == 1u || (from[side] == 0 && odd);
         if (from[side] > 0)
             continue;
-        (odd || (fitted && !corner) ? w->odd : w->even)[side] = 1;
+        (odd ? w->odd : w->even)[side] = 1;
         w->self = 0;
     }
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
                                                        terrimp_geomip_weights *weights)
 {
-    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
+    uint32_t k;
     TERRIMPI_REFUSE(!weights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
-    for (k = 0; k < count; k++)
-        terrimpi_mip_weights(chunk_quads, form, k, &weights[k]);
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(chunk_quads), TERRIMP_E_RANGE);
+    for (k = 0; k < (chunk_quads + 1u) * (chunk_quads + 1u); k++)
+        terrimpi_mip_weights(chunk_quads, k, &weights[k]);
     return TERRIMP_OK;
 }
 
@@ -4298,19 +4281,19 @@ static float terrimpi_mip_dot4(const uint8_t weight[4], const float factor[4])
            (float)weight[2] * factor[2] + (float)weight[3] * factor[3];
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
+TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
                                                 const terrimp_geomip_draw *draw,
                                                 const terrimp_geomip_vertex *vertices,
                                                 float *heights, size_t stride)
 {
-    uint32_t k, count = terrimp_pattern_vertex_count(chunk_quads, form);
+    uint32_t k;
     TERRIMPI_REFUSE(!draw || !vertices || !heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0 || stride == 0, TERRIMP_E_RANGE);
-    for (k = 0; k < count; k++, vertices++, heights += stride) {
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(chunk_quads) || stride == 0, TERRIMP_E_RANGE);
+    for (k = 0; k < (chunk_quads + 1u) * (chunk_quads + 1u); k++, vertices++, heights += stride) {
         const float *coarse = draw->side_coarse;
         terrimp_geomip_weights w;
         float factor, along_z, along_x;
-        terrimpi_mip_weights(chunk_quads, form, k, &w);
+        terrimpi_mip_weights(chunk_quads, k, &w);
         factor = (float)w.self * draw->morph + terrimpi_mip_dot4(w.odd, draw->side) +
                  terrimpi_mip_dot4(w.even, coarse);
         along_z = (float)w.beside[TERRIMP_SIDE_Z0] * coarse[TERRIMP_SIDE_Z0] +
@@ -4327,6 +4310,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads, int form,
 /* Based on: Hess 2010, sections 3.3 to 3.5 and 6.2. */
 
 #define TERRIMPI_SPLITS 24u /* places of a split that are tried */
+#define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
 #define TERRIMPI_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
@@ -4548,95 +4532,79 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_rate(const terrimp_box *boxes, size_t count,
-                                                const float eye[3], float distance,
-                                                float max_angle_rad, float speed,
-                                                float *captures_per_s)
-{
-    float rate = 0.0f, seconds;
-    size_t i;
-    TERRIMPI_REFUSE((count && !boxes) || !eye || !captures_per_s, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(terrimpi_finite(distance) && !(distance > 0.0f), TERRIMP_E_RANGE);
-    for (i = 0; i <= count; i++) { /* the last turn only checks the arguments */
-        float to_box = i < count ? terrimp_box_distance(&boxes[i], eye) : distance;
-        TERRIMPI_TRY(terrimp_impostor_lifetime(to_box, max_angle_rad, speed, &seconds));
-        TERRIMPI_REFUSE(!(seconds > 0.0f) && i == count, TERRIMP_E_RANGE);
-        if (i < count && to_box >= distance)
-            rate += 1.0f / seconds;
-    }
-    *captures_per_s = rate;
-    return TERRIMP_OK;
-}
+/* A mesh as the eye of a capture sees it: for each of a few cells of the picture the closest
+   triangle that faces the eye, and 1 / depth there. A point is (across, up, 1 / depth), the first
+   two in cells: planes stay planes, and an eye that moves by r moves a point by r / depth. */
+typedef struct terrimpi_split_map {
+    const terrimp_capture *capture;
+    const float *xyz;
+    const uint16_t *indices;
+    float low[2], cells[2]; /* first edge of the cells; cells for one unit at depth 1 */
+    float closest[TERRIMPI_SPLIT_CELLS][TERRIMPI_SPLIT_CELLS]; /* 0: there is none */
+    uint16_t own[TERRIMPI_SPLIT_CELLS][TERRIMPI_SPLIT_CELLS];  /* first index of its triangle */
+} terrimpi_split_map;
 
-/* Where the way `to` from the origin passes through a triangle: the fraction of the way, or 1 when
-   it does not. */
-static float terrimpi_hidden_at(const float to[3], const float a[3], const float b[3],
-                                const float c[3])
-{
-    float ab[3], ac[3], p[3], q[3], det, u, v, t;
-    terrimpi_sub(b, a, ab);
-    terrimpi_sub(c, a, ac);
-    terrimpi_cross(to, ac, p);
-    det = terrimpi_dot(ab, p);
-    if (!(terrimpi_abs(det) > 0.0f))
-        return 1.0f;
-    u = -terrimpi_dot(a, p) / det;
-    if (!(u >= 0.0f && u <= 1.0f))
-        return 1.0f;
-    terrimpi_cross(a, ab, q); /* of the origin minus a, and ab, with the sign turned */
-    v = -terrimpi_dot(to, q) / det;
-    if (!(v >= 0.0f && u + v <= 1.0f))
-        return 1.0f;
-    t = -terrimpi_dot(ac, q) / det;
-    return t > 0.0f && t < 1.0f ? t : 1.0f;
-}
-
-/* The fraction of the way from an eye to a point of triangle `own` at which another triangle first
-   hides it, or 1. */
-static float terrimpi_first_hit(const float eye[3], const float point[3], const float *xyz,
-                                const uint16_t *indices, uint32_t index_count, uint32_t own)
-{
-    float first = 1.0f, to[3], corner[3][3];
-    const uint16_t *t;
-    int k;
-    terrimpi_sub(point, eye, to);
-    for (t = indices; t < indices + index_count; t += 3) {
-        if (t == indices + own)
-            continue;
-        for (k = 0; k < 3; k++)
-            terrimpi_sub(xyz + t[k] * 3u, eye, corner[k]);
-        first = terrimpi_min(first, terrimpi_hidden_at(to, corner[0], corner[1], corner[2]));
-    }
-    return first;
-}
-
-/* How far a vertex lies in front of the eye of a capture. */
-static float terrimpi_depth(const terrimp_capture *capture, const float xyz[3])
+static void terrimpi_split_point(const terrimpi_split_map *m, const float xyz[3], float p[3])
 {
     float to[3];
-    terrimpi_sub(xyz, capture->eye, to);
-    return terrimpi_dot(to, capture->forward);
+    terrimpi_sub(xyz, m->capture->eye, to);
+    p[2] = 1.0f / terrimpi_max(terrimpi_dot(to, m->capture->forward), 1e-20f);
+    p[0] = (terrimpi_dot(to, m->capture->right) * p[2] - m->low[0]) * m->cells[0];
+    p[1] = (terrimpi_dot(to, m->capture->up) * p[2] - m->low[1]) * m->cells[1];
 }
 
-/* The middle of a triangle, and how large an eye sees it: 0 from behind. The solid angle, but for a
-   factor that all triangles share. */
-static float terrimpi_triangle_seen(const float eye[3], const float *xyz, const uint16_t *corners,
-                                    float middle[3])
+static void terrimpi_split_corners(const terrimpi_split_map *m, uint32_t first, float p[3][3])
 {
-    float ab[3], ac[3], to[3], normal[3], distance, facing;
-    int i;
-    for (i = 0; i < 3; i++) {
-        const float a = xyz[corners[0] * 3u + (uint32_t)i];
-        ab[i] = xyz[corners[1] * 3u + (uint32_t)i] - a;
-        ac[i] = xyz[corners[2] * 3u + (uint32_t)i] - a;
-        middle[i] = a + (ab[i] + ac[i]) * (1.0f / 3.0f);
-        to[i] = middle[i] - eye[i];
-    }
-    terrimpi_cross(ab, ac, normal);
-    distance = terrimpi_length(to);
-    facing = -terrimpi_dot(normal, to);
-    return facing > 0.0f && distance > 0.0f ? facing / (distance * distance * distance) : 0.0f;
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        terrimpi_split_point(m, m->xyz + m->indices[first + i] * 3u, p[i]);
+}
+
+/* Twice the area of a triangle of the picture, less than 0 when it is seen from behind, for an eye
+   that has moved by so many cells at depth 1. */
+static float terrimpi_split_area(float p[3][3], float move_x, float move_y)
+{
+    float w1 = p[1][2] - p[0][2], w2 = p[2][2] - p[0][2];
+    return (p[1][0] - p[0][0] - move_x * w1) * (p[2][1] - p[0][1] - move_y * w2) -
+           (p[2][0] - p[0][0] - move_x * w2) * (p[1][1] - p[0][1] - move_y * w1);
+}
+
+/* 1 / depth of a triangle's plane at a place of the picture; sets *inside to less than 0 where that
+   is not in the triangle. `area` is that of the triangle. */
+static float terrimpi_split_plane(float p[3][3], float area, float x, float y, float *inside)
+{
+    float a = (p[1][0] - x) * (p[2][1] - y) - (p[2][0] - x) * (p[1][1] - y);
+    float b = (p[2][0] - x) * (p[0][1] - y) - (p[0][0] - x) * (p[2][1] - y);
+    *inside = terrimpi_min(terrimpi_min(a, b), area - a - b);
+    return p[2][2] + (a * (p[0][2] - p[2][2]) + b * (p[1][2] - p[2][2])) / area;
+}
+
+/* The cells whose middles lie within low..high. */
+static void terrimpi_split_range(float a, float b, float c, int *low, int *high)
+{
+    const float last = (float)TERRIMPI_SPLIT_CELLS;
+    *low = (int)terrimpi_clamp(terrimpi_min(a, terrimpi_min(b, c)) + 0.5f, 0.0f, last);
+    *high = (int)terrimpi_clamp(terrimpi_max(a, terrimpi_max(b, c)) + 0.5f, 0.0f, last);
+}
+
+/* Enters a triangle into the cells that it is the closest in. */
+static void terrimpi_split_draw(terrimpi_split_map *m, uint32_t first, float p[3][3])
+{
+    float area = terrimpi_split_area(p, 0.0f, 0.0f);
+    int x, y, x0, x1, y0, y1;
+    if (!(area > 0.0f))
+        return;
+    terrimpi_split_range(p[0][0], p[1][0], p[2][0], &x0, &x1);
+    terrimpi_split_range(p[0][1], p[1][1], p[2][1], &y0, &y1);
+    for (y = y0; y < y1; y++)
+        for (x = x0; x < x1; x++) {
+            float inside, w;
+            w = terrimpi_split_plane(p, area, (float)x + 0.5f, (float)y + 0.5f, &inside);
+            if (inside >= 0.0f && w > m->closest[y][x]) {
+                m->closest[y][x] = w;
+                m->own[y][x] = (uint16_t)first;
+            }
+        }
 }
 
 /* Sums over a mesh as the moved eyes see it. */
@@ -4646,28 +4614,60 @@ typedef struct terrimpi_smear {
     float saved[TERRIMPI_SPLITS]; /* ... and that a split would spare */
 } terrimpi_smear;
 
-/* Adds the triangle whose indices begin at `own`. Places of a split: first + (k + 1) * step. */
-static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
-                               const uint16_t *indices, uint32_t index_count, uint32_t own,
-                               float reach, float overlap, float first, float step,
-                               terrimpi_smear *smear)
+/* Whether a point that is hidden at cell (x, y) still is after the eye has moved towards larger x
+   (or y, or smaller x), by `move` cells at depth 1. What hides it stretches up to a crest, some
+   cells in that direction, and moves by more than the point does. */
+static int terrimpi_split_still(const terrimpi_split_map *m, int x, int y, int step_x, int step_y,
+                                float move, float w)
 {
-    float middle[3], eye[3], size, hit = -1.0f, depth = 0.0f, weight;
-    uint32_t i, k, way;
-    for (way = 0; way < 3u; way++) {
-        const float *axis = way == 0 ? capture->up : capture->right;
-        for (i = 0; i < 3u; i++)
-            eye[i] = capture->eye[i] + axis[i] * (way == 2u ? -reach : reach);
-        size = terrimpi_triangle_seen(eye, xyz, indices + own, middle);
-        smear->seen += size;
-        if (!(size > 0.0f) || hit > TERRIMPI_IN_SIGHT)
+    float away = 0.5f;
+    while (x >= 0 && x < TERRIMPI_SPLIT_CELLS && y < TERRIMPI_SPLIT_CELLS &&
+           m->closest[y][x] * TERRIMPI_IN_SIGHT > w) {
+        if (away >= move * (m->closest[y][x] - w))
+            return 1;
+        away += 1.0f;
+        x += step_x;
+        y += step_y;
+    }
+    return 0;
+}
+
+/* The part of the way to a point of cell (x, y) after which something hides it, or 1. */
+static float terrimpi_split_hit(const terrimpi_split_map *m, int x, int y, const float point[3])
+{
+    float p[3][3], inside, w;
+    if (!(m->closest[y][x] * TERRIMPI_IN_SIGHT > point[2]))
+        return 1.0f;
+    terrimpi_split_corners(m, m->own[y][x], p);
+    w = terrimpi_split_plane(p, terrimpi_split_area(p, 0.0f, 0.0f), point[0], point[1], &inside);
+    return w > point[2] ? point[2] / w : 1.0f;
+}
+
+/* Adds a triangle, for eyes that have moved up, right and left. Places of a split: first + (k + 1)
+   * step. */
+static void terrimpi_split_add(const terrimpi_split_map *m, float p[3][3], float reach,
+                               float overlap, float first, float step, terrimpi_smear *smear)
+{
+    static const int ways[3][2] = { { 0, 1 }, { 1, 0 }, { -1, 0 } };
+    const float last = (float)(TERRIMPI_SPLIT_CELLS - 1);
+    float middle[3], hit, depth;
+    int x, y, way;
+    uint32_t k;
+    for (k = 0; k < 3u; k++)
+        middle[k] = (p[0][k] + p[1][k] + p[2][k]) * (1.0f / 3.0f);
+    x = (int)terrimpi_clamp(middle[0], 0.0f, last);
+    y = (int)terrimpi_clamp(middle[1], 0.0f, last);
+    hit = terrimpi_split_hit(m, x, y, middle);
+    depth = 1.0f / middle[2];
+    for (way = 0; way < 3; way++) {
+        int up = ways[way][1];
+        float size = terrimpi_split_area(p, (float)ways[way][0] * reach * m->cells[0],
+                                         (float)up * reach * m->cells[1]), weight;
+        if (!(size > 0.0f))
             continue;
-        if (hit < 0.0f) {
-            hit = terrimpi_first_hit(capture->eye, middle, xyz, indices, index_count, own);
-            depth = terrimpi_depth(capture, middle);
-        }
+        smear->seen += size;
         if (hit > TERRIMPI_IN_SIGHT ||
-            terrimpi_first_hit(eye, middle, xyz, indices, index_count, own) < TERRIMPI_IN_SIGHT)
+            terrimpi_split_still(m, x, y, ways[way][0], up, reach * m->cells[up], middle[2]))
             continue;
         weight = size * (1.0f - hit) * (1.0f - hit);
         smear->all += weight;
@@ -4679,25 +4679,55 @@ static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
     }
 }
 
+/* Sets the cells over all vertices; they lie between the depths 1 / *w_most and 1 / *w_least. */
+static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, float *w_least,
+                               float *w_most)
+{
+    float low[3], high[3], p[3];
+    uint32_t i, k;
+    memset(m->closest, 0, sizeof m->closest);
+    m->low[0] = m->low[1] = 0.0f;
+    m->cells[0] = m->cells[1] = 1.0f;
+    for (i = 0; i < vertex_count; i++) {
+        terrimpi_split_point(m, m->xyz + i * 3u, p);
+        for (k = 0; k < 3u; k++) {
+            low[k] = i == 0 ? p[k] : terrimpi_min(low[k], p[k]);
+            high[k] = i == 0 ? p[k] : terrimpi_max(high[k], p[k]);
+        }
+    }
+    for (k = 0; k < 2u; k++) {
+        m->low[k] = low[k];
+        m->cells[k] = (float)TERRIMPI_SPLIT_CELLS / terrimpi_max(high[k] - low[k], 1e-20f);
+    }
+    *w_least = low[2];
+    *w_most = high[2];
+}
+
 /* terrimp_capture_split of checked arguments. */
 static void terrimpi_capture_split(const terrimp_capture *capture, const float *xyz,
                                    uint32_t vertex_count, const uint16_t *indices,
                                    uint32_t index_count, float reach, float overlap,
                                    terrimp_split *split)
 {
-    float first = TERRIMPI_FLOAT_MAX, last = 0.0f, step;
+    float first, step, w_least, w_most, p[3][3];
     uint32_t i, k, best = 0;
+    terrimpi_split_map map;
     terrimpi_smear smear;
-    for (i = 0; i < vertex_count; i++) {
-        float depth = terrimpi_depth(capture, xyz + i * 3u);
-        first = terrimpi_min(first, depth);
-        last = terrimpi_max(last, depth);
+    map.capture = capture;
+    map.xyz = xyz;
+    map.indices = indices;
+    terrimpi_split_aim(&map, vertex_count, &w_least, &w_most);
+    first = 1.0f / w_most;
+    step = (1.0f / w_least - first) / (float)(TERRIMPI_SPLITS + 1u);
+    for (i = 0; i < index_count; i += 3u) {
+        terrimpi_split_corners(&map, i, p);
+        terrimpi_split_draw(&map, i, p);
     }
-    step = (last - first) / (float)(TERRIMPI_SPLITS + 1u);
     memset(&smear, 0, sizeof smear);
-    for (i = 0; i < index_count; i += 3u)
-        terrimpi_add_smear(capture, xyz, indices, index_count, i, reach, overlap, first, step,
-                           &smear);
+    for (i = 0; i < index_count; i += 3u) {
+        terrimpi_split_corners(&map, i, p);
+        terrimpi_split_add(&map, p, reach, overlap, first, step, &smear);
+    }
     for (k = 1; k < TERRIMPI_SPLITS; k++)
         if (smear.saved[k] > smear.saved[best])
             best = k;
@@ -4771,23 +4801,6 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
     rect->y = shelf->y;
     shelf->used += rect->width + shelves->padding;
     return TERRIMP_OK;
-}
-
-/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
-   extra memory. */
-static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
-                          int (*after)(const void *items, uint32_t a, uint32_t b))
-{
-    uint32_t i, k, gap;
-    for (gap = 1; gap < count / 3u;)
-        gap = 3u * gap + 1u;
-    for (; gap > 0; gap /= 3u)
-        for (i = gap; i < count; i++) {
-            uint32_t moved = order[i];
-            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
-                order[k] = order[k - gap];
-            order[k] = moved;
-        }
 }
 
 /* Whether item a comes after item b: lower, or as high and narrower, or later. */
@@ -5549,7 +5562,7 @@ struct terrimp_terrain {
     terrimpi_point *points;                /* [node_count][vertex_limit] */
     uint8_t *corners;                      /* [node_count][index_limit] indices of the surface */
     terrimp_terrain_desc desc; /* resolved */
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;           /* of create; release is NULL otherwise */
     size_t bytes;
@@ -5586,7 +5599,7 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     TERRIMPI_DEFAULT(d.triangle_budget, TERRIMP_TRIANGLE_BUDGET);
     TERRIMPI_DEFAULT(d.proud, 1.0f);
     d.proud = d.not_proud ? 0.0f : d.proud;
-    TERRIMPI_REFUSE(!terrimpi_mip_quads_fit(d.chunk_quads) ||
+    TERRIMPI_REFUSE(!terrimpi_tree_quads_fit(d.chunk_quads) ||
                     !terrimpi_within_u32(d.triangle_budget, 32u, 400u) ||
                     !terrimpi_within(d.proud, 0.0f, 1.0f) || d.height_low > d.height_high,
                     TERRIMP_E_RANGE);
@@ -5623,7 +5636,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
     uint32_t budget = t->desc.triangle_budget, skirts;
     int ok = 1;
     skirts = (t->desc.no_lower_skirts ? 0u : 1u) + (t->desc.upper_skirts ? 1u : 0u);
-    terrimp_geomip_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
+    terrimp_quadtree_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
     /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices in all. */
     t->border_limit = 4u * (terrimpi_border_points(budget) + 1u);
     t->vertex_limit = (budget + t->border_limit + 2u) / 2u;
@@ -5654,13 +5667,6 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
     return b.ok ? b.bytes : 0;
 }
 
-static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
-{
-    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
-}
-
 /* Where a node lies: its first sample, how many quads of the field it spans, and its tile of every
    2^level-th sample, whose last column and row are the node's last. */
 typedef struct terrimpi_patch {
@@ -5670,14 +5676,14 @@ typedef struct terrimpi_patch {
 
 static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 {
-    terrimpi_mip_place place = terrimpi_mip_place_of(&t->tree, node);
+    terrimp_node place = terrimpi_tree_node(&t->tree, node);
     uint32_t quads = t->desc.chunk_quads;
     terrimpi_patch p;
     p.level = place.level;
-    p.x = terrimpi_mip_col(&t->tree, p.level, place.x * quads);
-    p.z = terrimpi_mip_row(&t->tree, p.level, place.z * quads);
-    p.span_x = terrimpi_mip_col(&t->tree, p.level, (place.x + 1u) * quads) - p.x;
-    p.span_z = terrimpi_mip_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
+    p.x = terrimpi_tree_col(&t->tree, p.level, place.x * quads);
+    p.z = terrimpi_tree_row(&t->tree, p.level, place.z * quads);
+    p.span_x = terrimpi_tree_col(&t->tree, p.level, (place.x + 1u) * quads) - p.x;
+    p.span_z = terrimpi_tree_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
     p.cols = ((p.span_x - 1u) >> p.level) + 2u;
     p.rows = ((p.span_z - 1u) >> p.level) + 2u;
     return p;
@@ -5686,23 +5692,23 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 /* Samples from the node's first one to a point of its mesh. */
 static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
 {
-    return terrimpi_min_u32((uint32_t)point->x << p->level, p->span_x);
+    return terrimpi_lattice(point->x, p->level, p->span_x);
 }
 
 static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
 {
-    return terrimpi_min_u32((uint32_t)point->z << p->level, p->span_z);
+    return terrimpi_lattice(point->z, p->level, p->span_z);
 }
 
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
-    return terrimpi_mip_x(&t->tree, 0, column);
+    return terrimpi_tree_x(&t->tree, 0, column);
 }
 
 static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
 {
-    return terrimpi_mip_z(&t->tree, 0, row);
+    return terrimpi_tree_z(&t->tree, 0, row);
 }
 
 /* The height that a number of steps stands for. */
@@ -5731,27 +5737,20 @@ static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32
     return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
-/* The box of node (x, z) of a level: of everything drawn of it and of those below it. */
-static void terrimpi_node_box(const terrimp_terrain *t, uint32_t level, uint32_t x, uint32_t z,
-                              terrimp_box *box)
+/* The box of a node: of everything drawn of it and of those below it. */
+static void terrimpi_node_box(const terrimp_terrain *t, const terrimp_node *node, terrimp_box *box)
 {
-    const terrimpi_mesh *mesh = &t->meshes[terrimpi_mip_number(&t->tree, level, x, z)];
-    terrimpi_mip_place p;
-    p.level = level;
-    p.x = x;
-    p.z = z;
-    terrimpi_mip_box(&t->tree, p, box);
-    box->min[1] = mesh->low;
-    box->max[1] = mesh->high;
+    const terrimpi_mesh *mesh = &t->meshes[node->number];
+    terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box)
 {
-    terrimpi_mip_place place;
+    terrimp_node place;
     TERRIMPI_TRY(terrimpi_check_node(terrain, node, box));
-    place = terrimpi_mip_place_of(&terrain->tree, node);
-    terrimpi_node_box(terrain, place.level, place.x, place.z, box);
+    place = terrimpi_tree_node(&terrain->tree, node);
+    terrimpi_node_box(terrain, &place, box);
     return TERRIMP_OK;
 }
 
@@ -5839,7 +5838,7 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
         terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++)
-                *nodes++ = terrimpi_mip_number(&terrain->tree, level, x, z);
+                *nodes++ = terrimpi_tree_at(&terrain->tree, level, x, z).number;
     }
     return TERRIMP_OK;
 }
@@ -5937,7 +5936,8 @@ static void terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p, uint32
 TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terrain,
                                                     terrimp_terrain_info *info)
 {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
+    terrimp_node root;
     uint32_t quads;
     TERRIMPI_REFUSE(!terrain || !info, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
@@ -5957,7 +5957,8 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->mesh_index_count = tree->node_count * terrain->index_stride +
                              terrimpi_floor_indices(terrain);
     info->mesh_triangle_count = terrain->mesh_triangle_count;
-    terrimpi_node_box(terrain, tree->level_count - 1u, 0, 0, &info->box);
+    root = terrimpi_tree_root(tree);
+    terrimpi_node_box(terrain, &root, &info->box);
     return TERRIMP_OK;
 }
 
@@ -6055,8 +6056,7 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
     for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
-        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
+        uint32_t x = terrimpi_point_x(&p, &points[i]), z = terrimpi_point_z(&p, &points[i]);
         xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
         xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
         xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
@@ -6340,15 +6340,14 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const te
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
-        int32_t x[3], z[3];
-        int64_t area;
+        int64_t at[3][2], area;
         for (k = 0; k < 3u; k++) {
             if (corners[k] >= mesh->vertex_count)
                 return 0;
-            x[k] = (int32_t)terrimpi_point_x(p, &points[corners[k]]);
-            z[k] = (int32_t)terrimpi_point_z(p, &points[corners[k]]);
+            at[k][0] = terrimpi_point_x(p, &points[corners[k]]);
+            at[k][1] = terrimpi_point_z(p, &points[corners[k]]);
         }
-        area = (int64_t)(z[1] - z[0]) * (x[2] - x[0]) - (int64_t)(x[1] - x[0]) * (z[2] - z[0]);
+        area = terrimpi_twice_area(at[0], at[1], at[2]);
         if (area <= 0)
             return 0;
         all += area;
@@ -6399,7 +6398,8 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
 /* Whether a node is held by its parent. */
 static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
-    uint32_t parent = node + 1u < t->tree.node_count ? terrimpi_mip_parent(&t->tree, node) : node;
+    uint32_t parent =
+        node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
     const terrimp_geomip_node *c = &t->tree.nodes[node], *p = &t->tree.nodes[parent];
     return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
            t->meshes[node].low >= t->meshes[parent].low &&
@@ -6597,11 +6597,8 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #endif
 #define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
-
-/* A node and where it stands. */
-typedef struct terrimpi_site {
-    uint32_t node, level, x, z;
-} terrimpi_site;
+#define TERRIMPI_SPLIT_OVERLAP 0.6f /* ... unless the parts overlap in so much of their depth: then
+                                       19 of 20 splits would spare too little (seven flights) */
 
 /* A slot of an atlas. */
 typedef struct terrimpi_seat {
@@ -6613,6 +6610,7 @@ typedef struct terrimpi_record {
     uint32_t node;
     uint32_t seen;            /* the last frame that had a use for it; 0: the record is free */
     uint32_t listed;          /* the last frame that draws it */
+    float alpha;              /* the share of the pixels that it has in that frame */
     uint32_t part_count;      /* 0: no picture yet */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
@@ -6624,7 +6622,7 @@ typedef struct terrimpi_record {
 
 /* An impostor that would be good to have. */
 typedef struct terrimpi_want {
-    terrimpi_site site;
+    terrimp_node site;
     float closest;    /* [wu] from the eye to its box */
     float pixels;     /* that it covers, about */
     float urgency;    /* error of its picture over the tolerance */
@@ -6636,7 +6634,7 @@ typedef struct terrimpi_want {
 
 /* A part of the frame: see above. */
 typedef struct terrimpi_unit {
-    terrimpi_site site;
+    terrimp_node site;
     float closest;
     uint32_t first_leaf, leaf_count;
     uint32_t first_want, want_count; /* want_count 0: ground is all it can be */
@@ -6644,7 +6642,7 @@ typedef struct terrimpi_unit {
 
 /* A capture of this frame. Its cells are the source nodes of the picture and those around. */
 typedef struct terrimpi_job {
-    terrimpi_site site;
+    terrimp_node site;
     uint32_t record;
     uint32_t part_count;
     terrimpi_seat parts[TERRIMPI_PARTS];
@@ -6659,12 +6657,6 @@ typedef struct terrimpi_job {
     float wanted, cost;
 } terrimpi_job;
 
-/* What is drawn before the floor: an impostor or distant ground. */
-typedef struct terrimpi_item {
-    uint32_t index;  /* of the record or the ground draw */
-    int is_impostor;
-} terrimpi_item;
-
 struct terrimp_view {
     const terrimp_terrain *terrain;
     uint32_t frame;             /* updates so far */
@@ -6673,11 +6665,10 @@ struct terrimp_view {
     uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
     uint16_t *record_of;           /* [node_count] */
     unsigned char *prefers;        /* [node_count] the unit was drawn as impostors */
-    float *shown;                  /* [max_ground] alpha of each ground draw, 0: not drawn, -1:
-                                      opaque beyond the fade band */
+    unsigned char *shown;          /* [max_ground] nonzero: the ground draw is drawn */
     uint32_t *leaves;              /* [max_ground] ground draws, by unit */
     terrimpi_unit *units;          /* [max_ground] front to back */
-    terrimpi_item *items;          /* [max_ground + max_impostors] front to back */
+    uint32_t *items;               /* [max_impostors] records that are drawn, front to back */
     terrimpi_want *wants;          /* [max_impostors] by unit */
     uint32_t *queue;               /* [max_impostors] wants to capture, most urgent first */
     terrimpi_record *records;      /* [max_impostors] */
@@ -6690,7 +6681,6 @@ struct terrimp_view {
     terrimp_geomip_view ground;
     terrimp_view_desc desc;     /* resolved */
     float pixel_factor;
-    float depth_bias;
     float motion[3];            /* [wu] a frame, smoothed */
     float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
     terrimp_camera camera;      /* resolved, of the last update */
@@ -6718,12 +6708,6 @@ static void terrimpi_setting(float *value, float otherwise, float low, float hig
         *value = otherwise;
     if (!terrimpi_within(*value, low, high) && *result == TERRIMP_OK)
         *result = TERRIMP_E_RANGE;
-}
-
-static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
-{
-    if (*value == 0)
-        *value = otherwise;
 }
 
 /* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels
@@ -6771,15 +6755,14 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_TRY(terrimpi_settings_resolve(terrain, &d));
     if (d.ground_rule == TERRIMP_GEOMIP_DEFAULT)
         d.ground_rule = TERRIMP_GEOMIP_PICTURE;
-    terrimpi_default_u32(&d.atlas_size, 4096);
-    terrimpi_default_u32(&d.atlas_count, 1);
-    terrimpi_default_u32(&d.max_impostors, 1024);
-    terrimpi_default_u32(&d.max_captures, 64);
+    TERRIMPI_DEFAULT(d.atlas_size, 4096);
+    TERRIMPI_DEFAULT(d.atlas_count, 1);
+    TERRIMPI_DEFAULT(d.max_impostors, 1024);
+    TERRIMPI_DEFAULT(d.max_captures, 64);
     chunks = terrain->tree.level_first[1];
-    terrimpi_default_u32(&d.max_ground,
-                         d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
-                             ? terrimpi_min_u32(chunks, 4096)
-                             : chunks);
+    TERRIMPI_DEFAULT(d.max_ground, d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
+                                       ? terrimpi_min_u32(chunks, 4096)
+                                       : chunks);
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
@@ -6820,10 +6803,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->leaf_at = (uint32_t *)terrimpi_take(&l, nodes, sizeof *v->leaf_at);
     v->record_of = (uint16_t *)terrimpi_take(&l, nodes, sizeof *v->record_of);
     v->prefers = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->prefers);
-    v->shown = (float *)terrimpi_take(&l, ground, sizeof *v->shown);
+    v->shown = (unsigned char *)terrimpi_take(&l, ground, sizeof *v->shown);
     v->leaves = (uint32_t *)terrimpi_take(&l, ground, sizeof *v->leaves);
     v->units = (terrimpi_unit *)terrimpi_take(&l, ground, sizeof *v->units);
-    v->items = (terrimpi_item *)terrimpi_take(&l, ground + impostors, sizeof *v->items);
+    v->items = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->items);
     v->wants = (terrimpi_want *)terrimpi_take(&l, impostors, sizeof *v->wants);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->records = (terrimpi_record *)terrimpi_take(&l, impostors, sizeof *v->records);
@@ -6870,45 +6853,20 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 
 /* ---- places in the quadtree ---- */
 
-static terrimpi_site terrimpi_site_at(const terrimp_geomip *tree, uint32_t level, uint32_t x,
-                                      uint32_t z)
-{
-    terrimpi_site s;
-    s.level = level;
-    s.x = x;
-    s.z = z;
-    s.node = tree->level_first[level] + z * tree->level_x[level] + x;
-    return s;
-}
-
-static terrimpi_site terrimpi_site_of(const terrimp_geomip *tree, uint32_t node)
-{
-    terrimpi_mip_place p = terrimpi_mip_place_of(tree, node);
-    return terrimpi_site_at(tree, p.level, p.x, p.z);
-}
-
 /* The children of a node, nearest to the eye first. Returns how many there are. */
-static uint32_t terrimpi_children(const terrimp_view *v, const terrimpi_site *s,
-                                  terrimpi_site children[4])
+static uint32_t terrimpi_children(const terrimp_view *v, const terrimp_node *s,
+                                  terrimp_node children[4])
 {
-    const terrimp_geomip *tree = &v->terrain->tree;
-    uint32_t level = s->level - 1u, count = 0, i;
-    uint32_t closest = terrimpi_mip_closest(tree, s->level, s->x, s->z, v->camera.eye);
-    for (i = 0; i < 4u; i++) {
-        uint32_t child = closest ^ i, x = s->x * 2u + (child & 1u), z = s->z * 2u + (child >> 1);
-        if (x < tree->level_x[level] && z < tree->level_z[level])
-            children[count++] = terrimpi_site_at(tree, level, x, z);
-    }
-    return count;
+    return terrimpi_tree_children(&v->terrain->tree, s, v->camera.eye, children);
 }
 
-static void terrimpi_site_box(const terrimp_view *v, const terrimpi_site *s, terrimp_box *box)
+static void terrimpi_site_box(const terrimp_view *v, const terrimp_node *s, terrimp_box *box)
 {
-    terrimpi_node_box(v->terrain, s->level, s->x, s->z, box);
+    terrimpi_node_box(v->terrain, s, box);
 }
 
 /* A node's box, and which of the planes in `mask` its parts have to be tested against. */
-static int terrimpi_sight(const terrimp_view *v, const terrimpi_site *s, int mask, terrimp_box *box)
+static int terrimpi_sight(const terrimp_view *v, const terrimp_node *s, int mask, terrimp_box *box)
 {
     terrimpi_site_box(v, s, box);
     return mask ? terrimp_frustum_test(&v->frustum, box, mask) : 0;
@@ -6916,12 +6874,12 @@ static int terrimpi_sight(const terrimp_view *v, const terrimpi_site *s, int mas
 
 /* Does something with a node, of which the planes in `mask` may cut a part off, and goes on to its
    children. Returns 0 to end the walk. */
-typedef int (*terrimpi_visit)(terrimp_view *v, const terrimpi_site *s, int mask);
+typedef int (*terrimpi_visit)(terrimp_view *v, const terrimp_node *s, int mask);
 
-static int terrimpi_visit_children(terrimp_view *v, const terrimpi_site *s, int mask,
+static int terrimpi_visit_children(terrimp_view *v, const terrimp_node *s, int mask,
                                    terrimpi_visit visit)
 {
-    terrimpi_site children[4];
+    terrimp_node children[4];
     uint32_t i, count = s->level > 0 ? terrimpi_children(v, s, children) : 0;
     for (i = 0; i < count; i++)
         if (!visit(v, &children[i], mask))
@@ -6932,8 +6890,7 @@ static int terrimpi_visit_children(terrimp_view *v, const terrimpi_site *s, int 
 /* Visits the root. */
 static void terrimpi_visit_tree(terrimp_view *v, terrimpi_visit visit)
 {
-    terrimpi_site root = terrimpi_site_at(&v->terrain->tree, v->terrain->tree.level_count - 1u,
-                                          0, 0);
+    terrimp_node root = terrimpi_tree_root(&v->terrain->tree);
     visit(v, &root, TERRIMP_PLANES_ALL);
 }
 
@@ -7070,7 +7027,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows)
 {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
     uint32_t i;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     tree = &view->terrain->tree;
@@ -7081,11 +7038,11 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     terrimpi_cancel_jobs(view);
     view->outdated = 1;
     for (i = 0; i < view->desc.max_impostors; i++) {
-        terrimpi_site s;
+        terrimp_node s;
         uint32_t quads, reach;
         if (view->records[i].seen == 0)
             continue;
-        s = terrimpi_site_of(tree, view->records[i].node);
+        s = terrimpi_tree_node(tree, view->records[i].node);
         quads = view->terrain->desc.chunk_quads << s.level;
         reach = quads; /* the border in the picture is at most the node's neighbours */
         if (x <= (s.x + 1u) * quads + reach && x + cols + reach > s.x * quads &&
@@ -7099,7 +7056,7 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 
 /* Counts the chunks in sight in draws_needed, and lists the first draw_count of them, front to
    back, at full resolution. */
-static int terrimpi_visit_chunks(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_visit_chunks(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimp_geomip_view *g = &v->ground;
     terrimp_box box;
@@ -7109,9 +7066,7 @@ static int terrimpi_visit_chunks(terrimp_view *v, const terrimpi_site *s, int ma
     if (s->level == 0 && g->draws_needed++ < g->draw_count) {
         terrimp_geomip_draw *draw = &g->draws[g->draws_needed - 1u];
         memset(draw, 0, sizeof *draw);
-        draw->node = s->node;
-        draw->x = s->x;
-        draw->z = s->z;
+        draw->node = *s;
     }
     return terrimpi_visit_children(v, s, mask, terrimpi_visit_chunks);
 }
@@ -7153,7 +7108,7 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
         }
     }
     for (i = 0; i < v->ground.draw_count; i++)
-        v->leaf_at[v->ground.draws[i].node] = i;
+        v->leaf_at[v->ground.draws[i].node.number] = i;
     return TERRIMP_OK;
 }
 
@@ -7161,14 +7116,15 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
 static uint32_t terrimpi_leaf(const terrimp_view *v, uint32_t node)
 {
     uint32_t i = v->leaf_at[node];
-    return i < v->ground.draw_count && v->ground.draws[i].node == node ? i : TERRIMPI_NO_LEAF;
+    return i < v->ground.draw_count && v->ground.draws[i].node.number == node ? i
+                                                                              : TERRIMPI_NO_LEAF;
 }
 
 /* ---- the impostor cut and the units ---- */
 
 /* Whether a node is where the impostor cut runs: far enough away, and small enough on the screen.
    A node that has a picture keeps its place for a little longer. */
-static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float closest)
+static int terrimpi_wanted(const terrimp_view *v, const terrimp_node *s, float closest)
 {
     const terrimp_heightfield *field = &v->terrain->desc.field;
     float side, sides = terrimpi_max(2.0f, v->pixel_factor / v->desc.impostor_px);
@@ -7180,16 +7136,16 @@ static int terrimpi_wanted(const terrimp_view *v, const terrimpi_site *s, float 
         return 0;
     side = (float)(v->terrain->desc.chunk_quads << s->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (v->record_of[s->node] != TERRIMPI_NO_RECORD)
+    if (v->record_of[s->number] != TERRIMPI_NO_RECORD)
         side /= 1.15f;
     return closest >= sides * side;
 }
 
 /* Adds the ground draws below a node to the last unit. */
-static int terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_gather_leaves(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimp_box box;
-    uint32_t leaf = terrimpi_leaf(v, s->node);
+    uint32_t leaf = terrimpi_leaf(v, s->number);
     if (leaf != TERRIMPI_NO_LEAF) {
         v->leaves[v->leaf_count++] = leaf;
         v->units[v->unit_count].leaf_count++;
@@ -7203,7 +7159,7 @@ static int terrimpi_gather_leaves(terrimp_view *v, const terrimpi_site *s, int m
 
 /* Adds the impostors wanted below a node to the last unit. Returns 0 when a part of it that is in
    sight cannot be one. */
-static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_gather_wants(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimpi_want *want = &v->wants[v->want_count];
     terrimp_box box;
@@ -7225,7 +7181,7 @@ static int terrimpi_gather_wants(terrimp_view *v, const terrimpi_site *s, int ma
 }
 
 /* Makes a unit of a node in one of the cuts. What is in sight has ground leaves. */
-static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask, float closest)
+static void terrimpi_add_unit(terrimp_view *v, const terrimp_node *s, int mask, float closest)
 {
     terrimpi_unit *unit = &v->units[v->unit_count];
     memset(unit, 0, sizeof *unit);
@@ -7245,7 +7201,7 @@ static void terrimpi_add_unit(terrimp_view *v, const terrimpi_site *s, int mask,
 }
 
 /* Goes down to where one of the cuts runs, until all ground has its unit. */
-static int terrimpi_visit_units(terrimp_view *v, const terrimpi_site *s, int mask)
+static int terrimpi_visit_units(terrimp_view *v, const terrimp_node *s, int mask)
 {
     terrimp_box box;
     float closest;
@@ -7255,7 +7211,7 @@ static int terrimpi_visit_units(terrimp_view *v, const terrimpi_site *s, int mas
     if (mask == TERRIMP_PLANES_OUTSIDE)
         return 1;
     closest = terrimp_box_distance(&box, v->camera.eye);
-    if (terrimpi_leaf(v, s->node) == TERRIMPI_NO_LEAF &&
+    if (terrimpi_leaf(v, s->number) == TERRIMPI_NO_LEAF &&
         (v->desc.mode < TERRIMP_MODE_IMPOSTOR || !terrimpi_wanted(v, s, closest)))
         return terrimpi_visit_children(v, s, mask, terrimpi_visit_units);
     terrimpi_add_unit(v, s, mask, closest);
@@ -7284,7 +7240,7 @@ static float terrimpi_sine_limit(const terrimp_view *v, float error, float close
 }
 
 /* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
-static float terrimpi_source_error(const terrimp_geomip *tree, const terrimpi_site *s,
+static float terrimpi_source_error(const terrimp_quadtree *tree, const terrimp_node *s,
                                    uint32_t level)
 {
     uint32_t shift = s->level - level, x, z;
@@ -7299,7 +7255,7 @@ static float terrimpi_source_error(const terrimp_geomip *tree, const terrimpi_si
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
-static uint32_t terrimpi_source_level(const terrimp_view *v, const terrimpi_site *s, float closest)
+static uint32_t terrimpi_source_level(const terrimp_view *v, const terrimp_node *s, float closest)
 {
     float limit = TERRIMPI_SOURCE_TEXELS * closest / (v->pixel_factor * v->desc.texels_per_px);
     uint32_t level = s->level;
@@ -7320,12 +7276,12 @@ static float terrimpi_speed(const terrimp_view *v)
 /* How good a picture is from the present eye: its view angle and parallax error, and the larger of
    the two over its limit. */
 static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
-                            const terrimpi_site *s, float *angle_rad, float *parallax_px)
+                            const terrimp_node *s, float *angle_rad, float *parallax_px)
 {
     terrimp_box box;
     terrimpi_site_box(v, s, &box);
     *angle_rad = terrimpi_view_angle(&box, captured_eye, v->camera.eye);
-    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->node), captured_eye,
+    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->number), captured_eye,
                                            v->camera.eye, v->pixel_factor);
     return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
                         *parallax_px / v->desc.tolerance_px);
@@ -7339,7 +7295,7 @@ static float terrimpi_sharpness(const terrimp_view *v, float closest)
 /* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
    become too coarse, or far too fine. */
 static float terrimpi_urgency(const terrimp_view *v, const terrimpi_record *record,
-                              const terrimpi_site *s, float closest)
+                              const terrimp_node *s, float closest)
 {
     float angle, parallax, urgency, wanted = terrimpi_sharpness(v, closest);
     urgency = terrimpi_judge(v, record->eye, s, &angle, &parallax);
@@ -7366,12 +7322,12 @@ static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
     terrimpi_site_box(v, &want->site, &box);
     if (terrimpi_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
         return 0;
-    terrimpi_mesh_place(v->terrain, want->site.node, &mesh);
-    want->record = v->record_of[want->site.node];
+    terrimpi_mesh_place(v->terrain, want->site.number, &mesh);
+    want->record = v->record_of[want->site.number];
     want->pixels = k * k * (capture.tan_right - capture.tan_left) *
                    (capture.tan_up - capture.tan_down);
     want->draw_cost = costs->draw + costs->triangle * (float)(mesh.index_count / 3u);
-    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.number), want->closest);
     want->life = v->desc.no_lookahead ? 1.0f : 1.0f + TERRIMPI_AHEAD;
     want->life = terrimpi_min(TERRIMPI_LONGEST_LIFE,
                               want->life * want->closest * sine / terrimpi_max(speed, 1e-20f));
@@ -7407,7 +7363,7 @@ static float terrimpi_ground_cost(const terrimp_view *v, const terrimpi_unit *un
 static void terrimpi_decide(terrimp_view *v, terrimpi_unit *unit, float *spread, float *drawn)
 {
     float impostors = 0.0f, captures = 0.0f, pixels = 0.0f, ground;
-    uint32_t i, node = unit->site.node;
+    uint32_t i, node = unit->site.number;
     int pays = 1, ready = 1;
     for (i = 0; i < unit->want_count && pays; i++) {
         terrimpi_want *want = &v->wants[unit->first_want + i];
@@ -7517,7 +7473,7 @@ static int terrimpi_cell(const terrimp_view *v, const terrimpi_job *job, uint32_
         which = terrimpi_strip_pattern(quads, job->strip,
                                        direction > 4u ? direction - 1u : direction);
     *pattern = terrimpi_find_pattern(quads, which);
-    *node = terrimpi_mip_number(&t->tree, job->source, x, z);
+    *node = terrimpi_tree_at(&t->tree, job->source, x, z).number;
     return 1;
 }
 
@@ -7538,7 +7494,7 @@ static int terrimpi_cell_in_part(const terrimp_view *v, const terrimpi_job *job,
     if (TERRIMPI_PARTS == 1u || job->part_count == 1u)
         return 1;
     {
-        terrimpi_site s = terrimpi_site_of(&v->terrain->tree, node);
+        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, node);
         terrimpi_site_box(v, &s, &box);
     }
     for (i = 0; i < 3; i++) {
@@ -7592,7 +7548,7 @@ static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *wan
     if (v->desc.no_lookahead || !(speed > 0.0f))
         return;
     ahead = TERRIMPI_AHEAD * want->closest *
-            terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.node), want->closest);
+            terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.number), want->closest);
     ahead = terrimpi_min(ahead, speed * 0.5f * TERRIMPI_LONGEST_LIFE);
     for (i = 0; i < 3u; i++)
         eye[i] += v->motion[i] / speed * ahead;
@@ -7602,15 +7558,15 @@ static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *wan
 
 /* The frustum around a node's mesh, and the size of the slot that it needs. Returns 0 when none
    fits. */
-static int terrimpi_slot_size(terrimp_view *v, const terrimpi_site *s, const terrimp_box *box,
+static int terrimpi_slot_size(terrimp_view *v, const terrimp_node *s, const terrimp_box *box,
                               const float eye[3], terrimp_capture *capture, uint32_t size[2])
 {
     uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
                                         v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
     float density = v->pixel_factor * v->desc.texels_per_px, width, height;
     terrimp_mesh_info mesh;
-    terrimpi_mesh_place(v->terrain, s->node, &mesh);
-    terrimpi_fill_mesh(v->terrain, s->node, v->mesh_xyz, v->mesh_indices);
+    terrimpi_mesh_place(v->terrain, s->number, &mesh);
+    terrimpi_fill_mesh(v->terrain, s->number, v->mesh_xyz, v->mesh_indices);
     if (terrimpi_capture_fit(box, eye, capture) != TERRIMP_OK ||
         !terrimpi_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count))
         return 0;
@@ -7677,16 +7633,17 @@ static float terrimpi_depth_error(const terrimp_view *v, uint32_t node,
 static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const terrimp_box *box,
                              const terrimp_capture *capture, float *distance)
 {
-    uint32_t node = want->site.node;
+    uint32_t node = want->site.number;
     const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
+    float overlap = terrimpi_depth_error(v, node, capture, box);
     terrimp_split split;
     if (TERRIMPI_PARTS == 1u || v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
-        !(sine * want->closest > 0.0f))
+        !(sine * want->closest > 0.0f) ||
+        2.0f * overlap > TERRIMPI_SPLIT_OVERLAP * (capture->z_far - capture->z_near))
         return 0;
     terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
-                           3u * mesh->triangle_count, sine * want->closest,
-                           terrimpi_depth_error(v, node, capture, box), &split);
+                           3u * mesh->triangle_count, sine * want->closest, overlap, &split);
     *distance = split.distance;
     return split.gap * sine * v->pixel_factor >
                TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
@@ -7709,9 +7666,9 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     terrimpi_capture_eye(v, want, &box, eye);
     if (!terrimpi_slot_size(v, &want->site, &box, eye, front, size))
         return 0;
-    job->record = v->record_of[want->site.node];
+    job->record = v->record_of[want->site.number];
     if (job->record == TERRIMPI_NO_RECORD)
-        job->record = terrimpi_take_record(v, want->site.node);
+        job->record = terrimpi_take_record(v, want->site.number);
     if (job->record == TERRIMPI_NO_RECORD)
         return 0;
     job->part_count = 1;
@@ -7739,7 +7696,7 @@ static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint
     front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
     front->z_far += border;
     if (job->part_count > 1u) {
-        float overlap = terrimpi_depth_error(v, want->site.node, front, &box);
+        float overlap = terrimpi_depth_error(v, want->site.number, front, &box);
         *back = *front;
         front->z_far = terrimpi_min(front->z_far, split + overlap);
         back->z_near = terrimpi_max(back->z_near, split - overlap);
@@ -7788,7 +7745,7 @@ static void terrimpi_sort_queue(terrimp_view *v, uint32_t count)
             for (k = i; k >= gap; k -= gap) {
                 const terrimpi_want *w = &v->wants[v->queue[k - gap]];
                 if (w->priority > m->priority ||
-                    (w->priority == m->priority && w->site.node < m->site.node))
+                    (w->priority == m->priority && w->site.number < m->site.number))
                     break;
                 v->queue[k] = v->queue[k - gap];
             }
@@ -7806,7 +7763,7 @@ static uint32_t terrimpi_fill_queue(terrimp_view *v)
             uint32_t index = v->units[u].first_want + i;
             terrimpi_want *want = &v->wants[index];
             float weight = want->pixels / (1.0f + want->pixels); /* never 0 */
-            if (v->open && v->opened.site.node == want->site.node)
+            if (v->open && v->opened.site.number == want->site.number)
                 continue;
             if (want->urgency < 1.0f && (v->desc.no_spreading || want->urgency < TERRIMPI_EARLY))
                 continue;
@@ -7951,7 +7908,7 @@ static const float *terrimpi_picture(const terrimp_view *v, uint32_t index, uint
 static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urgent)
 {
     uint32_t index = v->record_of[node];
-    terrimpi_site s;
+    terrimp_node s;
     terrimpi_record *record;
     const float *eye;
     float angle, parallax;
@@ -7959,15 +7916,17 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
-    if (record->listed == v->frame)
+    if (record->listed == v->frame) {
+        record->alpha = 1.0f;
         return 1;
-    s = terrimpi_site_of(&v->terrain->tree, node);
+    }
+    s = terrimpi_tree_node(&v->terrain->tree, node);
     eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
     record->listed = record->seen = v->frame;
-    v->items[v->item_count].index = index;
-    v->items[v->item_count++].is_impostor = 1;
+    record->alpha = 1.0f;
+    v->items[v->item_count++] = index;
     v->stats.impostors++;
     v->stats.impostors_by_level[s.level]++;
     return 1;
@@ -7977,10 +7936,10 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
    together, or its parent, of which it is a part. Returns 0 when there is no picture. */
 static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
 {
-    const terrimp_geomip *tree = &v->terrain->tree;
-    terrimpi_site children[4];
+    const terrimp_quadtree *tree = &v->terrain->tree;
+    terrimp_node children[4];
     uint32_t i, count, level = want->site.level, up;
-    if (terrimpi_list_impostor(v, want->site.node, TERRIMPI_STALE))
+    if (terrimpi_list_impostor(v, want->site.number, TERRIMPI_STALE))
         return 1;
     v->stats.waiting++;
     if (v->desc.mode != TERRIMP_MODE_AUTO)
@@ -7988,25 +7947,25 @@ static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
     if (level > 0) {
         count = terrimpi_children(v, &want->site, children);
         for (i = 0; i < count; i++) {
-            uint32_t record = v->record_of[children[i].node];
+            uint32_t record = v->record_of[children[i].number];
             if (record == TERRIMPI_NO_RECORD || v->records[record].part_count == 0)
                 break;
         }
         if (i == count) {
             for (i = 0; i < count; i++)
-                if (!terrimpi_list_impostor(v, children[i].node, 2.0f * TERRIMPI_STALE))
+                if (!terrimpi_list_impostor(v, children[i].number, 2.0f * TERRIMPI_STALE))
                     break;
             if (i == count)
                 return 1;
         }
     }
     for (up = 1; up <= 2u && level + up < tree->level_count; up++) {
-        terrimpi_site s = terrimpi_site_at(tree, level + up, want->site.x >> up,
+        terrimp_node s = terrimpi_tree_at(tree, level + up, want->site.x >> up,
                                            want->site.z >> up);
         terrimp_box box;
         terrimpi_site_box(v, &s, &box);
         if (terrimp_box_distance(&box, v->camera.eye) >= v->desc.fade_start &&
-            terrimpi_list_impostor(v, s.node, 2.0f * TERRIMPI_STALE))
+            terrimpi_list_impostor(v, s.number, 2.0f * TERRIMPI_STALE))
             return 1;
     }
     return 0;
@@ -8021,20 +7980,16 @@ static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrim
 }
 
 /* Shows a unit's ground. */
-static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
+static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit)
 {
     terrimp_pattern pattern;
     uint32_t i;
-    for (i = 0; i < unit->leaf_count && alpha != 0.0f; i++) {
+    for (i = 0; i < unit->leaf_count; i++) {
         uint32_t leaf = v->leaves[unit->first_leaf + i];
-        v->shown[leaf] = alpha;
+        v->shown[leaf] = 1;
         terrimpi_ground_pattern(v, leaf, &pattern);
         v->stats.ground++;
         v->stats.triangles += pattern.triangle_count;
-        if (alpha < 0.0f) {
-            v->items[v->item_count].index = leaf;
-            v->items[v->item_count++].is_impostor = 0;
-        }
     }
 }
 
@@ -8042,54 +7997,46 @@ static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, flo
 static void terrimpi_unlist(terrimp_view *v, uint32_t first)
 {
     while (v->item_count > first) {
-        terrimpi_record *record = &v->records[v->items[--v->item_count].index];
+        terrimpi_record *record = &v->records[v->items[--v->item_count]];
         record->listed = 0;
         v->stats.impostors--;
-        v->stats.impostors_by_level[terrimpi_site_of(&v->terrain->tree, record->node).level]--;
+        v->stats.impostors_by_level[terrimpi_tree_node(&v->terrain->tree, record->node).level]--;
     }
 }
 
-/* Settles what each unit is drawn as, now that it is known which pictures will exist. */
+/* Settles what each unit is drawn as, now that it is known which pictures will exist. An impostor
+   that is drawn for other units too does not fade. */
 static void terrimpi_settle(terrimp_view *v)
 {
-    float closest = v->desc.fade_end; /* of all impostors */
+    float band = v->desc.fade_end - v->desc.fade_start;
     uint32_t u, i;
     v->item_count = 0;
     for (u = 0; u < v->unit_count; u++) {
         const terrimpi_unit *unit = &v->units[u];
         uint32_t before = v->item_count;
-        int covered = unit->want_count > 0, impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
+        int covered = unit->want_count > 0;
         for (i = 0; i < unit->want_count; i++)
             covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
-        if (!covered) {
+        if (!covered)
             terrimpi_unlist(v, before);
-            terrimpi_show_ground(v, unit,
-                                 impostors && unit->closest >= v->desc.fade_end ? -1.0f : 1.0f);
-        } else
-            terrimpi_show_ground(v, unit,
-                                 terrimpi_max(0.0f, (v->desc.fade_end - unit->closest) /
-                                                        (v->desc.fade_end - v->desc.fade_start)));
+        if (!covered || unit->closest < v->desc.fade_end)
+            terrimpi_show_ground(v, unit);
+        for (i = before; i < v->item_count; i++)
+            v->records[v->items[i]].alpha =
+                terrimpi_min(1.0f, (unit->closest - v->desc.fade_start) / band);
     }
-    for (i = 0; i < v->item_count; i++)
-        if (v->items[i].is_impostor) {
-            terrimpi_site s = terrimpi_site_of(&v->terrain->tree,
-                                               v->records[v->items[i].index].node);
-            float angle, parallax;
-            terrimp_mesh_info mesh;
-            terrimp_box box;
-            uint32_t parts;
-            terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
-                           &parallax);
-            terrimpi_mesh_place(v->terrain, s.node, &mesh);
-            v->stats.triangles += mesh.index_count / 3u * parts;
-            v->stats.draws += parts;
-            v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
-            v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
-            terrimpi_site_box(v, &s, &box);
-            closest = terrimpi_min(closest, terrimp_box_distance(&box, v->camera.eye));
-        }
-    /* All impostors go behind all ground: the closest one is moved to the end of the fade band. */
-    v->depth_bias = v->desc.fade_end / terrimpi_max(closest, v->desc.fade_end / 8.0f) - 1.0f;
+    for (i = 0; i < v->item_count; i++) {
+        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, v->records[v->items[i]].node);
+        float angle, parallax;
+        terrimp_mesh_info mesh;
+        uint32_t parts;
+        terrimpi_judge(v, terrimpi_picture(v, v->items[i], &parts), &s, &angle, &parallax);
+        terrimpi_mesh_place(v->terrain, s.number, &mesh);
+        v->stats.triangles += mesh.index_count / 3u * parts;
+        v->stats.draws += parts;
+        v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
+        v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
+    }
 }
 
 /* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
@@ -8098,8 +8045,9 @@ static void terrimpi_settle(terrimp_view *v)
 static int terrimpi_floor_wanted(const terrimp_view *v)
 {
     const terrimp_terrain *t = v->terrain;
+    terrimp_node root = terrimpi_tree_root(&t->tree);
     terrimp_box box;
-    terrimpi_node_box(t, t->tree.level_count - 1u, 0, 0, &box);
+    terrimpi_node_box(t, &root, &box);
     return v->stats.impostors > 0 && v->camera.eye[0] >= box.min[0] &&
            v->camera.eye[0] <= box.max[0] && v->camera.eye[2] >= box.min[2] &&
            v->camera.eye[2] <= box.max[2] && v->camera.eye[1] >= box.min[1];
@@ -8124,8 +8072,7 @@ static void terrimpi_count_frame(terrimp_view *v)
         terrimpi_site_box(v, &v->units[u].site, &box);
         if (u == 0 || v->units[u].closest < s->z_near)
             s->z_near = v->units[u].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye) *
-                                              (1.0f + v->depth_bias));
+        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye));
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
@@ -8227,7 +8174,7 @@ static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job,
     float border;
     uint32_t k;
     memset(&command, 0, sizeof command);
-    command.node = job->site.node;
+    command.node = job->site.number;
     command.level = job->site.level;
     command.part = part;
     command.atlas = job->parts[part].atlas;
@@ -8247,7 +8194,6 @@ static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job,
     callbacks->begin_capture(callbacks->user, &command);
     memset(&ground, 0, sizeof ground);
     ground.level = job->source;
-    ground.alpha = 1.0f;
     for (k = job->cell_from; k < job->cell_to; k++) {
         if (!terrimpi_cell(v, job, k, &ground.node, &pattern) ||
             !terrimpi_cell_in_part(v, job, ground.node, part))
@@ -8284,12 +8230,12 @@ static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
     terrimpi_mesh_place(v->terrain, record->node, &mesh);
     memset(&command, 0, sizeof command);
     command.node = record->node;
-    command.level = terrimpi_site_of(&v->terrain->tree, record->node).level;
+    command.level = terrimpi_tree_node(&v->terrain->tree, record->node).level;
     command.part_count = record->part_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    command.depth_bias = v->depth_bias;
+    command.alpha = record->alpha;
     record->drawn_count++;
     for (part = 0; part < record->part_count; part++) {
         command.part = part;
@@ -8307,7 +8253,6 @@ static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks
     command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
     command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
     command.index_count = terrimpi_floor_indices(v->terrain);
-    command.depth_bias = v->depth_bias;
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -8319,12 +8264,10 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     terrimp_pattern pattern;
     terrimpi_ground_pattern(v, index, &pattern);
     memset(&command, 0, sizeof command);
-    command.node = draw->node;
-    command.level = draw->level;
+    command.node = draw->node.number;
+    command.level = draw->node.level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
-    command.alpha = v->shown[index] < 0.0f ? 1.0f : v->shown[index];
-    command.depth_bias = v->shown[index] < 0.0f ? v->depth_bias : 0.0f;
     command.morph = draw->morph;
     memcpy(command.side, draw->side, sizeof command.side);
     memcpy(command.side_coarse, draw->side_coarse, sizeof command.side_coarse);
@@ -8345,18 +8288,12 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         terrimpi_render_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
     for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] >= 1.0f)
+        if (view->shown[view->leaves[i]])
             terrimpi_render_ground(view, view->leaves[i], callbacks);
     for (i = 0; i < view->item_count; i++)
-        if (view->items[i].is_impostor)
-            terrimpi_render_impostor(view, &view->records[view->items[i].index], callbacks);
-        else
-            terrimpi_render_ground(view, view->items[i].index, callbacks);
+        terrimpi_render_impostor(view, &view->records[view->items[i]], callbacks);
     if (callbacks->draw_floor && terrimpi_floor_wanted(view))
         terrimpi_render_floor(view, callbacks);
-    for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] > 0.0f && view->shown[view->leaves[i]] < 1.0f)
-            terrimpi_render_ground(view, view->leaves[i], callbacks);
     return TERRIMP_OK;
 }
 
@@ -9384,6 +9321,99 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 
 /* ==== stop here if you only draw what has been built ====================== */
 
+/* ==== Layers ============================================================= >>impl-layers */
+/* Based on: Jeschke 2004, chapter 3. With the reference point on the cell's near side each of his
+   spacings is an affine step of 1 / depth, so that the n-th layer needs no sum over those before
+   it, and depths of thousands of layers do not drift. */
+
+/* 1 / depth after `count` steps d -> d - (shrink d + shift). Steps are doubled as powers are; what
+   they take off is kept apart, where 1 - shrink would lose its digits, and taken off at once. */
+static float terrimpi_layer_walk(float d, float shrink, float shift, uint32_t count)
+{
+    float shrinks = 0.0f, shifts = 0.0f;
+    for (; count > 0; count >>= 1) {
+        if (count & 1u) {
+            shrinks += shrink - shrink * shrinks;
+            shifts += shift - shrink * shifts;
+        }
+        shift *= 2.0f - shrink;
+        shrink *= 2.0f - shrink;
+    }
+    return d - (shrinks * d + shifts);
+}
+
+/* 1 / depth of a layer; the last one stands no farther than it must. */
+static float terrimpi_layer_inverse(const terrimp_layers *l, uint32_t layer)
+{
+    uint32_t even = terrimpi_min_u32(layer, l->even_count);
+    float d = l->first - (float)even * l->step;
+    if (layer + 1u >= l->count)
+        return l->last;
+    return terrimpi_layer_walk(d, l->shrink, l->shift, layer - even);
+}
+
+TERRIMP_API float terrimp_layer_depth(const terrimp_layers *layers, uint32_t layer)
+{
+    return 1.0f / terrimpi_layer_inverse(layers, layer);
+}
+
+TERRIMP_API float terrimp_layer_border(const terrimp_layers *layers, uint32_t layer)
+{
+    if (layer == 0)
+        return layers->start;
+    if (layer >= layers->count)
+        return layers->end;
+    return 2.0f / (terrimpi_layer_inverse(layers, layer - 1u) +
+                   terrimpi_layer_inverse(layers, layer));
+}
+
+TERRIMP_API uint32_t terrimp_layer_of(const terrimp_layers *layers, float depth)
+{
+    uint32_t low = 0, high = layers->count - 1u;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2u;
+        if (depth < terrimp_layer_border(layers, middle + 1u))
+            high = middle;
+        else
+            low = middle + 1u;
+    }
+    return low;
+}
+
+/* The world position of a point (u, v) of the picture, in texels, at a depth. */
+static void terrimpi_layer_point(const terrimp_capture *p, float texel, float u, float v,
+                                 float depth, float out[3])
+{
+    float right = (p->tan_left + u * texel) * depth, up = (p->tan_down + v * texel) * depth;
+    int k;
+    for (k = 0; k < 3; k++)
+        out[k] = p->eye[k] + right * p->right[k] + up * p->up[k] + depth * p->forward[k];
+}
+
+TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
+                                                 const terrimp_capture *picture,
+                                                 const terrimp_layer_quad *quad,
+                                                 const uint32_t atlas[2], float xyz[12],
+                                                 float st[8])
+{
+    float depth;
+    uint32_t i;
+    TERRIMPI_REFUSE(!layers || !picture || !quad || !atlas || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(quad->layer >= layers->count || !atlas[0] || !atlas[1], TERRIMP_E_RANGE);
+    depth = terrimp_layer_depth(layers, quad->layer);
+    for (i = 0; i < 4u; i++) {
+        uint32_t x = i == 1u || i == 2u ? quad->texels.width : 0u;
+        uint32_t y = i >= 2u ? quad->texels.height : 0u;
+        terrimpi_layer_point(picture, layers->texel, (float)(quad->texels.x + x),
+                             (float)(quad->texels.y + y), depth, xyz + 3u * i);
+        if (!st)
+            continue;
+        st[2u * i] = (float)(quad->x + x) / (float)atlas[0];
+        st[2u * i + 1u] = (float)(quad->y + y) / (float)atlas[1];
+    }
+    return TERRIMP_OK;
+}
+
 #ifndef TERRIMP_NO_BUILD
 
 /* ==== Simplifier ========================================================= >>impl-simplifier */
@@ -9517,7 +9547,7 @@ static int terrimpi_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b,
     terrimpi_true_place(s, a, p[0]);
     terrimpi_true_place(s, b, p[1]);
     terrimpi_true_place(s, c, p[2]);
-    return (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]) > (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]);
+    return terrimpi_twice_area(p[0], p[1], p[2]) > 0;
 }
 
 /* --- which samples belong to a triangle, and sums over them --- */
@@ -10468,8 +10498,8 @@ static void terrimpi_lattice_size(int32_t inner_cols, int32_t inner_rows, int32_
 static void terrimpi_place_border(terrimpi_simplifier *s, const terrimp_border *borders,
                                   terrimp_mesh_vertex *loop, int32_t side[5])
 {
-    static const int order[4] = {TERRIMP_BORDER_X0, TERRIMP_BORDER_Z1, TERRIMP_BORDER_X1,
-                                 TERRIMP_BORDER_Z0};
+    static const int order[4] = {TERRIMP_SIDE_X0, TERRIMP_SIDE_Z1, TERRIMP_SIDE_X1,
+                                 TERRIMP_SIDE_Z0};
     int32_t w = s->cols - 1, h = s->rows - 1, v = 0, i, j;
     float steps;
     for (i = 0; i < 4; i++) {
@@ -10591,82 +10621,6 @@ static void terrimpi_read_samples(terrimpi_simplifier *s, const float *heights)
             sum.hh += h * h;
         }
     }
-}
-
-/* --- exact errors --- */
-
-/* Differences of samples to the surface. */
-typedef struct terrimpi_error {
-    float above, below, squares;
-} terrimpi_error;
-
-static void terrimpi_add_error(terrimpi_error *error, float difference)
-{
-    error->above = terrimpi_max(error->above, difference);
-    error->below = terrimpi_max(error->below, -difference);
-    error->squares += difference * difference;
-}
-
-/* The slopes of the plane through three vertices. */
-static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
-{
-    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
-    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
-    float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
-    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
-    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
-}
-
-/* Errors of the samples of a border between two points of its polyline, without the last one. */
-static void terrimpi_measure_border(const float *heights, int32_t stride, int32_t count,
-                                    float from, float to, terrimpi_error *error)
-{
-    int32_t i;
-    float slope = (to - from) / (float)count;
-    for (i = 0; i < count; i++)
-        terrimpi_add_error(error, heights[i * stride] - (from + slope * (float)i));
-}
-
-/* Works out the three errors of a surface: every sample once. The triangles own all but the last
-   row and the last column, which the border polylines supply. */
-static void terrimpi_measure(const float *heights, int32_t cols, int32_t rows, terrimp_mesh *mesh)
-{
-    const terrimp_mesh_vertex *v = mesh->vertices;
-    terrimpi_error all = {0.0f, 0.0f, 0.0f};
-    float squares = 0.0f, gx, gz;
-    uint32_t i, k;
-    int32_t x, z;
-    for (i = 0; i < mesh->surface_index_count; i += 3) {
-        terrimp_mesh_vertex a[3];
-        terrimpi_span span;
-        for (k = 0; k < 3u; k++)
-            a[k] = v[mesh->indices[i + k]];
-        terrimpi_find_span(a, &span);
-        terrimpi_find_plane(a, &gx, &gz);
-        all.squares = 0.0f; /* summed by triangle, as small sums round less */
-        for (z = span.low; z < span.high; z++) {
-            const float *row = heights + z * cols;
-            float base = a->height + (float)(z - a->z) * gz;
-            for (x = span.left[z]; x < span.right[z]; x++)
-                terrimpi_add_error(&all, row[x] - (base + (float)(x - a->x) * gx));
-        }
-        squares += all.squares;
-    }
-    all.squares = 0.0f;
-    for (i = 0; i < mesh->border_vertex_count; i++) {
-        const terrimp_mesh_vertex *p = v + i, *q = v + (i + 1) % mesh->border_vertex_count;
-        const float *at = heights + p->z * cols + p->x;
-        if (p->z == rows - 1 && q->z == rows - 1)
-            terrimpi_measure_border(at, 1, q->x - p->x, p->height, q->height, &all);
-        else if (p->x == cols - 1 && q->x == cols - 1)
-            terrimpi_measure_border(at, -cols, p->z - q->z, p->height, q->height, &all);
-        else if (p->x == cols - 1) /* the corner where the last column ends */
-            terrimpi_measure_border(at, 1, 1, p->height, p->height, &all);
-    }
-    mesh->error_above = all.above;
-    mesh->error_below = all.below;
-    mesh->error_rms = TERRIMP_SQRTF((squares + all.squares) / (float)(cols * rows));
 }
 
 /* --- borders --- */
@@ -10900,7 +10854,7 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
     TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
         terrimp_result r = terrimpi_check_border(
             b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
         if (r != TERRIMP_OK)
@@ -10908,8 +10862,8 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
     }
     for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
         uint32_t x_end = i & 1u, z_end = i >> 1;
-        const terrimp_border *p = b + (z_end ? TERRIMP_BORDER_Z1 : TERRIMP_BORDER_Z0);
-        const terrimp_border *q = b + (x_end ? TERRIMP_BORDER_X1 : TERRIMP_BORDER_X0);
+        const terrimp_border *p = b + (z_end ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_Z0);
+        const terrimp_border *q = b + (x_end ? TERRIMP_SIDE_X1 : TERRIMP_SIDE_X0);
         if (p->points[x_end ? p->point_count - 1 : 0].height !=
             q->points[z_end ? q->point_count - 1 : 0].height)
             return TERRIMP_E_RANGE;
@@ -10971,7 +10925,7 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
     TERRIMPI_REFUSE(!desc || !scratch || !mesh, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_check_desc(desc));
     budget = desc->triangle_budget ? desc->triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++)
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
         border += desc->borders[i].point_count - 1;
     TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
     plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
@@ -10991,7 +10945,6 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
     if (!whole)
         terrimpi_reduce(&s, desc, &plan, mesh->vertices);
     terrimpi_emit(&s, whole ? desc->heights : 0, mesh);
-    terrimpi_measure(desc->heights, s.cols, s.rows, mesh);
     return TERRIMP_OK;
 }
 
@@ -11015,35 +10968,24 @@ static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
     return TERRIMP_OK;
 }
 
-/* Appends a wall along the loop: down to a height, or up by a rise. */
-static terrimp_result terrimpi_add_skirt(terrimp_mesh *mesh, float value, int upper)
+TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height)
 {
     uint32_t i, n;
     TERRIMPI_TRY(terrimpi_check_surface(mesh));
     n = mesh->border_vertex_count;
     TERRIMPI_REFUSE(mesh->vertex_capacity - mesh->vertex_count < n ||
                     mesh->index_capacity - mesh->index_count < 6 * n, TERRIMP_E_CAPACITY);
-    TERRIMPI_REFUSE(!terrimpi_finite(value), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(upper && value < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(upper && height < 0.0f, TERRIMP_E_RANGE);
     for (i = 0; i < n; i++) {
         terrimp_mesh_vertex *rim = mesh->vertices + mesh->vertex_count + i;
         *rim = mesh->vertices[i];
-        rim->height = upper ? rim->height + value : terrimpi_min(rim->height, value);
+        rim->height = upper ? rim->height + height : terrimpi_min(rim->height, height);
     }
     terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
     mesh->vertex_count += n;
     mesh->index_count += 6 * n;
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_mesh_add_lower_skirt(terrimp_mesh *mesh, float height)
-{
-    return terrimpi_add_skirt(mesh, height, 0);
-}
-
-TERRIMP_API terrimp_result terrimp_mesh_add_upper_skirt(terrimp_mesh *mesh, float rise)
-{
-    return terrimpi_add_skirt(mesh, rise, 1);
 }
 
 /* --- standing proud (Hess 6.1) --- */
@@ -11066,20 +11008,20 @@ static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
     return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
 }
 
-/* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
-   rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
-static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
-                                 float over, int lowering)
+/* A vertex of weight w in a sample rises by what that wants. */
+static void terrimpi_rise(float w, float wanted, float *change)
 {
-    int k;
-    for (k = 0; k < n; k++) {
-        if (!(w[k] > 1e-6f))
-            continue;
-        if (lowering)
-            *change[k] = terrimpi_min(*change[k], terrimpi_max(0.0f, over) / ((float)n * w[k]));
-        else
-            *change[k] = terrimpi_max(*change[k], wanted);
-    }
+    if (w > 1e-6f)
+        *change = terrimpi_max(*change, wanted);
+}
+
+/* A vertex of weight w in a sample, one of n round it, may lose its share of the surface's height
+   over the sample. That this is no less than it may lose by others, a product mostly tells without
+   a division. */
+static void terrimpi_lower(float w, float n, float over, float *change)
+{
+    if (w > 1e-6f && over < *change * (n * w) * 1.00001f)
+        *change = terrimpi_min(*change, over / (n * w));
 }
 
 static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
@@ -11104,13 +11046,18 @@ static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_
     is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
     for (k = 0; k <= count; k++, samples += stride) {
         float surface, wanted;
+        int i;
         w[1] = (float)k / (float)count;
         w[0] = 1.0f - w[1];
         surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
         wanted = terrimpi_wanted_raise(*samples - surface,
                                        *samples - (w[0] * p->height + w[1] * q->height),
                                        w[0] * is_free[0] + w[1] * is_free[1]);
-        terrimpi_rise_sample(w, to, 2, wanted, surface - *samples, lowering);
+        for (i = 0; i < 2; i++)
+            if (lowering)
+                terrimpi_lower(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
+            else
+                terrimpi_rise(w[i], wanted, to[i]);
     }
 }
 
@@ -11140,6 +11087,17 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
     }
 }
 
+/* The slopes of the plane through three vertices. */
+static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
+{
+    int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
+    int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
+    float inverse = 1.0f / (float)(bz * cx - bx * cz);
+    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    *gx = ((float)bz * hc - (float)cz * hb) * inverse;
+    *gz = ((float)cx * hb - (float)bx * hc) * inverse;
+}
+
 /* Goes once over the samples of a triangle. */
 static void terrimpi_rise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
                                    const uint16_t *t, const float *raise, float *change,
@@ -11147,10 +11105,11 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
 {
     terrimp_mesh_vertex v[3];
     terrimpi_span span;
-    float slope_x[3], slope_z[3], gx, gz, *to[3];
+    float slope_x[3], slope_z[3], gx, gz, to[3];
+    float limit; /* from which on a sample takes nothing away, as no weight is above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
-        to[k] = change + t[k];
+        to[k] = change[t[k]];
         v[k] = mesh->vertices[t[k]];
         v[k].height = 0.0f;
     }
@@ -11163,19 +11122,32 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
     terrimpi_find_span(v, &span);
     terrimpi_find_plane(v, &gx, &gz);
+    limit = 3.001f * terrimpi_largest(to);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
-            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f;
-            float short_by = heights[z * cols + x] - (v[0].height + dx * gx + dz * gz), raised;
-            for (k = 0; k < 3; k++) {
+            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
+            float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
+            if (lowering && over >= limit)
+                continue;
+            for (k = 0; k < 3; k++)
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
-                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            if (lowering) {
+                over = terrimpi_max(over, 0.0f);
+                terrimpi_lower(w[0], 3.0f, over, &to[0]);
+                terrimpi_lower(w[1], 3.0f, over, &to[1]);
+                terrimpi_lower(w[2], 3.0f, over, &to[2]);
+                limit = 3.001f * terrimpi_largest(to);
+                continue;
             }
-            raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            terrimpi_rise_sample(w, to, 3,
-                                 terrimpi_wanted_raise(short_by, short_by + raised, hold),
-                                 -short_by, lowering);
+            for (k = 0; k < 3; k++)
+                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
+            wanted = terrimpi_wanted_raise(-over, wanted - over, hold);
+            for (k = 0; k < 3; k++)
+                terrimpi_rise(w[k], wanted, &to[k]);
         }
+    for (k = 0; k < 3; k++)
+        change[t[k]] = to[k];
 }
 
 static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
@@ -11221,7 +11193,6 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     }
     for (i = 0; i < n; i++)
         mesh->vertices[i].height += desc->amount * work[i];
-    terrimpi_measure(desc->heights, (int32_t)desc->cols, (int32_t)desc->rows, mesh);
     return TERRIMP_OK;
 }
 
@@ -11507,104 +11478,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     return TERRIMP_OK;
 }
 
-/* ---- heights, fits and errors of the ground ---- */
-
-/* Rows of vertices of a level. */
-static uint32_t terrimpi_mip_rows(const terrimp_geomip *t, uint32_t level)
-{
-    return ((t->field.depth - 1u) >> level) + 1u;
-}
-
-/* Loads of level 1, where rows are the samples two rows above to two below; in units of a twelfth
-   of a small triangle's area, as all loads. */
-static void terrimpi_mip_first_loads(const float *samples, uint32_t width, uint32_t count,
-                                     float *loads)
-{
-    const float *a = samples, *b = a + width, *c = b + width, *d = c + width, *e = d + width;
-    uint32_t i, x;
-    for (i = 1, x = 2; i + 1u < count; i++, x += 2u) {
-        float ring = b[x - 1u] + b[x] + c[x - 1u] + c[x + 1u] + d[x] + d[x + 1u];
-        float corners = a[x - 2u] + a[x] + c[x - 2u] + c[x + 2u] + e[x] + e[x + 2u];
-        float middles = a[x - 1u] + b[x - 2u] + b[x + 1u] + d[x - 1u] + d[x + 2u] + e[x + 1u];
-        loads[i] = 18.0f * c[x] + 10.0f * ring + 2.0f * middles + corners;
-    }
-}
-
-/* Loads of a level from those of the next finer one, from the row that lies on it; scaled to its
-   own triangles. */
-static void terrimpi_mip_next_loads(const float *finer, uint32_t cols, uint32_t count, float *loads)
-{
-    const float *above = finer - cols, *below = finer + cols;
-    uint32_t i, x;
-    for (i = 1, x = 2; i + 1u < count; i++, x += 2u)
-        loads[i] = 0.25f * finer[x] +
-                   0.125f * (above[x - 1u] + above[x] + finer[x - 1u] + finer[x + 1u] + below[x] +
-                             below[x + 1u]);
-}
-
-/* One sweep over the free vertices of a row, whose loads are given. */
-static void terrimpi_mip_sweep(const terrimp_geomip *t, uint32_t level, uint32_t j,
-                               const float *loads)
-{
-    uint32_t cols = terrimpi_mip_cols(t, level), half = t->chunk_quads / 2u, i, fixed;
-    float *fit = t->fits + t->fit_first[level] + j * cols;
-    const float *above = fit - cols, *below = fit + cols;
-    fixed = j % half == 0 ? half : cols;
-    for (i = 1; i + 1u < cols; i++) {
-        float round = above[i - 1u] + above[i] + fit[i - 1u] + fit[i + 1u] + below[i] +
-                      below[i + 1u];
-        if (i == fixed)
-            fixed += half;
-        else
-            fit[i] = (loads[i] - 8.0f * round) * (1.0f / 48.0f);
-    }
-}
-
-/* Turns the loads of a level, that are where its fits go, into fits. All sweeps run at once, each a
-   row behind the one before; scratch keeps the loads of the rows that they are at. */
-static void terrimpi_mip_solve(const terrimp_geomip *t, uint32_t level, float *scratch)
-{
-    uint32_t cols = terrimpi_mip_cols(t, level), rows = terrimpi_mip_rows(t, level), j, sweep;
-    float *fit = t->fits + t->fit_first[level];
-    for (j = 0; j < rows + TERRIMPI_MIP_SWEEPS; j++) {
-        if (j < rows) {
-            memcpy(scratch + j % (TERRIMPI_MIP_SWEEPS + 1u) * cols, fit + j * cols,
-                   cols * sizeof *fit);
-            terrimpi_heightfield_tile(&t->field, 0, j << level, cols, 1, 1u << level,
-                                      fit + j * cols);
-        }
-        for (sweep = 1; sweep <= TERRIMPI_MIP_SWEEPS; sweep++)
-            if (j > sweep && j - sweep + 1u < rows)
-                terrimpi_mip_sweep(t, level, j - sweep,
-                                   scratch + (j - sweep) % (TERRIMPI_MIP_SWEEPS + 1u) * cols);
-    }
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_fit(const terrimp_geomip *tree, float *scratch)
-{
-    uint32_t level, j;
-    TERRIMPI_REFUSE(!tree || !scratch, TERRIMP_E_NULL);
-    for (level = 1; tree->fits && level < tree->level_count; level++) {
-        uint32_t cols = terrimpi_mip_cols(tree, level), width = terrimpi_mip_cols(tree, level - 1u);
-        float *loads = tree->fits + tree->fit_first[level];
-        memset(loads, 0, (tree->fit_first[level + 1u] - tree->fit_first[level]) * sizeof *loads);
-        for (j = 1; j + 1u < terrimpi_mip_rows(tree, level); j++) {
-            loads += cols;
-            if (level == 1u) {
-                terrimpi_heightfield_tile(&tree->field, 0, 2u * j - 2u, width, 5, 1, scratch);
-                terrimpi_mip_first_loads(scratch, width, cols, loads);
-            } else {
-                terrimpi_mip_next_loads(tree->fits + tree->fit_first[level - 1u] + 2u * j * width,
-                                        width, cols, loads);
-            }
-        }
-    }
-    for (level = 1; tree->fits && level < tree->level_count; level++)
-        terrimpi_mip_solve(tree, level, scratch);
-    return TERRIMP_OK;
-}
-
-/* ---- errors ---- */
+/* ---- heights and errors of the ground ---- */
 
 /* What the samples of a node are found to miss. */
 typedef struct terrimpi_mip_misses {
@@ -11651,34 +11525,20 @@ static void terrimpi_mip_row_misses(const float *upper, const float *lower, cons
     misses->count += (float)span + 1.0f;
 }
 
-/* Heights of a row of a level's lattice, from vertex (i, j) on. */
-static void terrimpi_mip_lattice_row(const terrimp_geomip *t, uint32_t level, uint32_t i,
-                                     uint32_t j, uint32_t count, float *heights)
-{
-    uint32_t z = terrimpi_mip_row(t, level, j), k;
-    if (!t->fits || level == 0) {
-        terrimpi_heightfield_tile(&t->field, terrimpi_mip_col(t, level, i), z, count, 1,
-                                  1u << level, heights);
-        return;
-    }
-    for (k = 0; k < count; k++)
-        heights[k] = terrimpi_mip_stand(t, level, terrimpi_mip_col(t, level, i + k), z);
-}
-
 /* Compares all samples of a node with its triangles in pattern 0. */
-static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_place p,
+static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
                                       float *scratch, terrimpi_mip_misses *misses)
 {
     uint32_t quads = t->chunk_quads, j, z;
-    uint32_t x0 = terrimpi_mip_col(t, p.level, p.x * quads);
-    uint32_t span = terrimpi_mip_col(t, p.level, (p.x + 1u) * quads) - x0;
+    uint32_t x0 = terrimpi_tree_col(t, p.level, p.x * quads);
+    uint32_t span = terrimpi_tree_col(t, p.level, (p.x + 1u) * quads) - x0;
     float *upper = scratch, *lower = upper + quads + 1u, *row = lower + quads + 1u;
     for (j = p.z * quads; j < (p.z + 1u) * quads; j++) {
-        uint32_t z0 = terrimpi_mip_row(t, p.level, j), z1 = terrimpi_mip_row(t, p.level, j + 1u);
+        uint32_t z0 = terrimpi_tree_row(t, p.level, j), z1 = terrimpi_tree_row(t, p.level, j + 1u);
         if (z1 == z0)
             break;
-        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j, quads + 1u, upper);
-        terrimpi_mip_lattice_row(t, p.level, p.x * quads, j + 1u, quads + 1u, lower);
+        terrimpi_heightfield_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
+        terrimpi_heightfield_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
         for (z = z0; z <= z1; z++) { /* lattice rows twice: which weighs next to nothing in rms */
             terrimpi_heightfield_tile(&t->field, x0, z, span + 1u, 1, 1, row);
             terrimpi_mip_row_misses(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
@@ -11687,144 +11547,113 @@ static void terrimpi_mip_inner_misses(const terrimp_geomip *t, terrimpi_mip_plac
     }
 }
 
-/* A corner of a triangle: a sample's column and row, and the height drawn there. */
-typedef struct terrimpi_mip_corner {
-    uint32_t x, z;
-    float height;
-} terrimpi_mip_corner;
+static float terrimpi_mip_sample(const terrimp_quadtree *t, const int64_t at[2])
+{
+    return terrimpi_sample(&t->field, (uint32_t)at[0], (uint32_t)at[1]);
+}
 
-/* Compares the samples in a triangle, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_geomip *t,
-                                         const terrimpi_mip_corner corner[3],
+/* Compares the samples in a triangle of three samples, counter-clockwise, with it. */
+static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const int64_t a[2],
+                                         const int64_t b[2], const int64_t c[2],
                                          terrimpi_mip_misses *misses)
 {
-    uint32_t x0 = terrimpi_min_u32(corner[0].x, terrimpi_min_u32(corner[1].x, corner[2].x));
-    uint32_t x1 = terrimpi_max_u32(corner[0].x, terrimpi_max_u32(corner[1].x, corner[2].x));
-    uint32_t z0 = terrimpi_min_u32(corner[0].z, terrimpi_min_u32(corner[1].z, corner[2].z));
-    uint32_t z1 = terrimpi_max_u32(corner[0].z, terrimpi_max_u32(corner[1].z, corner[2].z));
-    uint32_t x, z, k;
-    for (z = z0; z <= z1; z++)
-        for (x = x0; x <= x1; x++) {
-            int64_t part[3], all; /* twice the areas opposite the corners */
+    int64_t all = terrimpi_twice_area(a, b, c), low[2], high[2], at[2];
+    float height = terrimpi_mip_sample(t, a);
+    float to_b = terrimpi_mip_sample(t, b) - height, to_c = terrimpi_mip_sample(t, c) - height;
+    int k;
+    if (all <= 0)
+        return;
+    for (k = 0; k < 2; k++) {
+        low[k] = a[k] < b[k] ? a[k] : b[k];
+        high[k] = a[k] > b[k] ? a[k] : b[k];
+        low[k] = low[k] < c[k] ? low[k] : c[k];
+        high[k] = high[k] > c[k] ? high[k] : c[k];
+    }
+    for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+        for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
+            int64_t by_b = terrimpi_twice_area(c, a, at), by_c = terrimpi_twice_area(a, b, at);
             float sample, miss;
-            for (k = 0; k < 3u; k++) {
-                const terrimpi_mip_corner *a = &corner[(k + 1u) % 3u], *b = &corner[(k + 2u) % 3u];
-                part[k] = ((int64_t)b->z - a->z) * ((int64_t)x - a->x) -
-                          ((int64_t)b->x - a->x) * ((int64_t)z - a->z);
-            }
-            all = part[0] + part[1] + part[2];
-            if (all == 0 || part[0] < 0 || part[1] < 0 || part[2] < 0)
+            if (by_b < 0 || by_c < 0 || by_b + by_c > all)
                 continue;
-            sample = terrimpi_sample(&t->field, x, z);
-            miss = sample - corner[0].height;
-            miss -= ((corner[1].height - corner[0].height) * (float)part[1] +
-                     (corner[2].height - corner[0].height) * (float)part[2]) / (float)all;
+            sample = terrimpi_mip_sample(t, at);
+            miss = sample - height;
+            miss -= (to_b * (float)by_b + to_c * (float)by_c) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
             misses->low = terrimpi_min(misses->low, sample);
             misses->high = terrimpi_max(misses->high, sample);
         }
 }
 
-/* Compares with what a finer neighbour beyond a side draws up to it: three triangles in each block
-   of 2 x 1 of its quads, below in half quads of the node, the first of them at its own border. The
-   last number of a corner says that it stands on that border, at the node's heights. */
-static void terrimpi_mip_border_misses(const terrimp_geomip *t, terrimpi_mip_place p, int side,
+/* Compares with what a finer neighbour beyond a side draws up to it: two of its quads for each of
+   the node's, in the pattern in which that side is coarse. */
+static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p, int side,
                                        terrimpi_mip_misses *misses)
 {
-    static const int8_t triangles[TERRIMP_SIDE_COUNT][3][3][3] = {
-        {{{1, -1, 0}, {0, 0, 1}, {2, 0, 1}}, {{0, -1, 0}, {0, 0, 1}, {1, -1, 0}},
-         {{1, -1, 0}, {2, 0, 1}, {2, -1, 0}}},
-        {{{0, 0, 1}, {1, 1, 0}, {2, 0, 1}}, {{0, 0, 1}, {0, 1, 0}, {1, 1, 0}},
-         {{2, 0, 1}, {1, 1, 0}, {2, 1, 0}}},
-        {{{-1, 1, 0}, {0, 2, 1}, {0, 0, 1}}, {{-1, 0, 0}, {-1, 1, 0}, {0, 0, 1}},
-         {{-1, 1, 0}, {-1, 2, 0}, {0, 2, 1}}},
-        {{{0, 0, 1}, {0, 2, 1}, {1, 1, 0}}, {{0, 2, 1}, {1, 2, 0}, {1, 1, 0}},
-         {{0, 0, 1}, {1, 1, 0}, {1, 0, 0}}}};
-    uint32_t quads = t->chunk_quads, at, k, c, fine = p.level - 1u;
-    for (at = 0; at < quads; at++) {
-        uint32_t i = p.x * quads, j = p.z * quads;
-        i += side == TERRIMP_SIDE_X0 ? 0 : side == TERRIMP_SIDE_X1 ? quads : at;
-        j += side == TERRIMP_SIDE_Z0 ? 0 : side == TERRIMP_SIDE_Z1 ? quads : at;
-        for (k = 0; k < 3u; k++) {
-            terrimpi_mip_corner corner[3];
-            for (c = 0; c < 3u; c++) {
-                const int8_t *offset = triangles[side][k][c];
-                corner[c].x = terrimpi_mip_col(t, fine, (uint32_t)((int32_t)(2u * i) + offset[0]));
-                corner[c].z = terrimpi_mip_row(t, fine, (uint32_t)((int32_t)(2u * j) + offset[1]));
-                corner[c].height = terrimpi_mip_stand(t, offset[2] ? p.level : fine, corner[c].x,
-                                                      corner[c].z);
-            }
-            terrimpi_mip_triangle_misses(t, corner, misses);
+    uint32_t quads = t->chunk_quads, along, k, c;
+    int along_x = terrimpi_along_x(side), last = side & 1;
+    terrimpi_mip_writer block; /* 2 x 2 quads of the neighbour */
+    block.quads = 2;
+    block.pattern = 1u << (side ^ 1);
+    for (along = 0; along < 2u * quads; along++) {
+        uint32_t across = last ? 0u : 1u, first[2];
+        int64_t at[4][2];
+        first[!along_x] = along & ~1u;
+        first[along_x] = last ? 2u * quads : (uint32_t)-2;
+        for (c = 0; c < 4u; c++) { /* counter-clockwise */
+            uint32_t i = (along_x ? along & 1u : across) + (c >> 1);
+            uint32_t j = (along_x ? across : along & 1u) + ((c + 1u) >> 1 & 1u);
+            k = terrimpi_mip_index(&block, i, j);
+            at[c][0] = terrimpi_tree_col(t, p.level - 1u, 2u * p.x * quads + first[0] + k % 3u);
+            at[c][1] = terrimpi_tree_row(t, p.level - 1u, 2u * p.z * quads + first[1] + k / 3u);
         }
+        terrimpi_mip_triangle_misses(t, at[0], at[2], at[3], misses);
+        terrimpi_mip_triangle_misses(t, at[0], at[1], at[2], misses);
     }
 }
 
-/* Widens a node's range by the heights at which its vertices may stand: its own, and where it
-   morphs or meets coarser neighbours those of the two levels above. */
-static void terrimpi_mip_drawn_range(const terrimp_geomip *t, terrimpi_mip_place p,
-                                     terrimp_geomip_node *node)
+static terrimp_result terrimpi_mip_build_leaf(const terrimp_quadtree *t, terrimp_node p)
 {
-    uint32_t quads = t->chunk_quads, i, j, above;
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++)
-            for (above = 0; above <= 2u; above++) {
-                uint32_t x = terrimpi_mip_col(t, p.level, p.x * quads + i);
-                uint32_t z = terrimpi_mip_row(t, p.level, p.z * quads + j);
-                float height = terrimpi_mip_height(t, p.level + above, x, z);
-                node->low = terrimpi_min(node->low, height);
-                node->high = terrimpi_max(node->high, height);
-                if (((i | j) & 1u) != 0)
-                    break;
-            }
-}
-
-static terrimp_result terrimpi_mip_build_leaf(const terrimp_geomip *t, terrimpi_mip_place p)
-{
-    terrimp_geomip_node *node = &t->nodes[terrimpi_mip_number(t, 0, p.x, p.z)];
+    terrimp_geomip_node *node = &t->nodes[p.number];
     uint32_t quads = t->chunk_quads;
     terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
     TERRIMPI_TRY(terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high));
     node->error = node->rms = 0.0f;
-    if (t->fits)
-        terrimpi_mip_drawn_range(t, p, node);
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_geomip *tree, uint32_t node,
+TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch)
 {
-    terrimpi_mip_place p, beyond;
+    terrimp_node p, beyond;
     terrimpi_mip_misses misses;
     int side;
     TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    p = terrimpi_mip_place_of(tree, node);
+    p = terrimpi_tree_node(tree, node);
     if (p.level == 0)
         return terrimpi_mip_build_leaf(tree, p);
     memset(&misses, 0, sizeof misses);
     terrimpi_mip_inner_misses(tree, p, scratch, &misses);
-    misses.low = misses.high = terrimpi_mip_stand(
-        tree, p.level, terrimpi_mip_col(tree, p.level, p.x * tree->chunk_quads),
-        terrimpi_mip_row(tree, p.level, p.z * tree->chunk_quads));
+    misses.low = misses.high = terrimpi_sample(
+        &tree->field, terrimpi_tree_col(tree, p.level, p.x * tree->chunk_quads),
+        terrimpi_tree_row(tree, p.level, p.z * tree->chunk_quads));
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        if (terrimpi_mip_beyond(tree, p, side, &beyond))
+        if (terrimpi_tree_beyond(tree, &p, side, &beyond))
             terrimpi_mip_border_misses(tree, p, side, &misses);
     tree->nodes[node].low = misses.low;
     tree->nodes[node].high = misses.high;
     tree->nodes[node].error = misses.most;
     tree->nodes[node].rms = TERRIMP_SQRTF(misses.squares / misses.count);
-    if (tree->fits)
-        terrimpi_mip_drawn_range(tree, p, &tree->nodes[node]);
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tree)
+TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree)
 {
     uint32_t i;
     TERRIMPI_REFUSE(!tree || !tree->nodes, TERRIMP_E_NULL);
     for (i = 0; i + 1u < tree->node_count; i++) {
         const terrimp_geomip_node *child = &tree->nodes[i];
-        terrimp_geomip_node *node = &tree->nodes[terrimpi_mip_parent(tree, i)];
+        terrimp_geomip_node *node = &tree->nodes[terrimpi_tree_parent_number(tree, i)];
         node->low = terrimpi_min(node->low, child->low);
         node->high = terrimpi_max(node->high, child->high);
         node->error = terrimpi_max(node->error, child->error);
@@ -11832,10 +11661,9 @@ TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_geomip *tre
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_geomip *tree, float *scratch)
+TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch)
 {
     uint32_t node;
-    TERRIMPI_TRY(terrimp_geomip_fit(tree, scratch));
     for (node = 0; node < tree->node_count; node++)
         TERRIMPI_TRY(terrimp_geomip_build_node(tree, node, scratch));
     return terrimp_geomip_build_finish(tree);
@@ -11894,12 +11722,6 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     return b.ok ? b.bytes : 0;
 }
 
-/* The sample of a node that column or row k of its tile stands on. */
-static uint32_t terrimpi_tile_place(uint32_t k, uint32_t level, uint32_t span)
-{
-    return terrimpi_min_u32(k << level, span);
-}
-
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
 static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex *from,
                               const terrimp_mesh_vertex *to, terrimpi_facet *facet)
@@ -11910,10 +11732,10 @@ static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex
     if (a->z == b->z)
         return;
     side = a == from ? &facet->left[facet->left_count++] : &facet->right[facet->right_count++];
-    side->low = terrimpi_tile_place(a->z, p->level, p->span_z);
-    side->high = terrimpi_tile_place(b->z, p->level, p->span_z);
-    side->x = (float)terrimpi_tile_place(a->x, p->level, p->span_x);
-    x = (float)terrimpi_tile_place(b->x, p->level, p->span_x);
+    side->low = terrimpi_lattice(a->z, p->level, p->span_z);
+    side->high = terrimpi_lattice(b->z, p->level, p->span_z);
+    side->x = (float)terrimpi_lattice(a->x, p->level, p->span_x);
+    x = (float)terrimpi_lattice(b->x, p->level, p->span_x);
     inverse = 1.0f / (float)(side->high - side->low);
     side->slope = (x - side->x) * inverse;
     side->h = a->height;
@@ -11978,8 +11800,8 @@ static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *me
             a = b;
             b = swap;
         }
-        from = terrimpi_tile_place(terrimpi_min_u32(a_at, b_at), p->level, span);
-        to = terrimpi_tile_place(terrimpi_max_u32(a_at, b_at), p->level, span);
+        from = terrimpi_lattice(terrimpi_min_u32(a_at, b_at), p->level, span);
+        to = terrimpi_lattice(terrimpi_max_u32(a_at, b_at), p->level, span);
         terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
                            (b->height - a->height) / (float)(to - from));
     }
@@ -11995,7 +11817,7 @@ static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *
     float *row = build->row, last = (float)p->span_x;
     terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
-        terrimpi_take_border(p, mesh, TERRIMP_BORDER_Z1, row);
+        terrimpi_take_border(p, mesh, TERRIMP_SIDE_Z1, row);
         return;
     }
     for (; facet < end; facet++) {
@@ -12043,8 +11865,8 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
                                      float *line)
 {
     int along_x = terrimpi_along_x(side);
-    uint32_t x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
-    uint32_t z = side == TERRIMP_BORDER_Z1 ? p->z + p->span_z : p->z;
+    uint32_t x = side == TERRIMP_SIDE_X1 ? p->x + p->span_x : p->x;
+    uint32_t z = side == TERRIMP_SIDE_Z1 ? p->z + p->span_z : p->z;
     uint32_t span = along_x ? p->span_x : p->span_z;
     terrimpi_heightfield_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
                               along_x ? 1u : span + 1u, 1, line);
@@ -12055,8 +11877,8 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
 static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t *first,
                                      uint32_t *step)
 {
-    *first = side == TERRIMP_BORDER_Z1   ? (p->rows - 1u) * p->cols
-             : side == TERRIMP_BORDER_X1 ? p->cols - 1u
+    *first = side == TERRIMP_SIDE_Z1   ? (p->rows - 1u) * p->cols
+             : side == TERRIMP_SIDE_X1 ? p->cols - 1u
                                          : 0u;
     *step = terrimpi_along_x(side) ? 1u : p->cols;
     return terrimpi_along_x(side) ? p->cols : p->rows;
@@ -12084,12 +11906,12 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
         for (i = 0; i < p->cols; i++)
             out[i] /= (float)(to - from);
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t span = terrimpi_read_border(t, p, side, build->row);
         uint32_t count = terrimpi_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             build->tile[first + k * step] =
-                k == 0 || k + 1u == count ? build->row[terrimpi_tile_place(k, p->level, span)]
+                k == 0 || k + 1u == count ? build->row[terrimpi_lattice(k, p->level, span)]
                                           : terrimpi_line_mean(build->row, k, p->level, span);
     }
 }
@@ -12098,7 +11920,7 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
 static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const terrimpi_patch *p,
                                              const terrimpi_build *build, terrimp_mesh *mesh)
 {
-    terrimp_border_point points[TERRIMP_BORDER_COUNT][16];
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][16];
     float line[129];
     terrimp_simplify_desc desc;
     terrimpi_squeeze squeeze;
@@ -12107,7 +11929,7 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     desc.cols = p->cols;
     desc.rows = p->rows;
     desc.triangle_budget = t->desc.triangle_budget;
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
@@ -12174,7 +11996,7 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
             }
         }
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++)
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         terrimpi_miss_border(t, p, side, mesh, build);
 }
 
@@ -12237,6 +12059,18 @@ static void terrimpi_store_surface(terrimp_terrain *t, uint32_t node, terrimp_me
     }
     for (i = 0; i < mesh->surface_index_count; i++)
         corners[i] = (uint8_t)mesh->indices[i];
+}
+
+/* Differences of samples to the surface. */
+typedef struct terrimpi_error {
+    float above, below, squares;
+} terrimpi_error;
+
+static void terrimpi_add_error(terrimpi_error *error, float difference)
+{
+    error->above = terrimpi_max(error->above, difference);
+    error->below = terrimpi_max(error->below, -difference);
+    error->squares += difference * difference;
 }
 
 /* Measures a mesh against every sample of its node. */
@@ -12395,7 +12229,7 @@ static void terrimpi_hold(terrimpi_mesh *mesh, float low, float high)
 
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain)
 {
-    const terrimp_geomip *tree;
+    const terrimp_quadtree *tree;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
@@ -12408,7 +12242,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
         terrain->mesh_triangle_count += terrain->meshes[node].triangle_count;
     }
     for (node = 0; node + 1u < tree->node_count; node++)
-        terrimpi_hold(&terrain->meshes[terrimpi_mip_parent(tree, node)],
+        terrimpi_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
                       terrain->meshes[node].low, terrain->meshes[node].high);
     terrain->built = 1;
     return TERRIMP_OK;
@@ -12448,7 +12282,7 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++)
                 TERRIMPI_TRY(terrimp_terrain_build_node(
-                    terrain, terrimpi_mip_number(&terrain->tree, level, x, z), scratch, bytes));
+                    terrain, terrimpi_tree_at(&terrain->tree, level, x, z).number, scratch, bytes));
     }
     return terrimp_terrain_build_finish(terrain);
 }
@@ -12551,6 +12385,898 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.checksum = terrimpi_bake_hash(&bake, terrain);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    return TERRIMP_OK;
+}
+
+/* ==== Layer builder ====================================================== >>impl-layer-builder */
+/* Based on: Jeschke 2004, chapters 3 and 4. What is said without a source is derived here.
+
+   Spacing. A line of sight meets the plane of depth 0 at x0 and a layer at depth t, in tangents of
+   the picture, at slope + x0 / t. So between two layers it moves by |x0| times the step of 1 / t,
+   which may be a texel at most: step = texel / largest |x0|. An eye h behind the cell's near side
+   stands at most size / 2 + h cell_tan beside the axis and looks at a point at most view_tan t
+   beside it, so |x0| <= (size / 2 + h q) t / (t + h), with q = cell_tan + view_tan. That is
+   monotone in h: either the near side rules (h = 0), where steps of 1 / t are all alike, or the far
+   side (h = cell_depth), where the step is affine in 1 / t.
+
+   Parallax. A point at depth t that appears on a plane at depth p misses its place by an angle of
+   at most |1/t - 1/p| r, with r = (|size| / 2 + h |q|) (end / (end + h))^2 at its largest: its
+   offset at the plane over its distance from the eye, both bounded over the depths up to end. */
+
+#define TERRIMPI_LAYERS_MAX 65535.0f
+
+/* What a descriptor comes to. */
+typedef struct terrimpi_spacing {
+    float start, end;    /* 1 / depth */
+    float spare;         /* by which 1 / depth may be off */
+    float texel;         /* or less, where half a texel in both directions is more than allowed */
+    float side;          /* largest |x0| from the near side of the cell */
+    float shrink, shift; /* of the step that the far side asks for */
+    float change;        /* 1 / depth below which that is the smaller one */
+} terrimpi_spacing;
+
+static float terrimpi_hypot(float a, float b)
+{
+    float v[3];
+    v[0] = a;
+    v[1] = b;
+    v[2] = 0.0f;
+    return terrimpi_length(v);
+}
+
+/* The largest r of the bound of parallax. Over h it has one peak, at end - 2 size / q. */
+static float terrimpi_layers_reach(const terrimp_layers_desc *d)
+{
+    float r = 0.5f * terrimpi_hypot(d->cell_size[0], d->cell_size[1]);
+    float q = terrimpi_hypot(d->cell_tan[0] + d->view_tan[0], d->cell_tan[1] + d->view_tan[1]);
+    float end = d->distance + d->depth, h, ratio;
+    if (!terrimpi_finite(end))
+        return r + d->cell_depth * q;
+    h = terrimpi_min(terrimpi_max(0.0f, end - 2.0f * r / q), d->cell_depth);
+    ratio = end / (end + h);
+    return (r + h * q) * ratio * ratio;
+}
+
+static void terrimpi_layers_spacing(const terrimp_layers_desc *d, terrimpi_spacing *s)
+{
+    float tolerance = d->tolerance_rad > 0.0f ? d->tolerance_rad : d->texel;
+    float q[2], m = d->cell_depth, sum, reach = terrimpi_layers_reach(d);
+    s->start = 1.0f / d->distance;
+    s->end = 1.0f / (d->distance + d->depth);
+    s->spare = reach > 0.0f ? tolerance / reach : s->start;
+    s->texel = 0.9998f * terrimpi_min(d->texel, 1.414f * tolerance); /* rounding of depths */
+    s->side = 0.5f * terrimpi_max(d->cell_size[0], d->cell_size[1]);
+    q[0] = d->cell_tan[0] + d->view_tan[0];
+    q[1] = d->cell_tan[1] + d->view_tan[1];
+    s->shift = 0.0f;
+    if (!terrimpi_finite(m)) {
+        s->shrink = s->texel / terrimpi_max(q[0], q[1]);
+        s->change = s->side > 0.0f ? terrimpi_max(q[0], q[1]) / s->side : TERRIMPI_INFINITY;
+    } else {
+        sum = terrimpi_max(0.5f * d->cell_size[0] + m * q[0], 0.5f * d->cell_size[1] + m * q[1]);
+        s->shift = sum > 0.0f ? s->texel / sum : 0.0f;
+        s->shrink = m * s->shift;
+        s->change = !(sum > s->side) ? -1.0f
+                    : s->side > 0.0f ? (sum / s->side - 1.0f) / m
+                                     : TERRIMPI_INFINITY;
+    }
+    s->shrink = terrimpi_min(s->shrink, 1.0f);
+}
+
+static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
+{
+    int k;
+    TERRIMPI_REFUSE(!terrimpi_finite(d->distance) || !terrimpi_finite(d->texel) ||
+                        !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
+                        d->cell_depth != d->cell_depth,
+                    TERRIMP_E_NOT_FINITE);
+    for (k = 0; k < 2; k++) {
+        float sum = d->cell_tan[k] + d->view_tan[k];
+        TERRIMPI_REFUSE(!terrimpi_finite2(d->cell_size[k], sum), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!(d->cell_size[k] >= 0.0f) || !(d->cell_tan[k] >= 0.0f) ||
+                            !(d->view_tan[k] > 0.0f),
+                        TERRIMP_E_RANGE);
+    }
+    TERRIMPI_REFUSE(!(d->distance > 0.0f) || !terrimpi_finite(1.0f / d->distance) ||
+                        !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
+                        !(d->tolerance_rad >= 0.0f),
+                    TERRIMP_E_RANGE);
+    return TERRIMP_OK;
+}
+
+/* How many steps of the far side take 1 / depth from d to the target or beyond. */
+static uint32_t terrimpi_layers_steps(float d, float shrink, float shift, float target)
+{
+    float shrinks[17], shifts[17];
+    uint32_t steps = 0;
+    int i;
+    for (i = 0; i < 17; i++) {
+        shrinks[i] = shrink;
+        shifts[i] = shift;
+        shift *= 2.0f - shrink;
+        shrink *= 2.0f - shrink;
+    }
+    for (i = 16; i >= 0; i--)
+        if (d - (shrinks[i] * d + shifts[i]) > target) {
+            d -= shrinks[i] * d + shifts[i];
+            steps += 1u << i;
+        }
+    return steps + 1u;
+}
+
+/* The number of layers, first those that the near side rules. */
+static terrimp_result terrimpi_layers_count(const terrimpi_spacing *s, terrimp_layers *l)
+{
+    float way = l->first - l->last, even = 0.0f, d;
+    uint32_t steps;
+    if (l->first > s->change) {
+        float needed = way / l->step, until = (l->first - s->change) / l->step;
+        if (needed <= until + 1.0f) {
+            TERRIMPI_REFUSE(!(needed < TERRIMPI_LAYERS_MAX), TERRIMP_E_RANGE);
+            l->even_count = terrimpi_ceil_u32(needed);
+            l->count = l->even_count + 1u;
+            l->step = way / (float)l->even_count;
+            return TERRIMP_OK;
+        }
+        TERRIMPI_REFUSE(!(until < TERRIMPI_LAYERS_MAX), TERRIMP_E_RANGE);
+        even = (float)((uint32_t)until + 1u);
+    }
+    d = even > 0.0f ? l->first - even * l->step : l->first;
+    steps = terrimpi_layers_steps(d, l->shrink, l->shift, l->last);
+    l->even_count = (uint32_t)even;
+    l->count = l->even_count + steps + 1u;
+    TERRIMPI_REFUSE((float)l->count > TERRIMPI_LAYERS_MAX, TERRIMP_E_RANGE);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
+                                               terrimp_layers *layers)
+{
+    terrimpi_spacing s;
+    terrimp_layers l;
+    TERRIMPI_REFUSE(!desc || !layers, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_layers_check(desc));
+    terrimpi_layers_spacing(desc, &s);
+    TERRIMPI_REFUSE(!(s.end + s.spare > 0.0f), TERRIMP_E_RANGE); /* no layer would be the last */
+    if (desc->even) { /* the far side's smallest step for all */
+        float small = s.shift + s.shrink * s.end;
+        s.side = terrimpi_max(s.side, small > 0.0f ? s.texel / small : TERRIMPI_INFINITY);
+        s.change = -1.0f;
+    }
+    l.start = desc->distance;
+    l.end = desc->distance + desc->depth;
+    l.texel = desc->texel;
+    l.first = terrimpi_max(s.start - s.spare, 0.5f * (s.start + s.end));
+    l.last = terrimpi_min(l.first, s.end + s.spare);
+    l.step = s.side > 0.0f ? s.texel / s.side : 0.0f;
+    l.shrink = s.shrink;
+    l.shift = s.shift;
+    l.count = 1;
+    l.even_count = 0;
+    if (l.first > l.last)
+        TERRIMPI_TRY(terrimpi_layers_count(&s, &l));
+    *layers = l;
+    return TERRIMP_OK;
+}
+
+/* --- hidden texels --- */
+
+/* The bits of the last word of a row that are texels. */
+static uint32_t terrimpi_mask_tail(uint32_t width)
+{
+    return 0xffffffffu >> (31u - (width - 1u) % 32u);
+}
+
+/* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
+static void terrimpi_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
+{
+    uint32_t words = TERRIMP_MASK_WORDS(width), i, other = 0;
+    row[words - 1u] &= terrimpi_mask_tail(width);
+    if (dx < 0)
+        for (i = 0; i < words; i++) {
+            uint32_t all = row[i] | opaque[i];
+            row[i] = all & (all << 1 | other);
+            other = all >> 31;
+        }
+    else
+        for (i = words; i-- > 0;) {
+            uint32_t all = row[i] | (i + 1u < words ? opaque[i]
+                                                    : opaque[i] & terrimpi_mask_tail(width));
+            row[i] = all & (all >> 1 | other);
+            other = all << 31;
+        }
+}
+
+/* One step of a mask of state from a layer to the next: what has neighbours at dx, dy and across
+   there hides what is behind it. */
+static void terrimpi_cull_step(const uint32_t *opaque, uint32_t width, uint32_t height, int dx,
+                               int dy, uint32_t *state)
+{
+    size_t words = TERRIMP_MASK_WORDS(width), y, i;
+    for (y = 0; y < height; y++)
+        terrimpi_cull_row(opaque + y * words, width, dx, state + y * words);
+    if (dy > 0) {
+        for (i = 0; i < (height - 1u) * words; i++)
+            state[i] &= state[i + words];
+        memset(state + i, 0, words * sizeof *state);
+        return;
+    }
+    for (i = height * words; i-- > words;)
+        state[i] &= state[i - words];
+    memset(state, 0, words * sizeof *state);
+}
+
+TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
+                                              uint32_t height, int rule, uint32_t *state,
+                                              uint32_t *visible)
+{
+    size_t count = (size_t)height * TERRIMP_MASK_WORDS(width), i;
+    int k;
+    TERRIMPI_REFUSE(!opaque || !state || !visible, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!width || !height || rule < 0 || rule >= TERRIMP_CULL_COUNT, TERRIMP_E_RANGE);
+    if (rule == TERRIMP_CULL_BLOCK) {
+        for (i = 0; i < count; i++)
+            visible[i] = opaque[i] & ~state[i];
+        terrimpi_cull_step(visible, width, height, 1, 1, state);
+        terrimpi_cull_step(state, width, height, -1, -1, state);
+        return TERRIMP_OK;
+    }
+    for (i = 0; i < count; i++)
+        visible[i] = opaque[i] & ~(state[i] & state[count + i] & state[2u * count + i] &
+                                   state[3u * count + i]);
+    for (k = 0; k < 4; k++) /* what was culled is in all four, and so is not missing in visible */
+        terrimpi_cull_step(visible, width, height, k & 1 ? 1 : -1, k & 2 ? 1 : -1,
+                           state + (size_t)k * count);
+    return TERRIMP_OK;
+}
+
+/* --- rectangles that hold all opaque texels --- */
+
+#define TERRIMPI_COVER_LINES 8u   /* a rectangle is cut along so many lines of a grid at once */
+#define TERRIMPI_COVER_SPANS 36u  /* from one of them to another */
+
+/* A rectangle that might be taken whole or in parts. */
+typedef struct terrimpi_cover_node {
+    terrimp_rect rect;
+    uint32_t cost, parts, part_count; /* where its parts stand; 0: none */
+} terrimpi_cover_node;
+
+/* What lies in a span of columns and a span of rows of the grid, and the cheapest way to cover it
+   with cuts along the grid. Corners of the opaque texels, ends excluded; x1 is 0 for none. */
+typedef struct terrimpi_cover_span {
+    uint16_t x0, y0, x1, y1;
+    uint32_t cost;
+    uint8_t cut_x, cut_y; /* the line of the first cut, or 0: whole */
+} terrimpi_cover_span;
+
+typedef struct terrimpi_cover {
+    terrimp_cover_desc desc;
+    terrimpi_cover_node *nodes;
+    uint32_t node_count, node_limit;
+    uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
+    uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
+    uint32_t *seen;       /* a row of bits */
+    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
+    terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
+} terrimpi_cover;
+
+static uint32_t terrimpi_bit_count(uint32_t bits)
+{
+    bits -= bits >> 1 & 0x55555555u;
+    bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
+    return ((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
+}
+
+/* The number of the lowest bit that is set, and clears it. */
+static uint32_t terrimpi_next_bit(uint32_t *bits)
+{
+    uint32_t below = terrimpi_bit_count((*bits & (0u - *bits)) - 1u);
+    *bits &= *bits - 1u;
+    return below;
+}
+
+/* A word of a mask's row y, without what lies outside of columns x to end. */
+static uint32_t terrimpi_mask_word(const terrimp_cover_desc *d, uint32_t y, uint32_t word,
+                                   uint32_t x, uint32_t end)
+{
+    uint32_t bits = d->mask[(size_t)y * TERRIMP_MASK_WORDS(d->width) + word];
+    if (word == x / 32u)
+        bits &= 0xffffffffu << x % 32u;
+    if (word == (end - 1u) / 32u)
+        bits &= terrimpi_mask_tail(end);
+    return bits;
+}
+
+/* Extents of the columns of a rectangle, in its rows; an empty one has low > high. */
+static void terrimpi_cover_columns(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t end = r->x + r->width, turn, i, word;
+    for (i = 0; i < r->width; i++) {
+        c->low[i] = 1;
+        c->high[i] = 0;
+    }
+    for (turn = 0; turn < 2u; turn++) {
+        memset(c->seen, 0, TERRIMP_MASK_WORDS(c->desc.width) * sizeof *c->seen);
+        for (i = 0; i < r->height; i++) {
+            uint32_t y = turn ? r->height - 1u - i : i;
+            for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
+                uint32_t fresh = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end);
+                fresh &= ~c->seen[word];
+                c->seen[word] |= fresh;
+                while (fresh)
+                    (turn ? c->high : c->low)[word * 32u + terrimpi_next_bit(&fresh) - r->x] = y;
+            }
+        }
+    }
+}
+
+/* The same of its rows; returns how many of its texels are opaque. */
+static uint32_t terrimpi_cover_rows(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t end = r->x + r->width, y, word, opaque = 0;
+    for (y = 0; y < r->height; y++) {
+        c->low[y] = 1;
+        c->high[y] = 0;
+        for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
+            uint32_t bits = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end), last = bits;
+            if (!bits)
+                continue;
+            opaque += terrimpi_bit_count(bits);
+            if (c->low[y] > c->high[y])
+                c->low[y] = word * 32u + terrimpi_next_bit(&bits) - r->x;
+            last |= last >> 1, last |= last >> 2, last |= last >> 4, last |= last >> 8;
+            last |= last >> 16;
+            c->high[y] = word * 32u + terrimpi_bit_count(last) - 1u - r->x;
+        }
+    }
+    return opaque;
+}
+
+/* A growing extent of rows or columns. */
+typedef struct terrimpi_extent {
+    uint32_t first, last, low, high;
+} terrimpi_extent;
+
+static uint32_t terrimpi_cover_cost(const terrimpi_cover *c, uint32_t width, uint32_t height)
+{
+    return (width + 2u * c->desc.gutter) * (height + 2u * c->desc.gutter) + c->desc.quad_cost;
+}
+
+/* Adds column or row i; returns what the rectangle of all so far costs. */
+static uint32_t terrimpi_extent_add(const terrimpi_cover *c, terrimpi_extent *e, uint32_t i)
+{
+    if (c->low[i] <= c->high[i]) {
+        if (e->first > e->last) {
+            e->first = e->last = i;
+            e->low = c->low[i];
+            e->high = c->high[i];
+        }
+        e->first = terrimpi_min_u32(e->first, i);
+        e->last = terrimpi_max_u32(e->last, i);
+        e->low = terrimpi_min_u32(e->low, c->low[i]);
+        e->high = terrimpi_max_u32(e->high, c->high[i]);
+    }
+    return e->first > e->last
+               ? 0u
+               : terrimpi_cover_cost(c, e->last - e->first + 1u, e->high - e->low + 1u);
+}
+
+/* The cut between `count` columns or rows with the cheapest two parts; returns their cost. */
+static uint32_t terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
+{
+    terrimpi_extent e = {1, 0, 0, 0};
+    uint32_t i, best = 0xffffffffu;
+    for (i = count; i-- > 0;)
+        c->beyond[i] = terrimpi_extent_add(c, &e, i);
+    e.first = 1;
+    e.last = 0;
+    for (i = 1; i < count; i++) {
+        uint32_t cost = terrimpi_extent_add(c, &e, i - 1u) + c->beyond[i];
+        if (cost < best) {
+            best = cost;
+            *at = i;
+        }
+    }
+    return best;
+}
+
+/* Shrinks a rectangle to its opaque texels; returns how many there are. */
+static uint32_t terrimpi_cover_tighten(terrimpi_cover *c, terrimp_rect *r)
+{
+    uint32_t opaque = terrimpi_cover_rows(c, r), y;
+    terrimpi_extent e = {1, 0, 0, 0};
+    for (y = 0; y < r->height; y++)
+        terrimpi_extent_add(c, &e, y);
+    if (opaque)
+        *r = terrimpi_rect(r->x + e.low, r->y + e.first, e.high - e.low + 1u,
+                           e.last - e.first + 1u);
+    return opaque;
+}
+
+/* The number of the span from line a to line b > a: after those that it is made of. */
+static uint32_t terrimpi_cover_span_of(uint32_t a, uint32_t b)
+{
+    return b * (b - 1u) / 2u + b - 1u - a;
+}
+
+static void terrimpi_cover_unite(const terrimpi_cover_span *a, const terrimpi_cover_span *b,
+                                 terrimpi_cover_span *out)
+{
+    terrimpi_cover_span u = *a;
+    if (!a->x1)
+        u = *b;
+    else if (b->x1) {
+        u.x0 = a->x0 < b->x0 ? a->x0 : b->x0;
+        u.y0 = a->y0 < b->y0 ? a->y0 : b->y0;
+        u.x1 = a->x1 > b->x1 ? a->x1 : b->x1;
+        u.y1 = a->y1 > b->y1 ? a->y1 : b->y1;
+    }
+    *out = u;
+}
+
+/* The spans of single cells of a rectangle's grid: of the texels of each. */
+static void terrimpi_cover_cells(terrimpi_cover *c, const terrimp_rect *r)
+{
+    const uint32_t n = TERRIMPI_COVER_LINES;
+    uint32_t i, k;
+    for (k = 0; k < n; k++)
+        for (i = 0; i < n; i++) {
+            terrimpi_cover_span *s = &c->spans[terrimpi_cover_span_of(k, k + 1u)]
+                                              [terrimpi_cover_span_of(i, i + 1u)];
+            uint32_t x = r->x + i * r->width / n, y = r->y + k * r->height / n;
+            terrimp_rect cell = terrimpi_rect(x, y, r->x + (i + 1u) * r->width / n - x,
+                                              r->y + (k + 1u) * r->height / n - y);
+            memset(s, 0, sizeof *s);
+            if (!cell.width || !cell.height || !terrimpi_cover_tighten(c, &cell))
+                continue;
+            s->x0 = (uint16_t)cell.x;
+            s->y0 = (uint16_t)cell.y;
+            s->x1 = (uint16_t)(cell.x + cell.width);
+            s->y1 = (uint16_t)(cell.y + cell.height);
+        }
+}
+
+/* Lowers the cost of a span to that of its best cut. */
+static void terrimpi_cover_best(terrimpi_cover *c, uint32_t a, uint32_t b, uint32_t p, uint32_t q)
+{
+    uint32_t columns = terrimpi_cover_span_of(a, b), rows = terrimpi_cover_span_of(p, q), m;
+    terrimpi_cover_span *s = &c->spans[rows][columns];
+    s->cut_x = s->cut_y = 0;
+    s->cost = s->x1 ? terrimpi_cover_cost(c, (uint32_t)s->x1 - s->x0, (uint32_t)s->y1 - s->y0) : 0u;
+    for (m = a + 1u; m < b; m++) {
+        uint32_t cost = c->spans[rows][terrimpi_cover_span_of(a, m)].cost +
+                        c->spans[rows][terrimpi_cover_span_of(m, b)].cost;
+        if (cost < s->cost) {
+            s->cost = cost;
+            s->cut_x = (uint8_t)m;
+        }
+    }
+    for (m = p + 1u; m < q; m++) {
+        uint32_t cost = c->spans[terrimpi_cover_span_of(p, m)][columns].cost +
+                        c->spans[terrimpi_cover_span_of(m, q)][columns].cost;
+        if (cost < s->cost) {
+            s->cost = cost;
+            s->cut_x = 0;
+            s->cut_y = (uint8_t)m;
+        }
+    }
+}
+
+/* The cheapest ways to cover all spans of a rectangle's grid, the smaller ones first. */
+static void terrimpi_cover_solve(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t a, b, p, q;
+    terrimpi_cover_cells(c, r);
+    for (q = 1; q <= TERRIMPI_COVER_LINES; q++)
+        for (p = q; p-- > 0;)
+            for (b = 1; b <= TERRIMPI_COVER_LINES; b++)
+                for (a = b; a-- > 0;) {
+                    uint32_t columns = terrimpi_cover_span_of(a, b);
+                    uint32_t rows = terrimpi_cover_span_of(p, q);
+                    terrimpi_cover_span *s = &c->spans[rows][columns];
+                    if (b - a > 1u)
+                        terrimpi_cover_unite(&c->spans[rows][terrimpi_cover_span_of(a, b - 1u)],
+                                             &c->spans[rows][terrimpi_cover_span_of(b - 1u, b)], s);
+                    else if (q - p > 1u)
+                        terrimpi_cover_unite(&c->spans[terrimpi_cover_span_of(p, q - 1u)][columns],
+                                             &c->spans[terrimpi_cover_span_of(q - 1u, q)][columns],
+                                             s);
+                    terrimpi_cover_best(c, a, b, p, q);
+                }
+}
+
+static int terrimpi_cover_add(terrimpi_cover *c, uint32_t node, const terrimp_rect *r)
+{
+    if (c->node_count == c->node_limit)
+        return 0;
+    c->nodes[node].part_count++;
+    c->nodes[c->node_count++].rect = *r;
+    return 1;
+}
+
+/* Makes parts of a node from the best cuts along its grid; returns 0 when there are none. */
+static int terrimpi_cover_by_grid(terrimpi_cover *c, uint32_t node)
+{
+    uint8_t stack[TERRIMPI_COVER_LINES * TERRIMPI_COVER_LINES][4];
+    uint32_t top = 1, k;
+    terrimpi_cover_solve(c, &c->nodes[node].rect);
+    memset(stack[0], 0, sizeof stack[0]);
+    stack[0][1] = stack[0][3] = TERRIMPI_COVER_LINES;
+    while (top) {
+        uint8_t *at = stack[--top];
+        const terrimpi_cover_span *s =
+            &c->spans[terrimpi_cover_span_of(at[2], at[3])][terrimpi_cover_span_of(at[0], at[1])];
+        uint8_t cut = s->cut_x ? s->cut_x : s->cut_y;
+        terrimp_rect r = terrimpi_rect(s->x0, s->y0, (uint32_t)s->x1 - s->x0,
+                                       (uint32_t)s->y1 - s->y0);
+        if (!cut && top == 0 && c->nodes[node].part_count == 0)
+            return 0;
+        if (!cut && s->x1 && !terrimpi_cover_add(c, node, &r)) {
+            c->node_count -= c->nodes[node].part_count;
+            c->nodes[node].part_count = 0;
+            return 0;
+        }
+        if (!cut)
+            continue;
+        k = s->cut_x ? 0 : 2;
+        memcpy(stack[top + 1u], at, sizeof stack[0]);
+        at[k] = cut; /* the part before the cut is the next one */
+        stack[top + 1u][k + 1u] = cut;
+        top += 2u;
+    }
+    return 1;
+}
+
+/* Makes two parts of a node, with the best cut between any two of its columns or rows. */
+static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
+{
+    terrimp_rect r = c->nodes[node].rect, part[2];
+    uint32_t x = 0, y = 0, by_y, k;
+    if (c->node_count + 2u > c->node_limit)
+        return;
+    terrimpi_cover_rows(c, &r);
+    by_y = terrimpi_cover_cut(c, r.height, &y);
+    terrimpi_cover_columns(c, &r);
+    part[0] = part[1] = r;
+    if (terrimpi_cover_cut(c, r.width, &x) < by_y) {
+        part[0].width = x;
+        part[1].x += x;
+        part[1].width -= x;
+    } else {
+        part[0].height = y;
+        part[1].y += y;
+        part[1].height -= y;
+    }
+    for (k = 0; k < 2u; k++) {
+        terrimpi_cover_tighten(c, &part[k]);
+        terrimpi_cover_add(c, node, &part[k]);
+    }
+}
+
+/* Cuts a node up, if more is lost in it than another rectangle costs. */
+static void terrimpi_cover_split(terrimpi_cover *c, uint32_t node)
+{
+    terrimpi_cover_node *n = &c->nodes[node];
+    uint32_t opaque = terrimpi_cover_rows(c, &n->rect);
+    n->cost = terrimpi_cover_cost(c, n->rect.width, n->rect.height);
+    n->parts = c->node_count;
+    n->part_count = 0;
+    if (n->rect.width * n->rect.height - opaque > c->desc.quad_cost &&
+        !terrimpi_cover_by_grid(c, node))
+        terrimpi_cover_in_two(c, node);
+}
+
+/* What a rectangle saves by taking the place of all that lie within it; less than 0 when it reaches
+   into others, which would then overlap. */
+static float terrimpi_cover_gain(const terrimpi_cover *c, const terrimp_rect *r,
+                                 const terrimp_rect *rects, uint32_t count)
+{
+    float gain = -(float)terrimpi_cover_cost(c, r->width, r->height);
+    uint32_t i;
+    for (i = 0; i < count; i++) {
+        const terrimp_rect *o = &rects[i];
+        if (o->x >= r->x + r->width || r->x >= o->x + o->width || o->y >= r->y + r->height ||
+            r->y >= o->y + o->height)
+            continue;
+        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
+            o->y + o->height > r->y + r->height)
+            return -1.0f;
+        gain += (float)terrimpi_cover_cost(c, o->width, o->height);
+    }
+    return gain;
+}
+
+static terrimp_rect terrimpi_rect_union(const terrimp_rect *a, const terrimp_rect *b)
+{
+    uint32_t x = terrimpi_min_u32(a->x, b->x), y = terrimpi_min_u32(a->y, b->y);
+    return terrimpi_rect(x, y, terrimpi_max_u32(a->x + a->width, b->x + b->width) - x,
+                         terrimpi_max_u32(a->y + a->height, b->y + b->height) - y);
+}
+
+/* Puts r in place of all that lie within it; returns how many rectangles are left. */
+static uint32_t terrimpi_cover_swallow(const terrimp_rect *r, terrimp_rect *rects, uint32_t count)
+{
+    uint32_t i, kept = 0, placed = 0;
+    for (i = 0; i < count; i++) {
+        const terrimp_rect *o = &rects[i];
+        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
+            o->y + o->height > r->y + r->height)
+            rects[kept++] = *o;
+        else if (!placed++)
+            rects[kept++] = *r;
+    }
+    return kept;
+}
+
+/* Joins rectangles as long as one in their place costs less than they do. */
+static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects, uint32_t count)
+{
+    uint32_t a, b, joined;
+    do {
+        joined = 0;
+        for (a = 0; a < count; a++)
+            for (b = a + 1u; b < count; b++) {
+                terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
+                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                    continue;
+                count = terrimpi_cover_swallow(&r, rects, count);
+                joined = 1;
+                b = a;
+            }
+    } while (joined);
+    return count;
+}
+
+/* Checks a descriptor and lays out the scratch memory; in base NULL only to count it. */
+static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void *base,
+                                           uint32_t capacity, terrimpi_cover *c, size_t *bytes)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    uint32_t longest = terrimpi_max_u32(desc->width, desc->height);
+    c->desc = *desc;
+    TERRIMPI_DEFAULT(c->desc.quad_cost, 20u);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(desc->width, 1, 16384) || desc->gutter > 64u ||
+                        !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
+                        c->desc.quad_cost > 1u << 24,
+                    TERRIMP_E_RANGE);
+    c->node_count = 0;
+    c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
+    c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
+    c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
+    c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
+    c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
+    c->cells = (uint32_t *)terrimpi_take(
+        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
+        sizeof *c->cells);
+    c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
+        &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
+    c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
+    *bytes = arena.bytes;
+    return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
+}
+
+TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity)
+{
+    terrimpi_cover c;
+    size_t bytes;
+    return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
+}
+
+/* What both ways to cover begin with. */
+static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
+                                          size_t bytes, const terrimp_rect *rects,
+                                          uint32_t capacity, const uint32_t *count,
+                                          terrimpi_cover *c)
+{
+    size_t needed;
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
+    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
+}
+
+/* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
+   room; returns how many they are. Parts stand behind what they are parts of. */
+static uint32_t terrimpi_cover_prune(terrimpi_cover *c, terrimp_rect *rects, uint32_t capacity)
+{
+    uint32_t i, kept = 0;
+    for (i = c->node_count; i-- > 0;) {
+        terrimpi_cover_node *n = &c->nodes[i];
+        uint32_t sum = 0, k;
+        for (k = 0; k < n->part_count; k++)
+            sum += c->nodes[n->parts + k].cost;
+        if (n->part_count && sum < n->cost)
+            n->cost = sum;
+        else
+            n->part_count = 0;
+    }
+    for (i = 0; i < c->node_count; i++)
+        c->nodes[i].cost = i == 0; /* from here on: whether it is left */
+    for (i = 0; i < c->node_count; i++) {
+        const terrimpi_cover_node *n = &c->nodes[i];
+        uint32_t k;
+        for (k = 0; n->cost && k < n->part_count; k++)
+            c->nodes[n->parts + k].cost = 1;
+        if (n->cost && !n->part_count && kept++ < capacity)
+            rects[kept - 1u] = n->rect;
+    }
+    return kept;
+}
+
+TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
+                                         size_t bytes, terrimp_rect *rects, uint32_t capacity,
+                                         uint32_t *count)
+{
+    terrimpi_cover c;
+    uint32_t i, kept;
+    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
+    c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
+    for (i = 0; i < c.node_count; i++)
+        terrimpi_cover_split(&c, i);
+    kept = terrimpi_cover_prune(&c, rects, capacity);
+    TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
+    *count = terrimpi_cover_join(&c, rects, kept);
+    return TERRIMP_OK;
+}
+
+/* A box of cells, ends excluded, and how many of them are filled. */
+typedef struct terrimpi_grow_box {
+    uint32_t x0, y0, x1, y1, filled;
+} terrimpi_grow_box;
+
+/* How many cells of a box are filled, on a grid that is a mask. */
+static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
+                                     uint32_t x1, uint32_t y1)
+{
+    uint32_t y, word, filled = 0;
+    for (y = y0; y < y1 && x0 < x1; y++)
+        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
+            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
+    return filled;
+}
+
+/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
+static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
+                              int dy, terrimpi_grow_box *out)
+{
+    *out = *b;
+    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
+        (dy > 0 && b->y1 == g->height))
+        return 0;
+    out->x0 -= dx < 0;
+    out->x1 += dx > 0;
+    out->y0 -= dy < 0;
+    out->y1 += dy > 0;
+    if (dx)
+        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
+                                            dx < 0 ? b->x0 : out->x1, out->y1);
+    if (dy)
+        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
+                                            dy < 0 ? b->y0 : out->y1);
+    return 1;
+}
+
+static float terrimpi_grow_area(const terrimpi_grow_box *b)
+{
+    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
+}
+
+/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
+static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
+                                 terrimpi_grow_box *box)
+{
+    for (;;) {
+        terrimpi_grow_box best = *box, next;
+        float best_ratio = 0.0f;
+        int k;
+        for (k = 0; k < 9; k++) {
+            float ratio;
+            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
+                continue;
+            ratio = (float)(next.filled - box->filled) /
+                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
+            if (ratio > best_ratio) {
+                best_ratio = ratio;
+                best = next;
+            }
+        }
+        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
+            return;
+        *box = best;
+    }
+}
+
+/* The mask of the cells that hold opaque texels. */
+static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
+{
+    terrimp_cover_desc g = c->desc;
+    uint32_t y, word;
+    g.mask = c->cells;
+    g.width = (c->desc.width - 1u) / cell + 1u;
+    g.height = (c->desc.height - 1u) / cell + 1u;
+    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
+    for (y = 0; y < c->desc.height; y++)
+        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
+            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
+            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
+            while (bits) {
+                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
+                row[x / 32u] |= 1u << x % 32u;
+            }
+        }
+    return g;
+}
+
+/* Grows a box from a cell, empties its cells, and returns it in texels. */
+static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
+                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
+{
+    terrimpi_grow_box b;
+    b.x0 = x;
+    b.y0 = y;
+    b.x1 = x + 1u;
+    b.y1 = y + 1u;
+    b.filled = 1;
+    terrimpi_grow_box_up(g, min_fill, &b);
+    for (y = b.y0; y < b.y1; y++)
+        for (x = b.x0; x < b.x1; x++)
+            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
+    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
+                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
+                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
+}
+
+TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
+                                              float min_fill, void *scratch, size_t bytes,
+                                              terrimp_rect *rects, uint32_t capacity,
+                                              uint32_t *count)
+{
+    terrimpi_cover c;
+    terrimp_cover_desc g;
+    uint32_t made = 0, y, word;
+    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
+                        !terrimpi_within_u32(cell, 1, 16384),
+                    TERRIMP_E_RANGE);
+    g = terrimpi_grow_grid(&c, cell);
+    for (y = 0; y < g.height; y++)
+        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
+            uint32_t bits;
+            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
+                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
+                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
+                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
+                terrimpi_cover_tighten(&c, &rects[made++]);
+            }
+        }
+    *count = made;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+                                              uint32_t count, uint32_t gutter,
+                                              terrimp_pack_item *items, uint32_t *order)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || !quads || !items || !order, TERRIMP_E_NULL);
+    for (i = 0; i < count; i++)
+        TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
+                            !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
+                        TERRIMP_E_RANGE);
+    for (i = 0; i < count; i++) {
+        items[i].rect = quads[i].texels;
+        items[i].rect.width += 2u * gutter;
+        items[i].rect.height += 2u * gutter;
+        TERRIMPI_REFUSE(items[i].rect.width > shelves->width ||
+                            items[i].rect.height > shelves->height,
+                        TERRIMP_E_CAPACITY); /* or it would be scaled */
+    }
+    TERRIMPI_TRY(terrimp_pack_ffdh(shelves, items, count, order, NULL));
+    for (i = 0; i < count; i++) {
+        quads[i].x = items[i].rect.x + gutter;
+        quads[i].y = items[i].rect.y + gutter;
+    }
     return TERRIMP_OK;
 }
 

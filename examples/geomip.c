@@ -2,7 +2,7 @@
    selected for each frame, drawn with one index buffer that never changes.
    Build:  make geomip
    Expect: 8 frames of some 35 draws and 18,000 triangles, of the terrain's 524,288; the last
-           one in geomip.png, outlined in a colour for each level. */
+           one in build/geomip.png, outlined in a colour for each level. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/context.h"
@@ -20,7 +20,7 @@ enum { WIDTH = 640, HEIGHT = 512 };
 static terrimp_geomip_node nodes[NODES];
 static terrimp_geomip_mark marks[NODES];
 static terrimp_geomip_draw draws[NODES];
-static float distances[NODES], scratch[1 << 16];
+static float distances[NODES], scratch[SIDE + 2 * QUADS + 2];
 static uint8_t picture[WIDTH * HEIGHT * 3];
 static terrimp_pattern patterns[TERRIMP_PATTERN_COUNT];
 static GLuint arrays[NODES], indices; /* a node has no array until it is drawn */
@@ -53,7 +53,7 @@ static void fill_indices(void)
     glBufferData(GL_ARRAY_BUFFER, sizeof list, list, GL_STATIC_DRAW);
 }
 
-static void fill_vertices(const terrimp_geomip *tree, uint32_t node)
+static void fill_vertices(const terrimp_quadtree *tree, uint32_t node)
 {
     float xyz[GRID][3];
     GLuint buffer; /* the array keeps it */
@@ -68,27 +68,27 @@ static void fill_vertices(const terrimp_geomip *tree, uint32_t node)
     glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
 }
 
-static void draw_nodes(const terrimp_geomip *tree, const terrimp_geomip_view *view, GLint tint,
+static void draw_nodes(const terrimp_quadtree *tree, const terrimp_geomip_view *view, GLint tint,
                        float outlined)
 {
     uint32_t i;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
         const terrimp_pattern *pattern = &patterns[draw->pattern];
-        const float *colour = gl_geomip_colour(draw->level);
-        if (!arrays[draw->node])
-            fill_vertices(tree, draw->node);
+        const float *colour = gl_geomip_colour(draw->node.level);
+        if (!arrays[draw->node.number])
+            fill_vertices(tree, draw->node.number);
         glUniform4f(tint, colour[0], colour[1], colour[2], outlined);
-        glBindVertexArray(arrays[draw->node]);
+        glBindVertexArray(arrays[draw->node.number]);
         glDrawElements(GL_TRIANGLES, (GLsizei)pattern->index_count, GL_UNSIGNED_SHORT,
                        (const void *)(uintptr_t)(pattern->first_index * sizeof(uint16_t)));
     }
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     terrimp_heightfield field = {0};
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view = {0};
     terrimp_camera camera = {0};
     uint16_t *samples = procedural_terrain(SIDE, SIDE, 1);
@@ -97,10 +97,11 @@ int main(void)
     gl_program program;
     int i, saved;
 
+    (void)argc;
     field.samples = samples, field.width = field.depth = SIDE;
     field.format = TERRIMP_FORMAT_U16, field.height_scale = 0.25f * PROCEDURAL_HEIGHT_SCALE;
-    if (!samples || terrimp_geomip_init(&field, QUADS, &tree) != TERRIMP_OK ||
-        tree.node_count > NODES || tree.scratch_count > sizeof scratch / sizeof *scratch)
+    if (!samples || terrimp_quadtree_init(&field, QUADS, &tree) != TERRIMP_OK ||
+        tree.node_count > NODES)
         return 1;
     tree.nodes = nodes;
     view.distances = distances, view.marks = marks, view.draws = draws, view.draw_capacity = NODES;
@@ -143,7 +144,7 @@ int main(void)
     glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
     draw_nodes(&tree, &view, program.tint, 0.6f);
     context_read(&frame, picture);
-    saved = image_write_png("geomip.png", picture, WIDTH, HEIGHT) == NULL;
+    saved = image_write_beside(argv[0], "geomip.png", picture, WIDTH, HEIGHT) == NULL;
     context_close(&frame); /* its buffers and textures go with it */
     free(lightmap), free(samples);
     return !saved;

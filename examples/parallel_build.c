@@ -60,7 +60,7 @@ static double build(const terrimp_terrain_desc *desc, void *memory, int threads,
     pthread_t thread[MOST_THREADS];
     terrimp_result result;
     double start = now();
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     work w;
     int i, started;
     memset(&w, 0, sizeof w);
@@ -69,7 +69,7 @@ static double build(const terrimp_terrain_desc *desc, void *memory, int threads,
     if (result == TERRIMP_OK)
         result = terrimp_terrain_build_begin(w.terrain);
     if (result == TERRIMP_OK) /* how many nodes there are */
-        result = terrimp_geomip_init(&desc->field, desc->chunk_quads, &tree);
+        result = terrimp_quadtree_init(&desc->field, desc->chunk_quads, &tree);
     w.left = tree.node_count;
     w.scratch_bytes = terrimp_terrain_scratch_bytes(desc);
     w.result = result;

@@ -218,14 +218,14 @@ static void fly_view(const terrimp_terrain *terrain, const way *w, const tour *t
 static double fly_geomip(const terrimp_heightfield *field, const way *w, const tour *t,
                          const terrimp_box *box, cost *c)
 {
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view;
     double build_ms = clock_cpu_ms();
     float *scratch;
     size_t i;
-    need(terrimp_geomip_init(field, 0, &tree));
+    need(terrimp_quadtree_init(field, 0, &tree));
     tree.nodes = need_memory(tree.node_count * sizeof *tree.nodes);
-    scratch = need_memory(tree.scratch_count * sizeof *scratch);
+    scratch = need_memory((tree.field.width + 2u * tree.chunk_quads + 2u) * sizeof *scratch);
     need(terrimp_geomip_build(&tree, scratch));
     build_ms = clock_cpu_ms() - build_ms;
     memset(&view, 0, sizeof view);

@@ -1,4 +1,4 @@
-/* Times the Geomipmap room alone, without graphics: building and fitting, then selection with
+/* Times the Geomipmap room alone, without graphics: building, then selection with
    culling and the list of draws, over a flight. Terrains of 4097 x 4097 samples: the procedural one
    (peaks and valleys) and a rough one (noise of all wavelengths); 1280 x 1024 pixels, 60 degrees.
    Times are of the processor; a frame's is the median over the flight, the least of three rounds.
@@ -47,7 +47,7 @@ static uint16_t *rough_terrain(void)
 
 /* A circle over the middle of the terrain, 60 units above the highest ground below, looking ahead
    and somewhat down. */
-static terrimp_camera camera_at(const terrimp_geomip *tree, int frame)
+static terrimp_camera camera_at(const terrimp_quadtree *tree, int frame)
 {
     terrimp_camera c;
     float turn = 6.2831853f * (float)frame / FRAMES, height = 0.0f;
@@ -67,7 +67,7 @@ static terrimp_camera camera_at(const terrimp_geomip *tree, int frame)
     return c;
 }
 
-static void bench_rule(const terrimp_geomip *tree, terrimp_geomip_view *view, const char *name)
+static void bench_rule(const terrimp_quadtree *tree, terrimp_geomip_view *view, const char *name)
 {
     double median = 1e9, draws = 0.0, triangles = 0.0;
     uint32_t most = 0;
@@ -98,10 +98,10 @@ static void bench_terrain(const char *name, uint16_t *samples, float scale, uint
     static const char *const rules[] = {"", "picture", "bound", "distance"};
     static const float tolerances[] = {1.0f, 4.0f};
     terrimp_heightfield field;
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view;
     float *scratch;
-    double start, fit_ms;
+    double start;
     int rule, i;
     memset(&field, 0, sizeof field);
     memset(&view, 0, sizeof view);
@@ -109,22 +109,19 @@ static void bench_terrain(const char *name, uint16_t *samples, float scale, uint
     field.width = field.depth = SIDE;
     field.format = TERRIMP_FORMAT_U16;
     field.height_scale = scale;
-    if (terrimp_geomip_init(&field, quads, &tree) != TERRIMP_OK)
+    if (terrimp_quadtree_init(&field, quads, &tree) != TERRIMP_OK)
         exit(2);
     tree.nodes = allocate(tree.node_count, sizeof *tree.nodes);
-    tree.fits = allocate(tree.fit_count, sizeof *tree.fits);
-    scratch = allocate(tree.scratch_count, sizeof *scratch);
+    scratch = allocate(SIDE + 2u * quads + 2u, sizeof *scratch);
     view.distances = allocate(tree.node_count, sizeof *view.distances);
     view.marks = allocate(tree.node_count, sizeof *view.marks);
     view.draw_capacity = tree.level_first[1];
     view.draws = allocate(view.draw_capacity, sizeof *view.draws);
     start = clock_cpu_ms();
-    terrimp_geomip_fit(&tree, scratch);
-    fit_ms = clock_cpu_ms() - start;
     if (terrimp_geomip_build(&tree, scratch) != TERRIMP_OK)
         exit(2);
-    say("\n%s, chunks of %u: fits %.0f ms, all of the tree %.0f ms\n", name, (unsigned)quads,
-           fit_ms, clock_cpu_ms() - start - fit_ms);
+    say("\n%s, chunks of %u: all of the tree %.0f ms\n", name, (unsigned)quads,
+        clock_cpu_ms() - start);
     say("| rule | select ms | draws | most | triangles |\n|---|--:|--:|--:|--:|\n");
     for (rule = TERRIMP_GEOMIP_PICTURE; rule < (int)TERRIMP_GEOMIP_RULE_COUNT; rule++)
         for (i = 0; i < 2; i++) {
@@ -133,7 +130,6 @@ static void bench_terrain(const char *name, uint16_t *samples, float scale, uint
             bench_rule(&tree, &view, rules[rule]);
         }
     free(tree.nodes);
-    free(tree.fits);
     free(scratch);
     free(view.distances);
     free(view.marks);

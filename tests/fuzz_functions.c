@@ -105,7 +105,8 @@ static void query_field(void)
     float x = fuzz_float(100.0f), z = fuzz_float(100.0f), height, normal[3], low, high;
     uint32_t at_x = 0, at_z = 0;
     terrimp_result sound = terrimp_heightfield_validate(&field, &at_x, &at_z);
-    if (terrimp_heightfield_sample(&field, fuzz_size(40), fuzz_size(40), &height) == TERRIMP_OK)
+    if (terrimp_heightfield_read(&field, fuzz_size(40), fuzz_size(40), 1, 1, 1, &height)
+        == TERRIMP_OK)
         FUZZ_CHECK(fuzz_finite(&height, 1));
     if (terrimp_heightfield_height(&field, x, z, &height) == TERRIMP_OK) {
         FUZZ_CHECK(fuzz_finite(&height, 1));
@@ -216,7 +217,7 @@ static void use_capture(void)
 
 static void judge_picture(void)
 {
-    float captured[3], eye[3], angle, pixels, seconds, rate;
+    float captured[3], eye[3], angle, pixels, seconds;
     point(300.0f, captured);
     point(300.0f, eye);
     if (terrimp_view_angle(&box, captured, eye, &angle) == TERRIMP_OK)
@@ -227,9 +228,6 @@ static void judge_picture(void)
     if (terrimp_impostor_lifetime(fuzz_float(100.0f), fuzz_float(3.0f), fuzz_float(50.0f), &seconds)
         == TERRIMP_OK)
         FUZZ_CHECK(seconds >= 0.0f);
-    if (terrimp_capture_rate(&box, 1, eye, fuzz_float(100.0f), fuzz_float(1.0f), fuzz_float(50.0f),
-                             &rate) == TERRIMP_OK)
-        FUZZ_CHECK(rate >= 0.0f);
 }
 
 /* ---- geomipmap ---- */
@@ -246,25 +244,24 @@ static void use_patterns(void)
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count - 1u) == TERRIMP_E_CAPACITY);
         FUZZ_CHECK(terrimp_pattern_fill(quads, form, indices, count) == TERRIMP_OK);
         for (i = 0; i < count; i++)
-            FUZZ_CHECK(indices[i] < terrimp_pattern_vertex_count(quads, form));
+            FUZZ_CHECK(indices[i] < (quads + 1u) * (quads + 1u));
         free(indices);
     }
 }
 
-static void draw_node(const terrimp_geomip *tree, const terrimp_geomip_draw *draw)
+static void draw_node(const terrimp_quadtree *tree, const terrimp_geomip_draw *draw)
 {
     size_t count = (size_t)(tree->chunk_quads + 1u) * (tree->chunk_quads + 1u);
     terrimp_geomip_vertex *vertices = (terrimp_geomip_vertex *)fuzz_take(count * sizeof *vertices);
     float *xyz = (float *)fuzz_take(count * 3u * sizeof *xyz);
-    FUZZ_CHECK(terrimp_geomip_fill_vertices(tree, draw->node, xyz, vertices) == TERRIMP_OK);
-    FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, TERRIMP_FORM_LIST, draw, vertices, xyz + 1,
-                                    3) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_vertices(tree, draw->node.number, xyz, vertices) == TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_morph(tree->chunk_quads, draw, vertices, xyz + 1, 3) == TERRIMP_OK);
     FUZZ_CHECK(fuzz_finite(xyz, count * 3u));
     free(xyz);
     free(vertices);
 }
 
-static void select_nodes(const terrimp_geomip *tree)
+static void select_nodes(const terrimp_quadtree *tree)
 {
     terrimp_geomip_view view;
     terrimp_box node;
@@ -282,15 +279,15 @@ static void select_nodes(const terrimp_geomip *tree)
     for (frame = fuzz_below(4) + 1u; frame-- > 0; change_camera())
         if (terrimp_geomip_select(tree, &view, &camera) == TERRIMP_OK) {
             FUZZ_CHECK(view.draw_count <= view.draw_capacity);
-            for (i = 0; i < view.draw_count; i++)
-                FUZZ_CHECK(view.draws[i].node < tree->node_count &&
+            for (i = 0; i < view.draw_count; i++) {
+                uint32_t number = view.draws[i].node.number;
+                FUZZ_CHECK(number < tree->node_count &&
                            view.draws[i].pattern < TERRIMP_PATTERN_COUNT &&
-                           terrimp_geomip_box(tree, view.draws[i].node, &node) == TERRIMP_OK);
+                           terrimp_geomip_box(tree, number, &node) == TERRIMP_OK);
+            }
             if (view.draw_count > 0)
                 draw_node(tree, view.draws + fuzz_u8() % view.draw_count);
         }
-    (void)terrimp_geomip_distances(tree, view.rule, fuzz_float(10.0f), fuzz_float(4.0f),
-                                   fuzz_float(1000.0f), view.distances);
     free(view.draws);
     free(view.marks);
     free(view.distances);
@@ -298,22 +295,21 @@ static void select_nodes(const terrimp_geomip *tree)
 
 static void use_geomip(void)
 {
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_weights *weights;
     float *scratch;
     uint32_t quads = fuzz_u8() & 15u ? 4u + 2u * fuzz_below(8) : fuzz_size(130);
-    if (terrimp_geomip_init(&field, quads, &tree) != TERRIMP_OK)
+    if (terrimp_quadtree_init(&field, quads, &tree) != TERRIMP_OK)
         return;
     tree.nodes = (terrimp_geomip_node *)fuzz_take(tree.node_count * sizeof *tree.nodes);
-    scratch = (float *)fuzz_take(tree.scratch_count * sizeof *scratch);
+    scratch = (float *)fuzz_take((tree.field.width + 2u * tree.chunk_quads + 2u) * sizeof *scratch);
     if (terrimp_geomip_build(&tree, scratch) == TERRIMP_OK)
         select_nodes(&tree);
     free(scratch);
     free(tree.nodes);
     weights = (terrimp_geomip_weights *)fuzz_take((size_t)(tree.chunk_quads + 1u)
                                                   * (tree.chunk_quads + 1u) * sizeof *weights);
-    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, TERRIMP_FORM_LIST, weights) ==
-               TERRIMP_OK);
+    FUZZ_CHECK(terrimp_geomip_fill_weights(tree.chunk_quads, weights) == TERRIMP_OK);
     free(weights);
 }
 
@@ -323,11 +319,11 @@ static void use_geomip(void)
 static uint32_t border_samples(const float *tile, uint32_t cols, uint32_t rows, int side,
                                float *out)
 {
-    uint32_t count = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1 ? cols : rows, i;
+    uint32_t count = side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1 ? cols : rows, i;
     for (i = 0; i < count; i++)
-        out[i] = side == TERRIMP_BORDER_Z0   ? tile[i]
-                 : side == TERRIMP_BORDER_Z1 ? tile[(rows - 1u) * cols + i]
-                 : side == TERRIMP_BORDER_X0 ? tile[i * cols]
+        out[i] = side == TERRIMP_SIDE_Z0   ? tile[i]
+                 : side == TERRIMP_SIDE_Z1 ? tile[(rows - 1u) * cols + i]
+                 : side == TERRIMP_SIDE_X0 ? tile[i * cols]
                                              : tile[i * cols + cols - 1u];
     return count;
 }
@@ -355,8 +351,8 @@ static void finish_mesh(const float *tile, uint32_t cols, uint32_t rows, terrimp
     raise.amount = fuzz_float(1.0f);
     (void)terrimp_mesh_raise(&raise, mesh, work);
     free(work);
-    (void)terrimp_mesh_add_lower_skirt(mesh, fuzz_float(-100.0f));
-    (void)terrimp_mesh_add_upper_skirt(mesh, fuzz_float(10.0f));
+    (void)terrimp_mesh_add_skirt(mesh, 0, fuzz_float(-100.0f));
+    (void)terrimp_mesh_add_skirt(mesh, 1, fuzz_float(10.0f));
     check_mesh(mesh, cols, rows);
 }
 

@@ -53,9 +53,9 @@ static void *build_part(void *user)
 static void build_in_threads(const terrimp_terrain_desc *desc, terrimp_terrain *terrain)
 {
     part parts[THREADS];
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     uint32_t i;
-    CHECK(terrimp_geomip_init(&desc->field, desc->chunk_quads, &tree) == TERRIMP_OK);
+    CHECK(terrimp_quadtree_init(&desc->field, desc->chunk_quads, &tree) == TERRIMP_OK);
     CHECK(terrimp_terrain_build_begin(terrain) == TERRIMP_OK);
     for (i = 0; i < THREADS; i++) {
         parts[i].terrain = terrain;

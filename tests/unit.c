@@ -1,5 +1,5 @@
 /* All unit tests: header only, no graphics.
-   Build: cc -std=c99 -I. tests/unit.c -lm -o unit && ./unit
+   Build: cc -std=c99 -I. tests/unit.c -lm -o unit && ./unit [part of a test's name]
    Expect: a last line `N passed, 0 failed`, in less than 10 s. */
 #include <stdlib.h>
 
@@ -19,6 +19,7 @@ static void *unit_malloc(size_t bytes)
 
 #include "check.h"
 #include "unit_heightfield.h"
+#include "unit_quadtree.h"
 #include "unit_geomipmap.h"
 #include "unit_simplifier.h"
 #include "unit_camera.h"
@@ -29,10 +30,18 @@ static void *unit_malloc(size_t bytes)
 #include "unit_sorted.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
+#include "unit_layers.h"
+#include "unit_golden.h"
 
-int main(void)
+int main(int argc, char **argv)
 {
+    check_only = argc > 1 ? argv[1] : NULL;
+    if (check_only && strcmp(check_only, "golden") == 0) {
+        golden_print();
+        return check_bad != 0;
+    }
     heightfield_tests();
+    quadtree_tests();
     geomipmap_tests();
     simplifier_tests();
     camera_tests();
@@ -43,5 +52,7 @@ int main(void)
     view_tests();
     sorted_tests();
     bad_input_tests();
+    layers_tests();
+    golden_tests();
     return check_report();
 }

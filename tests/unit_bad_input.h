@@ -140,7 +140,7 @@ static void heightfield_queries_refuse(void)
     bad = good;
     bad.width = 0;
     REFUSES(TERRIMP_E_RANGE, at, terrimp_heightfield_validate(&bad, &at.x, &at.z));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_sample(&bad, 0, 0, out));
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_read(&bad, 0, 0, 1, 1, 1, out));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_read(&bad, 0, 0, 1, 1, 1, out));
     REFUSES(TERRIMP_E_RANGE, range,
             terrimp_heightfield_bounds(&bad, 0, 0, 1, 1, &range.low, &range.high));
@@ -150,10 +150,10 @@ static void heightfield_queries_refuse(void)
     REFUSES(TERRIMP_E_RANGE, count,
             terrimp_heightfield_fill_voids(&bad, flat_samples, scratch, sizeof scratch, &count));
     REFUSES(TERRIMP_E_NULL, at, terrimp_heightfield_validate(NULL, &at.x, &at.z));
-    REFUSES(TERRIMP_E_NULL, out, terrimp_heightfield_sample(NULL, 0, 0, out));
-    GIVES(TERRIMP_E_NULL, terrimp_heightfield_sample(&good, 0, 0, NULL));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_sample(&good, 5, 0, out));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_sample(&good, 0, 0xffffffffu, out));
+    REFUSES(TERRIMP_E_NULL, out, terrimp_heightfield_read(NULL, 0, 0, 1, 1, 1, out));
+    GIVES(TERRIMP_E_NULL, terrimp_heightfield_read(&good, 0, 0, 1, 1, 1, NULL));
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_read(&good, 5, 0, 1, 1, 1, out));
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_read(&good, 0, 0xffffffffu, 1, 1, 1, out));
     GIVES(TERRIMP_E_NULL, terrimp_heightfield_read(&good, 0, 0, 1, 1, 1, NULL));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_read(&good, 5, 0, 1, 1, 1, out));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_heightfield_read(&good, 0, 0, 0, 1, 1, out));
@@ -209,7 +209,7 @@ static void heightfield_queries_refuse(void)
     holes.no_data = 7.0f;
     REFUSES(TERRIMP_E_VOID, count,
             terrimp_heightfield_fill_voids(&holes, flat_samples, scratch, bytes, &count));
-    REFUSES(TERRIMP_E_VOID, out, terrimp_heightfield_sample(&holes, 0, 0, out));
+    REFUSES(TERRIMP_E_VOID, out, terrimp_heightfield_read(&holes, 0, 0, 1, 1, 1, out));
     REFUSES(TERRIMP_E_VOID, out, terrimp_heightfield_height(&holes, 1.0f, 1.0f, out));
     REFUSES(TERRIMP_E_VOID, range,
             terrimp_heightfield_bounds(&holes, 0, 0, 5, 4, &range.low, &range.high));
@@ -266,12 +266,12 @@ static void simplifier_refuses(void)
     desc.cols = 5;
     desc.rows = 4;
     desc.triangle_budget = 20;
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
-        static terrimp_border_point kept[TERRIMP_BORDER_COUNT][8];
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
+        static terrimp_border_point kept[TERRIMP_SIDE_COUNT][8];
         float samples[5];
-        uint32_t along_x = i == TERRIMP_BORDER_Z0 || i == TERRIMP_BORDER_Z1, k;
+        uint32_t along_x = i == TERRIMP_SIDE_Z0 || i == TERRIMP_SIDE_Z1, k;
         uint32_t count = along_x ? 5u : 4u, step = along_x ? 1u : 5u;
-        uint32_t first = i == TERRIMP_BORDER_Z1 ? 15u : i == TERRIMP_BORDER_X1 ? 4u : 0u;
+        uint32_t first = i == TERRIMP_SIDE_Z1 ? 15u : i == TERRIMP_SIDE_X1 ? 4u : 0u;
         for (k = 0; k < count; k++)
             samples[k] = flat_samples[first + k * step];
         GIVES(TERRIMP_OK, terrimp_border_simplify(samples, count, 2, kept[i], 8, &point_count));
@@ -338,8 +338,8 @@ static void simplifier_refuses(void)
     raise.rows = 4;
     raise.amount = 1.0f;
     MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_raise(&raise, &mesh, work));
-    MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_add_lower_skirt(&mesh, 0.0f));
-    MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_add_upper_skirt(&mesh, 1.0f));
+    MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_add_skirt(&mesh, 0, 0.0f));
+    MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_add_skirt(&mesh, 1, 1.0f));
     GIVES(TERRIMP_OK, terrimp_simplify(&desc, scratch, bytes, &mesh));
     before = mesh;
     GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(NULL, &mesh, work));
@@ -353,16 +353,16 @@ static void simplifier_refuses(void)
     GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad_raise, &mesh, work));
     bad_raise.amount = not_finite(0);
     GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&bad_raise, &mesh, work));
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_add_lower_skirt(NULL, 0.0f));
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_add_upper_skirt(NULL, 0.0f));
-    GIVES(TERRIMP_E_RANGE, terrimp_mesh_add_upper_skirt(&mesh, -1.0f));
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_add_skirt(NULL, 0, 0.0f));
+    GIVES(TERRIMP_E_NULL, terrimp_mesh_add_skirt(NULL, 1, 0.0f));
+    GIVES(TERRIMP_E_RANGE, terrimp_mesh_add_skirt(&mesh, 1, -1.0f));
     for (i = 0; i < 3; i++) {
-        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_add_lower_skirt(&mesh, not_finite(i)));
-        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_add_upper_skirt(&mesh, not_finite(i)));
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_add_skirt(&mesh, 0, not_finite(i)));
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_add_skirt(&mesh, 1, not_finite(i)));
     }
     mesh.index_capacity = before.index_capacity = mesh.index_count + 1u;
-    GIVES(TERRIMP_E_CAPACITY, terrimp_mesh_add_lower_skirt(&mesh, 0.0f));
-    GIVES(TERRIMP_E_CAPACITY, terrimp_mesh_add_upper_skirt(&mesh, 1.0f));
+    GIVES(TERRIMP_E_CAPACITY, terrimp_mesh_add_skirt(&mesh, 0, 0.0f));
+    GIVES(TERRIMP_E_CAPACITY, terrimp_mesh_add_skirt(&mesh, 1, 1.0f));
     CHECK(memcmp(&mesh, &before, sizeof mesh) == 0);
 #undef MESH_REFUSES
 }
@@ -583,15 +583,6 @@ static void impostor_functions_refuse(void)
         REFUSES(TERRIMP_E_NOT_FINITE, out, terrimp_impostor_lifetime(not_finite(i), 1, 1, &out));
         REFUSES(TERRIMP_E_NOT_FINITE, out, terrimp_impostor_lifetime(1, not_finite(i), 1, &out));
         REFUSES(TERRIMP_E_NOT_FINITE, out, terrimp_impostor_lifetime(1, 1, not_finite(i), &out));
-        REFUSES(TERRIMP_E_NOT_FINITE, out,
-                terrimp_capture_rate(&box, 1, eye, not_finite(i), 1, 1, &out));
-        REFUSES(TERRIMP_E_NOT_FINITE, out,
-                terrimp_capture_rate(&box, 1, eye, 1, not_finite(i), 1, &out));
-        REFUSES(TERRIMP_E_NOT_FINITE, out,
-                terrimp_capture_rate(&box, 1, eye, 1, 1, not_finite(i), &out));
-        memcpy(wrong, eye, sizeof wrong);
-        wrong[i] = not_finite(i);
-        REFUSES(TERRIMP_E_NOT_FINITE, out, terrimp_capture_rate(&box, 1, wrong, 1, 1, 1, &out));
     }
     GIVES(TERRIMP_E_NULL, terrimp_impostor_lifetime(1, 1, 1, NULL));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_impostor_lifetime(-1, 1, 1, &out));
@@ -599,15 +590,6 @@ static void impostor_functions_refuse(void)
     REFUSES(TERRIMP_E_RANGE, out, terrimp_impostor_lifetime(1, 3.2f, 1, &out));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_impostor_lifetime(1, 1, 0, &out));
     REFUSES(TERRIMP_E_RANGE, out, terrimp_impostor_lifetime(1, 1, -1, &out));
-    REFUSES(TERRIMP_E_NULL, out, terrimp_capture_rate(NULL, 1, eye, 1, 1, 1, &out));
-    REFUSES(TERRIMP_E_NULL, out, terrimp_capture_rate(&box, 1, NULL, 1, 1, 1, &out));
-    GIVES(TERRIMP_E_NULL, terrimp_capture_rate(&box, 1, eye, 1, 1, 1, NULL));
-    GIVES(TERRIMP_OK, terrimp_capture_rate(NULL, 0, eye, 1, 1, 1, &out));
-    CHECK(out == 0.0f);
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_capture_rate(&box, 1, eye, 0, 1, 1, &out));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_capture_rate(&box, 1, eye, -1, 1, 1, &out));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_capture_rate(&box, 1, eye, 1, 4, 1, &out));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_capture_rate(&box, 1, eye, 1, 1, 0, &out));
 }
 
 /* Sizes and distances close to what a float holds give an error or an answer, never undefined
@@ -1252,16 +1234,6 @@ static void too_little_room_for_ground_is_an_error(void)
     land_free(&l);
 }
 
-/* A picture that is renewed all the time has no rate. */
-static void pictures_without_a_lifetime_have_no_rate(void)
-{
-    terrimp_box box;
-    terrimp_capture capture;
-    float eye[3], rate;
-    good_capture(&box, eye, &capture);
-    REFUSES(TERRIMP_E_RANGE, rate, terrimp_capture_rate(&box, 1, eye, 5.0f, 0.0f, 1.0f, &rate));
-}
-
 static void meshes_are_not_raised_by_bad_numbers(void)
 {
     static float work[2 * 1000];
@@ -1305,52 +1277,40 @@ static void geomip_functions_refuse(void)
 {
     terrimp_heightfield bad;
     mip_scene s;
-    terrimp_geomip out;
+    terrimp_quadtree out;
     terrimp_box box;
     terrimp_geomip_weights weights[25];
     terrimp_geomip_vertex vertices[25];
     terrimp_geomip_draw draw;
-    float distances[200], heights[25];
+    terrimp_camera camera;
+    float heights[25];
     int i;
     memset(&draw, 0, sizeof draw);
     memset(vertices, 0, sizeof vertices);
-    mip_make(&s, TERRIMP_FORM_LIST, 33, 33, 4);
+    mip_make(&s, 33, 33, 4);
     bad = s.tree.field;
     bad.width = 1;
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_geomip_init(&bad, 4, &out));
+    REFUSES(TERRIMP_E_RANGE, out, terrimp_quadtree_init(&bad, 4, &out));
     REFUSES(TERRIMP_E_NULL, box, terrimp_geomip_box(NULL, 0, &box));
     REFUSES(TERRIMP_E_RANGE, box, terrimp_geomip_box(&s.tree, s.tree.node_count, &box));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_fit(NULL, s.scratch));
     GIVES(TERRIMP_E_NULL, terrimp_geomip_build_finish(NULL));
-    REFUSES(TERRIMP_E_NULL, distances,
-            terrimp_geomip_distances(NULL, 0, 1.0f, 1.0f, 500.0f, distances));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 500.0f, NULL));
-    REFUSES(TERRIMP_E_RANGE, distances,
-            terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, 0.0f, distances));
-    REFUSES(TERRIMP_E_RANGE, distances,
-            terrimp_geomip_distances(&s.tree, TERRIMP_GEOMIP_RULE_COUNT, 1.0f, 1.0f, 500.0f,
-                                     distances));
-    for (i = 0; i < 3; i++) {
-        float wrong = not_finite(i);
-        terrimp_camera camera;
+    mip_random_camera(&s, &camera);
+    for (i = 0; i < 9; i++) {
         terrimp_geomip_view view = s.view;
-        mip_random_camera(&s, &camera);
-        REFUSES(TERRIMP_E_NOT_FINITE, distances,
-                terrimp_geomip_distances(&s.tree, 0, wrong, 1.0f, 500.0f, distances));
-        REFUSES(TERRIMP_E_NOT_FINITE, distances,
-                terrimp_geomip_distances(&s.tree, 0, 1.0f, wrong, 500.0f, distances));
-        REFUSES(TERRIMP_E_NOT_FINITE, distances,
-                terrimp_geomip_distances(&s.tree, 0, 1.0f, 1.0f, wrong, distances));
-        view.hysteresis = wrong;
+        float *fields[3];
+        fields[0] = &view.tolerance_px;
+        fields[1] = &view.morph_ratio;
+        fields[2] = &view.hysteresis;
+        *fields[i / 3] = not_finite(i % 3);
         GIVES(TERRIMP_E_NOT_FINITE, terrimp_geomip_select(&s.tree, &view, &camera));
     }
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_fill_weights(4, TERRIMP_FORM_LIST, NULL));
-    REFUSES(TERRIMP_E_RANGE, weights, terrimp_geomip_fill_weights(3, TERRIMP_FORM_LIST, weights));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, NULL, 1));
-    REFUSES(TERRIMP_E_NULL, heights,
-            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, NULL, vertices, heights, 1));
-    REFUSES(TERRIMP_E_RANGE, heights,
-            terrimp_geomip_morph(4, TERRIMP_FORM_LIST, &draw, vertices, heights, 0));
+    s.view.rule = TERRIMP_GEOMIP_RULE_COUNT;
+    GIVES(TERRIMP_E_RANGE, terrimp_geomip_select(&s.tree, &s.view, &camera));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_fill_weights(4, NULL));
+    REFUSES(TERRIMP_E_RANGE, weights, terrimp_geomip_fill_weights(3, weights));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_morph(4, &draw, vertices, NULL, 1));
+    REFUSES(TERRIMP_E_NULL, heights, terrimp_geomip_morph(4, NULL, vertices, heights, 1));
+    REFUSES(TERRIMP_E_RANGE, heights, terrimp_geomip_morph(4, &draw, vertices, heights, 0));
     mip_free(&s);
 }
 
@@ -1419,7 +1379,6 @@ static void bad_input_tests(void)
     RUN(views_refuse);
     RUN(samples_outside_of_the_named_range_are_refused);
     RUN(too_little_room_for_ground_is_an_error);
-    RUN(pictures_without_a_lifetime_have_no_rate);
     RUN(meshes_are_not_raised_by_bad_numbers);
     RUN(geomip_functions_refuse);
     RUN(pictures_are_not_tightened_or_split_by_bad_numbers);

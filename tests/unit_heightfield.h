@@ -210,13 +210,13 @@ static void hf_nan_is_a_void_only_with_has_no_data(void)
     field.no_data = -9999.0f;
     CHECK(terrimp_heightfield_validate(&field, &x, &z) == TERRIMP_E_NOT_FINITE);
     CHECK(x == 271 && z == 1);
-    CHECK(terrimp_heightfield_sample(&field, 271, 1, &height) == TERRIMP_E_NOT_FINITE);
+    CHECK(terrimp_heightfield_read(&field, 271, 1, 1, 1, 1, &height) == TERRIMP_E_NOT_FINITE);
     CHECK(terrimp_heightfield_bounds(&field, 0, 0, 300, 2, &low, &high) == TERRIMP_E_NOT_FINITE);
     CHECK(terrimp_heightfield_height(&field, 270.5f, 0.5f, &height) == TERRIMP_E_NOT_FINITE);
     CHECK(height == 5.0f && low == 3.0f && high == 4.0f);
     field.has_no_data = 1;
     CHECK(terrimp_heightfield_validate(&field, &x, &z) == TERRIMP_E_VOID);
-    CHECK(terrimp_heightfield_sample(&field, 271, 1, &height) == TERRIMP_E_VOID);
+    CHECK(terrimp_heightfield_read(&field, 271, 1, 1, 1, 1, &height) == TERRIMP_E_VOID);
     CHECK(terrimp_heightfield_bounds(&field, 0, 0, 300, 2, &low, &high) == TERRIMP_OK);
     CHECK(low == 0.0f && high == 0.0f);
     samples[571] = FLT_MAX; /* a sample may be finite and its height not */
@@ -236,7 +236,7 @@ static void hf_samples_and_tiles_are_offset_plus_scale_times_sample(void)
         hf_random(&f, random_range(2, 24), random_range(2, 24));
         x = random_range(0, f.view.width - 1);
         z = random_range(0, f.view.depth - 1);
-        CHECK(terrimp_heightfield_sample(&f.view, x, z, &height) == TERRIMP_OK);
+        CHECK(terrimp_heightfield_read(&f.view, x, z, 1, 1, 1, &height) == TERRIMP_OK);
         CHECK(height == hf_height(&f, x, z));
         tile[rows * cols] = 12345.0f; /* one past the end */
         CHECK(terrimp_heightfield_read(&f.view, x, z, cols, rows, stride, tile) == TERRIMP_OK);
@@ -250,8 +250,10 @@ static void hf_samples_and_tiles_are_offset_plus_scale_times_sample(void)
                     at_z = f.view.depth - 1u;
                 CHECK(tile[r * cols + c] == hf_height(&f, (uint32_t)at_x, (uint32_t)at_z));
             }
-        CHECK(terrimp_heightfield_sample(&f.view, f.view.width, z, &height) == TERRIMP_E_RANGE);
-        CHECK(terrimp_heightfield_sample(&f.view, x, f.view.depth, &height) == TERRIMP_E_RANGE);
+        CHECK(terrimp_heightfield_read(&f.view, f.view.width, z, 1, 1, 1, &height) ==
+              TERRIMP_E_RANGE);
+        CHECK(terrimp_heightfield_read(&f.view, x, f.view.depth, 1, 1, 1, &height) ==
+              TERRIMP_E_RANGE);
     }
 }
 
@@ -324,8 +326,8 @@ static void hf_read_and_bounds_refuse_bad_arguments(void)
 
     hf_random(&f, 5, 4);
     CHECK(terrimp_heightfield_validate(NULL, NULL, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_heightfield_sample(NULL, 0, 0, out) == TERRIMP_E_NULL);
-    CHECK(terrimp_heightfield_sample(&f.view, 0, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_heightfield_read(NULL, 0, 0, 1, 1, 1, out) == TERRIMP_E_NULL);
+    CHECK(terrimp_heightfield_read(&f.view, 0, 0, 1, 1, 1, NULL) == TERRIMP_E_NULL);
     CHECK(terrimp_heightfield_read(NULL, 0, 0, 1, 1, 1, out) == TERRIMP_E_NULL);
     CHECK(terrimp_heightfield_read(&f.view, 0, 0, 1, 1, 1, NULL) == TERRIMP_E_NULL);
     CHECK(terrimp_heightfield_read(&f.view, 5, 0, 1, 1, 1, out) == TERRIMP_E_RANGE);

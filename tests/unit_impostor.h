@@ -407,32 +407,6 @@ static void lifetime_keeps_the_view_angle(void)
     }
 }
 
-static void capture_rate_is_the_sum_over_distant_boxes(void)
-{
-    int i, n;
-    for (i = 0; i < 300; i++) {
-        static const float middle[3] = {0.0f, 0.0f, 0.0f};
-        terrimp_box boxes[40];
-        float eye[3], beyond = random_float(0.5f, 60.0f), angle = random_float(0.01f, 1.5f);
-        float speed = random_float(0.1f, 100.0f), rate = -1.0f;
-        double wanted = 0.0;
-        size_t count = random_range(0, 40);
-        random_vector(0.0f, 10.0f, eye);
-        for (n = 0; n < 40; n++) {
-            float place[3];
-            random_vector(0.0f, 100.0f, place);
-            random_box(n ? place : middle, 10.0f, &boxes[n]);
-        }
-        for (n = 0; n < (int)count; n++) {
-            double d = (double)terrimp_box_distance(&boxes[n], eye);
-            if (d >= (double)beyond)
-                wanted += (double)speed / (d * sin((double)angle));
-        }
-        CHECK(terrimp_capture_rate(boxes, count, eye, beyond, angle, speed, &rate) == TERRIMP_OK);
-        CHECK(fabs((double)rate - wanted) <= 1e-4 * wanted);
-    }
-}
-
 enum { RIDGE_SIDE = 17 };
 
 /* A level grid, 10 to 26 in front of the eye, with a ridge along x in its row `ridge`. */
@@ -522,7 +496,6 @@ static void impostor_tests(void)
     RUN(parallax_error_ends);
     RUN(lifetime_is_that_of_hess);
     RUN(lifetime_keeps_the_view_angle);
-    RUN(capture_rate_is_the_sum_over_distant_boxes);
     RUN(capture_split_stands_behind_what_hides);
 }
 

@@ -130,7 +130,7 @@ static void land_span(const land *l, uint32_t node, uint32_t first[2], uint32_t 
 static float land_sample(const land *l, uint32_t x, uint32_t z)
 {
     float height = -1e30f;
-    CHECK(terrimp_heightfield_sample(&l->desc.field, x, z, &height) == TERRIMP_OK);
+    CHECK(terrimp_heightfield_read(&l->desc.field, x, z, 1, 1, 1, &height) == TERRIMP_OK);
     return height;
 }
 
@@ -331,7 +331,7 @@ static int same_place(const land *l, const terrimp_mesh_info *mesh, uint32_t a, 
     return p[0] == q[0] && p[1] == q[1];
 }
 
-static int hangs(const land *l, const terrimp_mesh_info *mesh, uint32_t border, uint32_t foot,
+static uint32_t hangs(const land *l, const terrimp_mesh_info *mesh, uint32_t border, uint32_t foot,
                  float low, float deep)
 {
     float from = l->xyz[(size_t)(mesh->base_vertex + border) * 3u + 1u];

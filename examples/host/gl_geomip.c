@@ -16,21 +16,19 @@ static gl_program make_program(const gl_geomip *g, const char *fragment)
 
 /* ---- Opening ------------------------------------------------------------ */
 
-/* Lists, with heights that are fitted. */
-enum { FORM = TERRIMP_FORM_FITTED };
+enum { FORM = TERRIMP_FORM_LIST };
 
 static size_t vertex_count(const gl_geomip *g)
 {
-    return terrimp_pattern_vertex_count(g->tree.chunk_quads, FORM);
+    return (size_t)(g->tree.chunk_quads + 1u) * (g->tree.chunk_quads + 1u);
 }
 
 /* What the tree and its view keep; close frees it. */
 static int allocate(gl_geomip *g)
 {
-    const terrimp_geomip *t = &g->tree;
+    const terrimp_quadtree *t = &g->tree;
     size_t nodes = t->node_count, vertices = vertex_count(g);
     g->tree.nodes = malloc(nodes * sizeof *t->nodes);
-    g->tree.fits = malloc((t->fit_count + 1u) * sizeof *t->fits);
     g->view.distances = malloc(nodes * sizeof *g->view.distances);
     g->view.marks = calloc(nodes, sizeof *g->view.marks);
     g->view.draw_capacity = t->level_x[0] * t->level_z[0]; /* a tiling has no more */
@@ -39,13 +37,14 @@ static int allocate(gl_geomip *g)
     g->vertices = calloc(nodes, sizeof *g->vertices);
     g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
     g->moves = malloc(vertices * sizeof *g->moves);
-    return t->nodes && t->fits && g->view.distances && g->view.marks && g->view.draws && g->arrays
-           && g->vertices && g->xyz && g->moves;
+    return t->nodes && g->view.distances && g->view.marks && g->view.draws && g->arrays &&
+           g->vertices && g->xyz && g->moves;
 }
 
 static terrimp_result build(gl_geomip *g)
 {
-    float *scratch = malloc(g->tree.scratch_count * sizeof *scratch);
+    size_t count = g->tree.field.width + 2u * g->tree.chunk_quads + 2u;
+    float *scratch = malloc(count * sizeof *scratch);
     terrimp_result result = TERRIMP_E_MEMORY;
     if (scratch)
         result = terrimp_geomip_build(&g->tree, scratch);
@@ -80,7 +79,7 @@ static terrimp_result fill_weights(gl_geomip *g)
     terrimp_geomip_weights *weights = malloc(count * sizeof *weights);
     terrimp_result result = TERRIMP_E_MEMORY;
     if (weights)
-        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, FORM, weights);
+        result = terrimp_geomip_fill_weights(g->tree.chunk_quads, weights);
     if (result == TERRIMP_OK) {
         glGenBuffers(1, &g->weights);
         glBindBuffer(GL_ARRAY_BUFFER, g->weights);
@@ -94,7 +93,7 @@ static terrimp_result fill_weights(gl_geomip *g)
 static const char *fill(gl_geomip *g, const terrimp_heightfield *field, uint32_t chunk_quads)
 {
     terrimp_result result =
-        terrimp_geomip_init(field, chunk_quads ? chunk_quads : 32, &g->tree);
+        terrimp_quadtree_init(field, chunk_quads ? chunk_quads : 32, &g->tree);
     if (result == TERRIMP_OK && !allocate(g))
         result = TERRIMP_E_MEMORY;
     if (result == TERRIMP_OK)
@@ -141,7 +140,6 @@ void gl_geomip_close(gl_geomip *g)
     glDeleteProgram(g->ground.id);
     glDeleteProgram(g->line.id);
     free(g->tree.nodes);
-    free(g->tree.fits);
     free(g->view.distances);
     free(g->view.marks);
     free(g->view.draws);
@@ -216,7 +214,7 @@ terrimp_result gl_geomip_update(gl_geomip *g, const terrimp_camera *camera, terr
     for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
         terrimp_box box;
         float distance;
-        result = terrimp_geomip_box(&g->tree, g->view.draws[i].node, &box);
+        result = terrimp_geomip_box(&g->tree, g->view.draws[i].node.number, &box);
         distance = terrimp_box_distance(&box, camera->eye);
         closest = distance < closest ? distance : closest;
         distance = terrimp_box_farthest(&box, camera->eye);
@@ -235,13 +233,13 @@ static void draw_node(const gl_geomip *g, const gl_program *p, const terrimp_geo
 {
     const terrimp_pattern *pattern = &g->patterns[draw->pattern];
     if (p == &g->line)
-        glUniform3fv(p->tint, 1, gl_geomip_colour(draw->level));
+        glUniform3fv(p->tint, 1, gl_geomip_colour(draw->node.level));
     if (is_morphing(g)) {
         glUniform1f(p->morph, draw->morph);
         glUniform4fv(p->side, 1, draw->side);
         glUniform4fv(p->side_coarse, 1, draw->side_coarse);
     }
-    glBindVertexArray(g->arrays[draw->node]);
+    glBindVertexArray(g->arrays[draw->node.number]);
     glDrawElements(GL_TRIANGLES, (GLsizei)pattern->index_count, GL_UNSIGNED_SHORT,
                    (const void *)(uintptr_t)(pattern->first_index * sizeof(uint16_t)));
 }
@@ -254,13 +252,12 @@ static terrimp_result draw_all(gl_geomip *g, const gl_program *p)
     glUseProgram(p->id);
     glUniformMatrix4fv(p->matrix, 1, GL_FALSE, g->gl->camera_matrix);
     glUniform3fv(p->eye, 1, g->gl->camera_eye);
-    glUniform1f(p->scale, 1.0f);
     glUniform4fv(p->field, 1, g->gl->field);
     glBindTexture(GL_TEXTURE_2D, g->gl->lightmap);
     for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {
         const terrimp_geomip_draw *draw = &g->view.draws[i];
-        if (!g->arrays[draw->node])
-            result = make_node(g, draw->node);
+        if (!g->arrays[draw->node.number])
+            result = make_node(g, draw->node.number);
         if (result == TERRIMP_OK)
             draw_node(g, p, draw);
     }

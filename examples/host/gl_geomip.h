@@ -8,7 +8,7 @@
 
 typedef struct gl_geomip {
     gl_terrain *gl;                  /* not its own */
-    terrimp_geomip tree;
+    terrimp_quadtree tree;
     terrimp_geomip_view view;
     terrimp_pattern patterns[TERRIMP_PATTERN_COUNT];
     GLuint *arrays, *vertices;       /* [node_count] 0 until the node is drawn */
