@@ -1562,8 +1562,9 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
 
 /* Begins a frame: finds the footprint of the camera and, with max_triangles, the scale.
 
-   Errors     E_RANGE also when the eye is more than 2^23 samples from the origin, or z_far reaches
-              over more than 2^27 quads, with TERRIMP_FIXED 2000; after any, next returns 0
+   Errors     E_RANGE also when the eye is more than 2^23 samples from the origin, or when z_far
+              reaches over more than 1024 pages, with TERRIMP_FIXED also 2048 quads less three
+              pages. After any error next returns 0
    Cost       about 2 us; with max_triangles one to two thirds of what next takes for the whole
               frame, more for the first
    Source     Finch and Bishop 1998, sections 4.3 and 4.10 */
@@ -2751,7 +2752,8 @@ static int terrimpi_quad_normal(const terrimpi_quad *quad, int side, float norma
 /* [wu] after which a field that wraps repeats itself. */
 static float terrimpi_period(const terrimp_heightfield *f, int axis)
 {
-    return axis == 0 ? f->spacing_x * (float)(f->width - 1u) : f->spacing_z * (float)(f->depth - 1u);
+    return axis == 0 ? f->spacing_x * (float)(f->width - 1u)
+                     : f->spacing_z * (float)(f->depth - 1u);
 }
 
 /* Takes a coordinate to the repetition that the samples lie in; what it is moved by, in periods. */
@@ -9244,6 +9246,8 @@ static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3], float re
     spacing[0] = d->field.spacing_x;
     spacing[1] = d->field.spacing_z;
     larger = terrimpi_max(spacing[0], spacing[1]);
+    if (!(reach < 1024.0f * (float)d->page_quads))
+        return 0;
     while (unit > 8.0f && !((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
         unit *= 0.5f;
     if (!((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
