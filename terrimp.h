@@ -4302,8 +4302,8 @@ static uint32_t terrimpi_pack_side(uint32_t side, float scale)
     return scale < 1.0f && side ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
 }
 
-/* Finds places for all at a scale; returns whether there are. `shelves` lists the first rectangle of
-   each shelf, whose x meanwhile says how far the shelf is taken. */
+/* Finds places for all at a scale; returns whether there are. `shelves` lists the first rectangle
+   of each shelf, whose x meanwhile says how far the shelf is taken. */
 static int terrimpi_pack_try(uint32_t width, uint32_t height, terrimp_rect *rects, uint32_t count,
                              const uint32_t *order, uint32_t *shelves, float scale)
 {

@@ -1,6 +1,6 @@
-/* Two atlases in turn, after Hess 2010, section 4.3, on top of terrimp_pack_ffdh: pictures move from
-   the outdated atlas to the newest one as they are renewed; when all have moved, the outdated atlas
-   is emptied, packed anew and becomes the newest one. What the live atlas is measured against. */
+/* Two atlases in turn, after Hess 2010, section 4.3, on top of terrimp_pack_ffdh: pictures move
+   from the outdated atlas to the newest one as they are renewed; when all have moved, the outdated
+   atlas is emptied, packed anew and becomes the newest one. What the live atlas is measured against. */
 #ifndef ATLAS_PAIR_H
 #define ATLAS_PAIR_H
 
@@ -47,7 +47,7 @@ static void pair_init(atlas_pair *pair, uint32_t width, uint32_t height, pair_sh
     }
 }
 
-/* First fit: the lowest shelf with room for a rectangle, or a new one. Returns whether it fitted. */
+/* First fit: the lowest shelf with room for a rectangle, or a new one. Returns whether it fits. */
 static int pair_insert(const atlas_pair *pair, pair_atlas *atlas, terrimp_rect *rect)
 {
     pair_shelf *shelf = atlas->shelves, *end = shelf + atlas->count;
@@ -71,7 +71,7 @@ static int pair_insert(const atlas_pair *pair, pair_atlas *atlas, terrimp_rect *
     return 1;
 }
 
-/* Empties the outdated atlas, packs a set of sizes into it, all reduced alike where they do not fit,
+/* Empties the outdated atlas, packs a set of sizes into it, all reduced alike if they do not fit,
    and makes it the newest. Every slot loses what it had in that atlas; what it has in the other one
    stays. Returns whether they fitted.
 

@@ -800,7 +800,8 @@ static void churn_free(churn *c)
     c->held[i] = c->held[--c->held_count];
 }
 
-/* Slots come until the load is reached, then go in random order; a load of 0 frees the cheapest instead. */
+/* Slots come until the load is reached, then go in random order; with a load of 0 the
+   cheapest go instead. */
 static void churn_at(uint32_t smallest, uint32_t largest, float load)
 {
     const double area = (double)PAIR_SIDE * PAIR_SIDE;

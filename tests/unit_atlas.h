@@ -1,5 +1,5 @@
-/* Laws of the atlas room: first-fit decreasing height, the pair of atlases that tests and benchmarks
-   make of it, the live atlas. */
+/* Laws of the atlas room: first-fit decreasing height, the pair of atlases that tests and
+   benchmarks make of it, the live atlas. */
 #ifndef UNIT_ATLAS_H
 #define UNIT_ATLAS_H
 
