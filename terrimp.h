@@ -49,9 +49,11 @@
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
        >>view         the per-frame decision, the schedule, the draw commands
+       >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
 
@@ -112,9 +114,14 @@
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
-       as they were unless their comment says otherwise. NaN, infinities, null pointers, sizes out
-       of their limits and products that overflow are errors in every build; asserts are for this
-       header's own mistakes. terrimp_result_text says what to do.
+       as they were unless their comment says otherwise. Any of them may return, in every build,
+       and their comments do not repeat it:
+         E_NULL                a pointer is null that is not said to be optional
+         E_RANGE, E_NOT_FINITE a number is outside of its limits, or NaN or infinite
+         E_OVERFLOW, E_MEMORY  sizes multiply to more than size_t holds; a block is too small
+         E_ALIGN, E_CAPACITY   a pointer is not aligned for its type; an output array is too small
+         E_STATE               an object is not ready: before init, build_finish, the first update
+       Asserts are for this header's own mistakes. terrimp_result_text says what to do.
 
    THREADS AND DETERMINISM
        No globals, no statics that change. Nodes may be built by several threads at once, each
@@ -161,7 +168,9 @@
        de Boer  W. H. de Boer, Fast Terrain Rendering Using Geometrical MipMapping, 2000
        Wagner   D. Wagner, Terrain Geomorphing in the Vertex Shader, in ShaderX2, 2003
        FFDH     E. G. Coffman, M. R. Garey, D. S. Johnson, R. E. Tarjan, Performance Bounds for
-                Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980 */
+                Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980
+       Jeschke  S. Jeschke, Accelerating the Rendering Process Using Impostors, dissertation, TU
+                Wien, 2004: layers */
 
 /* ==== Configuration ====================================================== >>config */
 
@@ -280,14 +289,9 @@ typedef struct terrimp_heightfield {
 
    in         what the caller filled in
    out        receives the effective descriptor; may be in itself
-   Errors     E_NULL  in, out or in->samples is null
-              E_RANGE a size, the format, a spacing or the scale is outside its limits; row_bytes is
-                      shorter than a row or no multiple of a sample; the spacing is so fine, or the
-                      origin so distant, that a float cannot tell neighbouring columns apart; a
-                      sample of the integer formats would get an infinite height
-              E_NOT_FINITE  a spacing, the scale, the offset or the origin is NaN or infinite
-              E_OVERFLOW    the samples span more than size_t holds
-              E_ALIGN       samples is not aligned for the format
+   Errors     E_RANGE also when row_bytes is shorter than a row or no multiple of a sample; when the
+              spacing is so fine, or the origin so distant, that a float cannot tell neighbouring
+              columns apart; when a sample of the integer formats would get an infinite height
    Cost       O(1); the samples are not read */
 TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield *in,
                                                        terrimp_heightfield *out);
@@ -296,8 +300,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
 
    x, z       receive its column and row on E_VOID, and on E_NOT_FINITE if a sample is the cause;
               NULL: not wanted
-   Errors     those of resolve; E_VOID  the sample is a void;
-              E_NOT_FINITE  the height of the sample is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample
    Cost       O(width * depth) */
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z);
@@ -308,9 +311,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
    cols, rows size of the tile in samples [Limits: >= 1]
    stride     steps of the field from one sample of the tile to the next [Limits: >= 1]
    out        [rows][cols] [wu] receives the heights; must not overlap the samples
-   Errors     those of resolve; E_NULL  out is null; E_RANGE  an argument is outside its limits;
-              E_OVERFLOW  the tile is larger than size_t holds; E_VOID  the tile has a void;
-              E_NOT_FINITE  a height of the tile is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample in the tile
    Cost       O(cols * rows), read twice: out is written only once the tile is known to be good */
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
                                                     uint32_t z, uint32_t cols, uint32_t rows,
@@ -321,8 +322,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
    x, z       column and row of the first sample [Limits: inside the field]
    cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
    low, high  [wu] receive the heights
-   Errors     those of resolve; E_NULL  low or high is null; E_RANGE  an argument is outside its
-              limits; E_VOID  every sample is a void; E_NOT_FINITE  a height is NaN or infinite
+   Errors     E_VOID when every sample is a void; E_NOT_FINITE for such a height
    Cost       O(cols * rows) */
 TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, uint32_t cols, uint32_t rows,
@@ -332,8 +332,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
 
    x, z       [wu] position; the outline of the field belongs to it
    height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_NOT_FINITE  x, z or a height of the
-              quad; E_MISS  the position is outside the field; E_VOID  the position is in a hole
+   Errors     E_MISS outside of the field; E_VOID in a hole; E_NOT_FINITE also for heights
    Cost       O(1) */
 TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield *field, float x,
                                                       float z, float *height);
@@ -362,9 +361,7 @@ typedef struct terrimp_ray_hit {
    direction     [3] any length but zero
    max_distance  [wu] end of the ray [Limits: > 0; FLT_MAX for no end]
    hit           receives the meeting; NULL: not wanted
-   Errors        those of resolve; E_NULL  origin or direction is null;
-                 E_NOT_FINITE  origin, direction or max_distance is NaN or infinite;
-                 E_RANGE  direction is zero or max_distance <= 0; E_MISS  the ray meets nothing
+   Errors        E_MISS when the ray meets nothing
    Cost          O(number of quads below the ray), at most width + depth
    Source        Amanatides and Woo 1987, A fast voxel traversal algorithm: the walk */
 TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield *field,
@@ -388,22 +385,21 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera.
-   Errors: E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits. */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
+   camera. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
 /* View and projection matrix, for column vectors, column-major.
 
    view          [16] out, world to eye space (x right, y up, looking along -z)
-   projection    [16] out, eye space to clip space
-   Errors        those of terrimp_camera_resolve */
+   projection    [16] out, eye space to clip space */
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16]);
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
    height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-   Errors: those of terrimp_camera_resolve. Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
+   Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
 /* The six planes of a viewing volume. A point p is inside plane i when
@@ -419,7 +415,7 @@ enum {
     TERRIMP_PLANES_OUTSIDE = -1
 };
 
-/* The planes of a camera. Errors: those of terrimp_camera_resolve. */
+/* The planes of a camera. */
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum);
 
@@ -452,8 +448,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE when a minimum exceeds its maximum; E_INSIDE when the
-              eye is in the box; E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
+              E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -463,13 +459,12 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
    sides touch their projections. The clip distances stay.
 
    xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
-   Errors       E_NULL; E_RANGE; E_BEHIND when a point is not in front of the eye: the capture is
-                unchanged
+   Errors       E_BEHIND when a point is not in front of the eye: the capture is unchanged
    Cost         O(count) */
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count);
 
-/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
+/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16]);
@@ -498,8 +493,7 @@ typedef struct terrimp_quadtree {
 /* Lays the quadtree out; nodes is left NULL for the caller to set.
 
    chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
-                fewer triangles, for the same picture
-   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
+                fewer triangles, for the same picture */
 TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
                                                  uint32_t chunk_quads, terrimp_quadtree *tree);
 
@@ -533,8 +527,7 @@ typedef struct terrimp_pattern {
 
    chunk_quads  quads along a node's side [Limits: even, 4..128]
    form         terrimp_form
-   pattern      [Limits: < TERRIMP_PATTERN_COUNT]
-   Errors       E_NULL; E_RANGE */
+   pattern      [Limits: < TERRIMP_PATTERN_COUNT] */
 TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, uint32_t pattern,
                                                 terrimp_pattern *found);
 
@@ -547,7 +540,6 @@ TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form)
    are transformed for each triangle at chunk_quads 16, 0.55 at 64.
 
    indices     [terrimp_pattern_index_count] out
-   Errors      E_NULL; E_RANGE; E_CAPACITY
    Source      de Boer 2000, section 2.3.2 (borders); Wagner 2003 (strips with degenerate joins) */
 TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
                                                 size_t capacity);
@@ -563,7 +555,7 @@ typedef struct terrimp_geomip_node {
     float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
 } terrimp_geomip_node;
 
-/* The box of a node. Errors: E_NULL; E_RANGE. */
+/* The box of a node. */
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box);
 
@@ -622,8 +614,8 @@ typedef struct terrimp_geomip_view {
    level, those outside of the camera's view are left out.
 
    view       in: settings and arrays; out: draws, draw_count, triangle_count
-   Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
-              before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
+   Errors     E_CAPACITY: draw_count is 0, draws_needed says how many there are. After others the
+              draws of the frame before stay
    Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
    Source     de Boer 2000, sections 2.2 and 2.3.1, equations 1 to 2 */
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
@@ -655,13 +647,12 @@ typedef struct terrimp_geomip_weights {
 /* Fills the vertices of a node of any level, row by row.
 
    xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
-   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
-   Errors     E_NULL (also when both are NULL); E_RANGE */
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted */
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices);
 
-/* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
+/* Fills the weights of a node's vertices, for all nodes the same.
 
    weights    [(chunk_quads + 1)^2] out */
 TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
@@ -674,7 +665,6 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
    vertices   [(chunk_quads + 1)^2] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
-   Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
@@ -699,7 +689,6 @@ typedef struct terrimp_rect {
    size             [2] out, width and height; rounded up
    scale            out, 1, or the factor by which the picture was reduced to keep to `largest`;
                     may be NULL
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equations 3.3 and 3.4 */
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
@@ -709,8 +698,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
    at its rim then stay inside the slot.
 
    capture    in and out
-   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin]
-   Errors     E_NULL; E_RANGE */
+   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin] */
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
@@ -720,7 +708,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
-   Errors          E_NULL; E_RANGE when the slot is empty or leaves the atlas
+   Errors          E_RANGE when the slot is empty or leaves the atlas
    Source          Hess 2010, section 3.4, made projective: interpolating s and t themselves would
                    bend the picture inside large triangles */
 TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
@@ -728,14 +716,13 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. Errors: E_NULL. */
+   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
                                                        size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
    angle_rad    out, 0..pi
-   Errors       E_NULL; E_NOT_FINITE
    Source       Hess 2010, section 3.5: all corners, since an eye can approach the centre of a large
                 impostor without turning around it */
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
@@ -750,7 +737,7 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
                   pass the vertical one: with meshes that stand proud the bound then held for every
                   sample that a capture saw, but at grazing angles (measured: up to 1.1 times it)
    error_px       out; +infinity when the eye is within `error` of the box and has moved
-   Errors         E_NULL; E_NOT_FINITE; E_RANGE when error < 0 or pixel_factor <= 0
+   Errors         E_RANGE when error < 0 or pixel_factor <= 0
    Source         own derivation, in the implementation; DESIGN: err * sin(theta) * K / d, with the
                   sine bounded over the whole box, not sampled at its corners */
 TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
@@ -763,7 +750,6 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
    max_angle_rad    [Limits: 0..pi]; from pi/2 on the angle needs a path of `distance`
    speed            [wu/s] of the eye [Limits: > 0]
    seconds          out
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equation 3.6: t = D sin(alpha) / S */
 TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_angle_rad,
                                                      float speed, float *seconds);
@@ -788,8 +774,7 @@ typedef struct terrimp_split {
               [Limits: > 0]
    overlap    [wu] by which each part goes beyond the place of the split, since the mesh is not the
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also for an index beyond the vertices or a count not of
-              triangles
+   Errors     E_RANGE, also for an index beyond the vertices or a count not of triangles
    Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
@@ -808,8 +793,8 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
               out: the sizes that fitted, and the places
    order      [2 * count] out: the first half is the order of insertion; the rest is scratch
    scale      out: what the sizes were multiplied by, 1 when they fitted; may be NULL
-   Errors     E_NULL; E_RANGE; E_CAPACITY when not even one texel each fits: only places and order
-              may have changed
+   Errors     E_RANGE; E_CAPACITY when not even one texel each fits: only places and order may
+              have changed
    Cost       O(n^1.5 + n * shelves) for each step, no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
@@ -843,7 +828,6 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 
    memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
    bytes      at least terrimp_live_atlas_bytes(desc)
-   Errors     E_NULL; E_RANGE; E_OVERFLOW; E_ALIGN; E_MEMORY
    Cost       O(max_slots) */
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
@@ -852,14 +836,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
 /* Finds room for a rectangle and keeps it.
 
    slot       out: its handle, < max_slots, until it is freed
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it fits
-              nowhere or all slots are in use: counted as a failure, nothing else changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it fits nowhere or all slots are in
+              use: counted as a failure, nothing else changes
    Cost       O(free rectangles), which are about twice as many as slots */
 TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, uint32_t *slot);
 
 /* Frees a slot: what borders on it grows together with it.
-   Errors: E_NULL; E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
+   Errors: E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
@@ -869,7 +853,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
    width, height  the size wanted [Limits: 1..65536]
    size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
               its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
-   Errors     E_NULL; E_STATE before init; E_RANGE
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
@@ -924,8 +907,7 @@ typedef struct terrimp_terrain_info {
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
 
-/* Writes the effective descriptor, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_heightfield_resolve. */
+/* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
 
@@ -936,7 +918,7 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
    morph      nonzero: also the nodes beside them whose morph data has changed
    nodes      [capacity] out, rising; NULL: only counted
    count      out: how many there are, also when they are more than capacity
-   Errors     E_NULL; E_RANGE; E_STATE; E_CAPACITY: nodes is untouched
+   Errors     E_CAPACITY: nodes is untouched
    Cost       O(count) */
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, int morph,
@@ -948,11 +930,11 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
                                                     terrimp_terrain_info *info);
 
 /* The box of everything that is drawn of a node and of all nodes below it: samples, coarse meshes,
-   skirts. Errors: E_NULL; E_RANGE; E_STATE. */
+   skirts. */
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box);
 
-/* The place and the quality of a node's coarse mesh. Errors: E_NULL; E_RANGE; E_STATE. */
+/* The place and the quality of a node's coarse mesh. */
 typedef struct terrimp_mesh_info {
     uint32_t base_vertex, vertex_count; /* in the vertices of terrimp_terrain_fill_meshes */
     uint32_t first_index, index_count;  /* in its indices */
@@ -967,8 +949,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
    terrimp_terrain_fill_ground. Triangle list, counter-clockwise from above. First stand the
    patterns of terrimp_pattern_fill with TERRIMP_FORM_LIST, then the strips that captures draw.
 
-   indices    [ground_index_count] out
-   Errors     E_NULL; E_CAPACITY; E_STATE */
+   indices    [ground_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *terrain,
                                                         uint16_t *indices, size_t capacity);
 
@@ -977,8 +958,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
 
    node        of any level [Limits: < node_count]
    xyz         [ground_vertex_count][3] out
-   capacity    floats
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity    floats */
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity);
 
@@ -986,8 +966,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
    say the weights that terrimp_geomip_fill_weights gives for chunk_quads and TERRIMP_FORM_LIST.
 
    vertices   [ground_vertex_count] out
-   capacity   of vertices
-   Errors     E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity   of vertices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
                                                       uint32_t node,
                                                       terrimp_geomip_vertex *vertices,
@@ -999,8 +978,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
    node        [Limits: <= node_count] node_count: the floor, behind all others
    xyz         [mesh_vertex_stride][3] out; for the floor what is left of mesh_vertex_count
    indices     [mesh_index_stride] out; the same
-   capacities  floats, indices
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacities  floats, indices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                      float *xyz, size_t xyz_capacity,
                                                      uint16_t *indices, size_t index_capacity);
@@ -1009,8 +987,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
    count from the base vertex of each mesh.
 
    xyz         [mesh_vertex_count][3] out
-   indices     [mesh_index_count] out
-   Errors      E_NULL; E_CAPACITY; E_STATE */
+   indices     [mesh_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *terrain, float *xyz,
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity);
@@ -1051,7 +1028,7 @@ typedef struct terrimp_bake_info {
 
    block      [bytes] aligned to 8 bytes
    info       out; NULL: not wanted
-   Errors     E_NULL; E_ALIGN; E_BAKE; E_ORDER when it has to be converted first
+   Errors     E_BAKE; E_ORDER when it has to be converted first
    Cost       O(nodes), about 1 us for each */
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
                                               terrimp_bake_info *info);
@@ -1061,7 +1038,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
 
    block      [bytes] aligned to 8 bytes
    out        [capacity] aligned to 8 bytes; may be block, else apart from it
-   Errors     E_NULL; E_ALIGN; E_CAPACITY; E_BAKE: out, if it is not block, may have changed */
+   Errors     E_BAKE: out, if it is not block, may have changed */
 TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
                                                 size_t capacity);
 
@@ -1084,7 +1061,7 @@ TERRIMP_API size_t terrimp_terrain_open_bytes(void);
    memory         [memory_bytes] aligned to 8 bytes, at least terrimp_terrain_open_bytes
    terrain        out: lies in memory
    Errors         those of check and of terrimp_heightfield_resolve; E_BAKE for a field of another
-                  size, format, scale or offset; E_MEMORY
+                  size, format, scale or offset
    Cost           that of check */
 TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field,
                                                 const void *block, size_t bytes, void *memory,
@@ -1262,8 +1239,7 @@ typedef struct terrimp_stats {
                                     enough, then draw with these; z_near is 0 within a box */
 } terrimp_stats;
 
-/* Writes the effective settings for a terrain, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; E_STATE when the terrain is not built. */
+/* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out);
@@ -1276,17 +1252,16 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 
    terrain    built; outlives the view
    memory     [bytes] aligned to 8 bytes
-   view       out: lies in memory
-   Errors     those of terrimp_view_desc_resolve; E_MEMORY; E_ALIGN */
+   view       out: lies in memory */
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
-   Errors     E_NULL; those of terrimp_camera_resolve; E_CAPACITY when more than max_ground chunks
-              are in sight in mode FULL or IMPOSTOR: the frame before stays. In GEOMIP and AUTO
-              E_CAPACITY when even ground at 1000 px needs more nodes: there is no frame then
+   Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR: the
+              frame before stays. In GEOMIP and AUTO E_CAPACITY when even ground at 1000 px needs
+              more nodes: there is no frame then
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
@@ -1299,7 +1274,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
-/* Errors: E_NULL; E_STATE before the first update. */
+/* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when the light has changed or textures were lost. */
@@ -1308,8 +1283,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
    x, z       column and row of the first sample [Limits: inside the field]
-   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
-   Errors     E_NULL; E_RANGE */
+   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut */
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows);
 
@@ -1325,6 +1299,59 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view);
 #endif /* TERRIMP_NO_MALLOC */
 
 /* ==== stop here if you only draw what has been built ====================== */
+
+/* ==== Layers ============================================================= >>layers */
+
+/* A piece of scenery, for instance a wood or a village, as pictures that stand one behind the
+   other: its layers. All are taken from one reference point, in the middle of the side of a view
+   cell that faces the scenery, and serve every eye in that cell. Each shows what lies between two
+   depths. They stand so close that between two of them nothing shows through, and so that nothing
+   appears farther than an allowed angle from where it is. Depths are measured from the reference
+   point along the direction of view. Room Layer builder makes them. */
+typedef struct terrimp_layers {
+    uint32_t count;        /* layer 0 is the closest */
+    uint32_t even_count;   /* this layer and those before it are evenly spaced in 1 / depth */
+    float start, end;      /* [wu] the depths that they stand for; end may be infinite */
+    float first, last;     /* 1 / depth of the first and of the last layer */
+    float step;            /* by which 1 / depth falls from one evenly spaced layer to the next */
+    float shrink, shift;   /* beyond: by which part of itself, and by how much else, it falls */
+    float texel;           /* tangent that one texel of each layer covers at the reference point */
+} terrimp_layers;
+
+/* The depth at which a layer stands [wu]. layers is not null, layer < its count. O(log(count)). */
+TERRIMP_API float terrimp_layer_depth(const terrimp_layers *layers, uint32_t layer);
+
+/* The depth at which layer - 1 ends and layer begins [wu]: start for 0, end for count. In between
+   what is off by parallax is shared equally: Jeschke 2004, equation 3.6, which at the reference
+   point is the middle in 1 / depth. */
+TERRIMP_API float terrimp_layer_border(const terrimp_layers *layers, uint32_t layer);
+
+/* The layer that stands for a depth; the first or the last one for depths out of the range.
+   O(log(count)^2). */
+TERRIMP_API uint32_t terrimp_layer_of(const terrimp_layers *layers, float depth);
+
+/* A rectangle of a layer that is drawn. */
+typedef struct terrimp_layer_quad {
+    terrimp_rect texels; /* of the layer's picture; row 0 is the lowest */
+    uint32_t layer;
+    uint32_t x, y;       /* where the atlas holds its lowest left texel */
+} terrimp_layer_quad;
+
+/* Corners and texture coordinates of a quad, counter-clockwise as the cell sees it. Its texture
+   needs no perspective: the quad is parallel to the picture.
+
+   picture     the capture of the layers: eye at the reference point; texels of layers->texel count
+               from tan_left and tan_down
+   atlas       [2] width and height of the atlas [texels]
+   xyz         [4][3] out [wu]
+   st          [4][2] out, 0..1 over the atlas; may be NULL
+   Errors      E_NULL; E_RANGE for a layer that is not there or an empty atlas
+   Cost        O(log(count)) */
+TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
+                                                 const terrimp_capture *picture,
+                                                 const terrimp_layer_quad *quad,
+                                                 const uint32_t atlas[2], float xyz[12],
+                                                 float st[8]);
 
 #ifndef TERRIMP_NO_BUILD
 
@@ -1399,7 +1426,6 @@ typedef struct terrimp_mesh {
                samples than that many points is kept whole, sample by sample
    points      [capacity] out; capacity of inner_limit + 2 (or count) is always enough
    point_count out: points written
-   Errors      NULL, RANGE, NOT_FINITE, CAPACITY; outputs untouched
    Cost        O(count^2), no allocation; about 20 us for 65 samples, 3 KB of stack
    Source      Hess 2010, section 3.1, fig. 3.2 */
 TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_t count,
@@ -1417,8 +1443,7 @@ TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
 
    triangle_budget   0 -> TERRIMP_TRIANGLE_BUDGET [Limits: ..TERRIMP_MAX_TRIANGLES]
    vertex_capacity   out
-   index_capacity    out
-   Errors            NULL, RANGE; outputs untouched */
+   index_capacity    out */
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                                                  uint32_t *vertex_capacity,
                                                  uint32_t *index_capacity);
@@ -1433,9 +1458,8 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
    scratch        [scratch_bytes] aligned for int64_t; contents need not outlive the call
    scratch_bytes  at least terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget)
    mesh           in: arrays and capacities; out: everything else
-   Errors         NULL; RANGE (sizes, budget too small for the borders, border positions that do
-                  not rise from 0 to the end, corners that disagree); NOT_FINITE; MEMORY; ALIGN;
-                  CAPACITY; the mesh is untouched then
+   Errors         E_RANGE also for a budget that is too small for the borders, border positions that
+                  do not rise from 0 to the end, corners that disagree
    Cost           O(cols rows + budget^2); about 0.65 ms for 65 x 65 at the default budget
    Source         Hess 2010, section 3.1; the fit of heights after Lindstrom and Turk's idea that
                   a moved vertex beats a chosen one, here along y alone */
@@ -1453,7 +1477,7 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
    upper   0: the lower skirt
    height  [wu] of the lower skirt, its bottom, as a rule the node's least height; a border vertex
            that lies lower gets a wall of no height. Of the upper one, its rise [Limits: >= 0]
-   Errors  NULL; NOT_FINITE; RANGE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
+   Errors  E_STATE when the mesh has no surface yet
    Source  Hess 2010, section 4.2 */
 TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
 
@@ -1476,7 +1500,7 @@ typedef struct terrimp_raise_desc {
    desc    how far
    mesh    in: a mesh of that tile without skirts; out: its heights
    work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
-   Errors  NULL; RANGE; NOT_FINITE; STATE when the mesh has no surface or has skirts; mesh untouched
+   Errors  E_STATE when the mesh has no surface or has skirts
    Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
    Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
@@ -1501,9 +1525,8 @@ TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, 
    scratch         aligned for float; NULL is E_NULL even if there is no void
    scratch_bytes   at least terrimp_heightfield_fill_voids_scratch_bytes(width, depth)
    filled_count    receives the number of filled samples, 0 without has_no_data; NULL: not wanted
-   Errors          those of resolve; E_NULL; E_RANGE  samples is not field->samples;
-                   E_ALIGN  scratch; E_MEMORY  scratch_bytes; E_VOID  no sample is valid;
-                   E_NOT_FINITE  a height is NaN or infinite. No sample changes on errors.
+   Errors          E_RANGE also when samples is not field->samples; E_VOID when no sample is valid;
+                   E_NOT_FINITE for such a height. No sample changes then
    Cost            O(width * depth); some 0.35 s for 3601 x 3601 samples of which half are void
    Source          Bornemann and Deuflhard 1996, The cascadic multigrid method: from coarse to fine,
                    with more relaxation the coarser the grid */
@@ -1518,15 +1541,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
    built at the same time by threads with scratch arrays of their own.
 
    scratch    [field.width + 2 * chunk_quads + 2]
-   Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
+   Errors     at level 0 E_VOID, E_NOT_FINITE for such a sample
    Cost       O(samples of the node) */
 TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch);
 
-/* Ends the building: parents hold what their children hold. Errors: E_NULL. */
+/* Ends the building: parents hold what their children hold. */
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
@@ -1540,8 +1563,7 @@ TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *des
 /* Lays a terrain out in the caller's block. No sample is read, nothing is built yet.
 
    memory     [bytes] aligned to 8 bytes; freed by the caller when the terrain is no longer used
-   terrain    out: lies in memory
-   Errors     those of terrimp_terrain_desc_resolve; E_MEMORY; E_ALIGN; E_OVERFLOW */
+   terrain    out: lies in memory */
 TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc, void *memory,
                                                 size_t bytes, terrimp_terrain **terrain);
 
@@ -1549,8 +1571,8 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
    can be built in any order and still meet. Looks at every sample, unless the descriptor names the
    range. To be called once, before any node is built.
 
-   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or
-              the sum of its squares over all samples
+   Errors     E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or the sum
+              of its squares over all samples
    Cost       O(width * depth), about 1.5 ns a sample; O(1) when the range is named */
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain);
 
@@ -1560,16 +1582,16 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 
    node       [Limits: < node_count]
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_RANGE, also for a sample outside of the named range; E_MEMORY; E_ALIGN;
-              E_STATE before build_begin; E_VOID, E_NOT_FINITE for such a sample
+   Errors     E_RANGE, also for a sample outside of the named range; E_VOID, E_NOT_FINITE for such a
+              sample
    Cost       1.4 ms for 64 x 64 quads at level 0; at every level that, and the visits to all of the
               node's samples, 25 ns for each
    Source     Hess 2010, section 6.5, asks for meshes of several chunks */
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
-/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_NULL;
-   E_STATE when a node has not been built. */
+/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_STATE when
+   a node has not been built. */
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain);
 
 /* Begins, builds all nodes, one after the other, and finishes. Errors: those of the three above. */
@@ -1585,9 +1607,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
    samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
               it begins inside the field]; what reaches over the last column and row is cut
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_MEMORY; E_ALIGN; E_RANGE for a rectangle outside of the limits or a height
-              outside of the range; E_VOID, E_NOT_FINITE for such a sample; E_STATE before
-              build_finish and for a terrain that uses a bake. Nothing has changed then
+   Errors     E_RANGE for a rectangle outside of the limits or a height outside of the range;
+              E_VOID, E_NOT_FINITE for such a sample; E_STATE before build_finish and for a terrain
+              that uses a bake. Nothing has changed then
    Cost       that of build_node for each such node: the root has every sample. A host that cannot
               wait calls build_node itself, a few nodes a frame, from the finest level up */
 TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
@@ -1615,10 +1637,129 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
-   Errors     E_NULL; E_STATE before build_finish; E_OVERFLOW; E_CAPACITY; E_ALIGN
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
+
+/* ==== Layer builder ====================================================== >>layer-builder */
+
+/* From where layers are to be seen, and what they show. The cell is a box, or a shaft that opens
+   away from the scenery; the reference point is the middle of its side that faces the scenery. */
+typedef struct terrimp_layers_desc {
+    float distance;      /* (required) [wu] from that side to the scenery [Limits: > 0] */
+    float depth;         /* [wu] of the scenery [Limits: >= 0, may be infinite] */
+    float cell_size[2];  /* [wu] width and height of that side [Limits: >= 0] */
+    float cell_depth;    /* [wu] of the cell [Limits: >= 0, may be infinite] */
+    float cell_tan[2];   /* by how much half its width and half its height grow on the way back: 0
+                            for a box [Limits: >= 0] */
+    float view_tan[2];   /* (required) largest offset of the scenery from the middle of the picture,
+                            to the side and up or down, as a tangent [Limits: > 0] */
+    float texel;         /* (required) tangent of a texel. 1 / K of the sharpest view, or less: then
+                            no eye of the cell sees a texel larger than a pixel [Limits: > 0] */
+    float tolerance_rad; /* largest angle between where a point is and where it appears
+                            [Limits: >= 0] [Default 0 -> texel] */
+    int even;            /* nonzero: all steps of 1 / depth are alike, so that planes stay planes in
+                            the grid of a depth mesh. Takes more layers for shafts, and for scenery
+                            wider than the cell */
+} terrimp_layers_desc;
+
+/* Places the layers. No line of sight from the cell passes a layer more than one texel, in either
+   direction, beside where it passes the next: so texels uncover at most what is right behind them.
+
+   layers     out. Its count is the answer for those that only want to know the price
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed, as for
+              scenery without end that is seen from a cell without end
+   Cost       O(log(count)), no list is made
+   Source     Jeschke 2004, equations 3.1 to 3.7, derived anew: implementation */
+TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
+                                               terrimp_layers *layers);
+
+/* --- hidden texels (Jeschke 3.4) --- */
+
+/* The opaque texels of a layer, in bits: bit x % 32 of word [y][x / 32] for texel (x, y), rows of
+   TERRIMP_MASK_WORDS(width) words. Bits beyond the width may be anything. */
+#define TERRIMP_MASK_WORDS(width) (((width) + 31u) / 32u)
+
+typedef enum terrimp_cull_rule {
+    TERRIMP_CULL_DEFAULT = 0, /* same as CORNERS */
+    TERRIMP_CULL_BLOCK,       /* hidden behind 3 x 3 texels: one mask of state */
+    TERRIMP_CULL_CORNERS,     /* hidden from each quarter of the cell behind 2 x 2 texels, which may
+                                 be others each time: finds more, four masks of state */
+    TERRIMP_CULL_COUNT
+} terrimp_cull_rule;
+
+/* Finds the texels of a layer that no eye of the cell can see, for the closer layers hide them.
+   Called for one layer after the other, the closest first; all of one size. What is hidden hides
+   what is behind it in turn. Never culls what can be seen, if the layers stand as planned, or
+   closer together.
+
+   opaque     [height][TERRIMP_MASK_WORDS(width)]
+   rule       terrimp_cull_rule
+   state      [1 or 4][height][TERRIMP_MASK_WORDS(width)] in and out; 0 before the first layer
+   visible    [height][TERRIMP_MASK_WORDS(width)] out: those opaque texels that can be seen; may be
+              opaque itself
+   Errors     E_NULL; E_RANGE for an empty layer or a rule that is none
+   Cost       O(width * height / 32): 0.05 ms for 512 x 512
+   Source     Jeschke 2004, sections 3.4 and 3.4.1 */
+TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
+                                              uint32_t height, int rule, uint32_t *state,
+                                              uint32_t *visible);
+
+/* --- rectangles that hold all opaque texels (Jeschke 3.5) --- */
+
+typedef struct terrimp_cover_desc {
+    const uint32_t *mask; /* (required) [height][TERRIMP_MASK_WORDS(width)] opaque texels */
+    uint32_t width;       /* (required) [texels] [Limits: 1..16384] */
+    uint32_t height;      /* (required) [texels] [Limits: 1..16384] */
+    uint32_t quad_cost;   /* what a rectangle costs, in texels: 20 for 80 bytes of vertices, if a
+                             texel has 4 [Limits: 1..2^24] [Default 0 -> 20] */
+    uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
+} terrimp_cover_desc;
+
+/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
+   numbers of the descriptor are outside of their limits or capacity is 0. */
+TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
+
+/* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
+   rectangles becomes small: cuts in two, where that leaves the fewest texels, until no cut can
+   pay; takes back the cuts that did not pay; then joins rectangles where that does.
+
+   scratch    aligned to 8 bytes
+   rects      [capacity] out, without gutter
+   count      out: how many there are; none for an empty mask
+   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY
+   Cost       about O(width * height / 32 * log(count)) */
+TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
+                                         size_t bytes, terrimp_rect *rects, uint32_t capacity,
+                                         uint32_t *count);
+
+/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
+   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
+
+   cell       [texels] side of a cell [Limits: 1..16384]
+   min_fill   [Limits: 0..1] he found 0.8 to work well
+   Errors     those of terrimp_cover
+   Source     Jeschke 2004, section 3.5 */
+TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
+                                              float min_fill, void *scratch, size_t bytes,
+                                              terrimp_rect *rects, uint32_t capacity,
+                                              uint32_t *count);
+
+/* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
+   fills with copies of its outermost texels. Never scales.
+
+   shelves     in: where; empty or partly filled; out: its top is the height that was needed
+   quads       [count] in: texels; out: x and y
+   gutter      [texels] [Limits: 0..64]
+   items       [count] scratch; out: PLACED in the flags of those that were
+   order       [count] scratch
+   Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
+               fit: quads are unchanged, and the shelves hold what did
+   Cost        that of terrimp_pack_ffdh
+   Source      Jeschke 2004, section 3.6, without his powers of two */
+TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+                                              uint32_t count, uint32_t gutter,
+                                              terrimp_pack_item *items, uint32_t *order);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -7587,6 +7728,99 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
 
 /* ==== stop here if you only draw what has been built ====================== */
 
+/* ==== Layers ============================================================= >>impl-layers */
+/* Based on: Jeschke 2004, chapter 3. With the reference point on the cell's near side each of his
+   spacings is an affine step of 1 / depth, so that the n-th layer needs no sum over those before
+   it, and depths of thousands of layers do not drift. */
+
+/* 1 / depth after `count` steps d -> d - (shrink d + shift). Steps are doubled as powers are; what
+   they take off is kept apart, where 1 - shrink would lose its digits, and taken off at once. */
+static float terrimpi_layer_walk(float d, float shrink, float shift, uint32_t count)
+{
+    float shrinks = 0.0f, shifts = 0.0f;
+    for (; count > 0; count >>= 1) {
+        if (count & 1u) {
+            shrinks += shrink - shrink * shrinks;
+            shifts += shift - shrink * shifts;
+        }
+        shift *= 2.0f - shrink;
+        shrink *= 2.0f - shrink;
+    }
+    return d - (shrinks * d + shifts);
+}
+
+/* 1 / depth of a layer; the last one stands no farther than it must. */
+static float terrimpi_layer_inverse(const terrimp_layers *l, uint32_t layer)
+{
+    uint32_t even = terrimpi_min_u32(layer, l->even_count);
+    float d = l->first - (float)even * l->step;
+    if (layer + 1u >= l->count)
+        return l->last;
+    return terrimpi_layer_walk(d, l->shrink, l->shift, layer - even);
+}
+
+TERRIMP_API float terrimp_layer_depth(const terrimp_layers *layers, uint32_t layer)
+{
+    return 1.0f / terrimpi_layer_inverse(layers, layer);
+}
+
+TERRIMP_API float terrimp_layer_border(const terrimp_layers *layers, uint32_t layer)
+{
+    if (layer == 0)
+        return layers->start;
+    if (layer >= layers->count)
+        return layers->end;
+    return 2.0f / (terrimpi_layer_inverse(layers, layer - 1u) +
+                   terrimpi_layer_inverse(layers, layer));
+}
+
+TERRIMP_API uint32_t terrimp_layer_of(const terrimp_layers *layers, float depth)
+{
+    uint32_t low = 0, high = layers->count - 1u;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2u;
+        if (depth < terrimp_layer_border(layers, middle + 1u))
+            high = middle;
+        else
+            low = middle + 1u;
+    }
+    return low;
+}
+
+/* The world position of a point (u, v) of the picture, in texels, at a depth. */
+static void terrimpi_layer_point(const terrimp_capture *p, float texel, float u, float v,
+                                 float depth, float out[3])
+{
+    float right = (p->tan_left + u * texel) * depth, up = (p->tan_down + v * texel) * depth;
+    int k;
+    for (k = 0; k < 3; k++)
+        out[k] = p->eye[k] + right * p->right[k] + up * p->up[k] + depth * p->forward[k];
+}
+
+TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
+                                                 const terrimp_capture *picture,
+                                                 const terrimp_layer_quad *quad,
+                                                 const uint32_t atlas[2], float xyz[12],
+                                                 float st[8])
+{
+    float depth;
+    uint32_t i;
+    TERRIMPI_REFUSE(!layers || !picture || !quad || !atlas || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(quad->layer >= layers->count || !atlas[0] || !atlas[1], TERRIMP_E_RANGE);
+    depth = terrimp_layer_depth(layers, quad->layer);
+    for (i = 0; i < 4u; i++) {
+        uint32_t x = i == 1u || i == 2u ? quad->texels.width : 0u;
+        uint32_t y = i >= 2u ? quad->texels.height : 0u;
+        terrimpi_layer_point(picture, layers->texel, (float)(quad->texels.x + x),
+                             (float)(quad->texels.y + y), depth, xyz + 3u * i);
+        if (!st)
+            continue;
+        st[2u * i] = (float)(quad->x + x) / (float)atlas[0];
+        st[2u * i + 1u] = (float)(quad->y + y) / (float)atlas[1];
+    }
+    return TERRIMP_OK;
+}
+
 #ifndef TERRIMP_NO_BUILD
 
 /* ==== Simplifier ========================================================= >>impl-simplifier */
@@ -10557,6 +10791,898 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.checksum = terrimpi_bake_hash(&bake, terrain);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    return TERRIMP_OK;
+}
+
+/* ==== Layer builder ====================================================== >>impl-layer-builder */
+/* Based on: Jeschke 2004, chapters 3 and 4. What is said without a source is derived here.
+
+   Spacing. A line of sight meets the plane of depth 0 at x0 and a layer at depth t, in tangents of
+   the picture, at slope + x0 / t. So between two layers it moves by |x0| times the step of 1 / t,
+   which may be a texel at most: step = texel / largest |x0|. An eye h behind the cell's near side
+   stands at most size / 2 + h cell_tan beside the axis and looks at a point at most view_tan t
+   beside it, so |x0| <= (size / 2 + h q) t / (t + h), with q = cell_tan + view_tan. That is
+   monotone in h: either the near side rules (h = 0), where steps of 1 / t are all alike, or the far
+   side (h = cell_depth), where the step is affine in 1 / t.
+
+   Parallax. A point at depth t that appears on a plane at depth p misses its place by an angle of
+   at most |1/t - 1/p| r, with r = (|size| / 2 + h |q|) (end / (end + h))^2 at its largest: its
+   offset at the plane over its distance from the eye, both bounded over the depths up to end. */
+
+#define TERRIMPI_LAYERS_MAX 65535.0f
+
+/* What a descriptor comes to. */
+typedef struct terrimpi_spacing {
+    float start, end;    /* 1 / depth */
+    float spare;         /* by which 1 / depth may be off */
+    float texel;         /* or less, where half a texel in both directions is more than allowed */
+    float side;          /* largest |x0| from the near side of the cell */
+    float shrink, shift; /* of the step that the far side asks for */
+    float change;        /* 1 / depth below which that is the smaller one */
+} terrimpi_spacing;
+
+static float terrimpi_hypot(float a, float b)
+{
+    float v[3];
+    v[0] = a;
+    v[1] = b;
+    v[2] = 0.0f;
+    return terrimpi_length(v);
+}
+
+/* The largest r of the bound of parallax. Over h it has one peak, at end - 2 size / q. */
+static float terrimpi_layers_reach(const terrimp_layers_desc *d)
+{
+    float r = 0.5f * terrimpi_hypot(d->cell_size[0], d->cell_size[1]);
+    float q = terrimpi_hypot(d->cell_tan[0] + d->view_tan[0], d->cell_tan[1] + d->view_tan[1]);
+    float end = d->distance + d->depth, h, ratio;
+    if (!terrimpi_finite(end))
+        return r + d->cell_depth * q;
+    h = terrimpi_min(terrimpi_max(0.0f, end - 2.0f * r / q), d->cell_depth);
+    ratio = end / (end + h);
+    return (r + h * q) * ratio * ratio;
+}
+
+static void terrimpi_layers_spacing(const terrimp_layers_desc *d, terrimpi_spacing *s)
+{
+    float tolerance = d->tolerance_rad > 0.0f ? d->tolerance_rad : d->texel;
+    float q[2], m = d->cell_depth, sum, reach = terrimpi_layers_reach(d);
+    s->start = 1.0f / d->distance;
+    s->end = 1.0f / (d->distance + d->depth);
+    s->spare = reach > 0.0f ? tolerance / reach : s->start;
+    s->texel = 0.9998f * terrimpi_min(d->texel, 1.414f * tolerance); /* rounding of depths */
+    s->side = 0.5f * terrimpi_max(d->cell_size[0], d->cell_size[1]);
+    q[0] = d->cell_tan[0] + d->view_tan[0];
+    q[1] = d->cell_tan[1] + d->view_tan[1];
+    s->shift = 0.0f;
+    if (!terrimpi_finite(m)) {
+        s->shrink = s->texel / terrimpi_max(q[0], q[1]);
+        s->change = s->side > 0.0f ? terrimpi_max(q[0], q[1]) / s->side : TERRIMPI_INFINITY;
+    } else {
+        sum = terrimpi_max(0.5f * d->cell_size[0] + m * q[0], 0.5f * d->cell_size[1] + m * q[1]);
+        s->shift = sum > 0.0f ? s->texel / sum : 0.0f;
+        s->shrink = m * s->shift;
+        s->change = !(sum > s->side) ? -1.0f
+                    : s->side > 0.0f ? (sum / s->side - 1.0f) / m
+                                     : TERRIMPI_INFINITY;
+    }
+    s->shrink = terrimpi_min(s->shrink, 1.0f);
+}
+
+static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
+{
+    int k;
+    TERRIMPI_REFUSE(!terrimpi_finite(d->distance) || !terrimpi_finite(d->texel) ||
+                        !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
+                        d->cell_depth != d->cell_depth,
+                    TERRIMP_E_NOT_FINITE);
+    for (k = 0; k < 2; k++) {
+        float sum = d->cell_tan[k] + d->view_tan[k];
+        TERRIMPI_REFUSE(!terrimpi_finite2(d->cell_size[k], sum), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!(d->cell_size[k] >= 0.0f) || !(d->cell_tan[k] >= 0.0f) ||
+                            !(d->view_tan[k] > 0.0f),
+                        TERRIMP_E_RANGE);
+    }
+    TERRIMPI_REFUSE(!(d->distance > 0.0f) || !terrimpi_finite(1.0f / d->distance) ||
+                        !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
+                        !(d->tolerance_rad >= 0.0f),
+                    TERRIMP_E_RANGE);
+    return TERRIMP_OK;
+}
+
+/* How many steps of the far side take 1 / depth from d to the target or beyond. */
+static uint32_t terrimpi_layers_steps(float d, float shrink, float shift, float target)
+{
+    float shrinks[17], shifts[17];
+    uint32_t steps = 0;
+    int i;
+    for (i = 0; i < 17; i++) {
+        shrinks[i] = shrink;
+        shifts[i] = shift;
+        shift *= 2.0f - shrink;
+        shrink *= 2.0f - shrink;
+    }
+    for (i = 16; i >= 0; i--)
+        if (d - (shrinks[i] * d + shifts[i]) > target) {
+            d -= shrinks[i] * d + shifts[i];
+            steps += 1u << i;
+        }
+    return steps + 1u;
+}
+
+/* The number of layers, first those that the near side rules. */
+static terrimp_result terrimpi_layers_count(const terrimpi_spacing *s, terrimp_layers *l)
+{
+    float way = l->first - l->last, even = 0.0f, d;
+    uint32_t steps;
+    if (l->first > s->change) {
+        float needed = way / l->step, until = (l->first - s->change) / l->step;
+        if (needed <= until + 1.0f) {
+            TERRIMPI_REFUSE(!(needed < TERRIMPI_LAYERS_MAX), TERRIMP_E_RANGE);
+            l->even_count = terrimpi_ceil_u32(needed);
+            l->count = l->even_count + 1u;
+            l->step = way / (float)l->even_count;
+            return TERRIMP_OK;
+        }
+        TERRIMPI_REFUSE(!(until < TERRIMPI_LAYERS_MAX), TERRIMP_E_RANGE);
+        even = (float)((uint32_t)until + 1u);
+    }
+    d = even > 0.0f ? l->first - even * l->step : l->first;
+    steps = terrimpi_layers_steps(d, l->shrink, l->shift, l->last);
+    l->even_count = (uint32_t)even;
+    l->count = l->even_count + steps + 1u;
+    TERRIMPI_REFUSE((float)l->count > TERRIMPI_LAYERS_MAX, TERRIMP_E_RANGE);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
+                                               terrimp_layers *layers)
+{
+    terrimpi_spacing s;
+    terrimp_layers l;
+    TERRIMPI_REFUSE(!desc || !layers, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_layers_check(desc));
+    terrimpi_layers_spacing(desc, &s);
+    TERRIMPI_REFUSE(!(s.end + s.spare > 0.0f), TERRIMP_E_RANGE); /* no layer would be the last */
+    if (desc->even) { /* the far side's smallest step for all */
+        float small = s.shift + s.shrink * s.end;
+        s.side = terrimpi_max(s.side, small > 0.0f ? s.texel / small : TERRIMPI_INFINITY);
+        s.change = -1.0f;
+    }
+    l.start = desc->distance;
+    l.end = desc->distance + desc->depth;
+    l.texel = desc->texel;
+    l.first = terrimpi_max(s.start - s.spare, 0.5f * (s.start + s.end));
+    l.last = terrimpi_min(l.first, s.end + s.spare);
+    l.step = s.side > 0.0f ? s.texel / s.side : 0.0f;
+    l.shrink = s.shrink;
+    l.shift = s.shift;
+    l.count = 1;
+    l.even_count = 0;
+    if (l.first > l.last)
+        TERRIMPI_TRY(terrimpi_layers_count(&s, &l));
+    *layers = l;
+    return TERRIMP_OK;
+}
+
+/* --- hidden texels --- */
+
+/* The bits of the last word of a row that are texels. */
+static uint32_t terrimpi_mask_tail(uint32_t width)
+{
+    return 0xffffffffu >> (31u - (width - 1u) % 32u);
+}
+
+/* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
+static void terrimpi_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
+{
+    uint32_t words = TERRIMP_MASK_WORDS(width), i, other = 0;
+    row[words - 1u] &= terrimpi_mask_tail(width);
+    if (dx < 0)
+        for (i = 0; i < words; i++) {
+            uint32_t all = row[i] | opaque[i];
+            row[i] = all & (all << 1 | other);
+            other = all >> 31;
+        }
+    else
+        for (i = words; i-- > 0;) {
+            uint32_t all = row[i] | (i + 1u < words ? opaque[i]
+                                                    : opaque[i] & terrimpi_mask_tail(width));
+            row[i] = all & (all >> 1 | other);
+            other = all << 31;
+        }
+}
+
+/* One step of a mask of state from a layer to the next: what has neighbours at dx, dy and across
+   there hides what is behind it. */
+static void terrimpi_cull_step(const uint32_t *opaque, uint32_t width, uint32_t height, int dx,
+                               int dy, uint32_t *state)
+{
+    size_t words = TERRIMP_MASK_WORDS(width), y, i;
+    for (y = 0; y < height; y++)
+        terrimpi_cull_row(opaque + y * words, width, dx, state + y * words);
+    if (dy > 0) {
+        for (i = 0; i < (height - 1u) * words; i++)
+            state[i] &= state[i + words];
+        memset(state + i, 0, words * sizeof *state);
+        return;
+    }
+    for (i = height * words; i-- > words;)
+        state[i] &= state[i - words];
+    memset(state, 0, words * sizeof *state);
+}
+
+TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
+                                              uint32_t height, int rule, uint32_t *state,
+                                              uint32_t *visible)
+{
+    size_t count = (size_t)height * TERRIMP_MASK_WORDS(width), i;
+    int k;
+    TERRIMPI_REFUSE(!opaque || !state || !visible, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!width || !height || rule < 0 || rule >= TERRIMP_CULL_COUNT, TERRIMP_E_RANGE);
+    if (rule == TERRIMP_CULL_BLOCK) {
+        for (i = 0; i < count; i++)
+            visible[i] = opaque[i] & ~state[i];
+        terrimpi_cull_step(visible, width, height, 1, 1, state);
+        terrimpi_cull_step(state, width, height, -1, -1, state);
+        return TERRIMP_OK;
+    }
+    for (i = 0; i < count; i++)
+        visible[i] = opaque[i] & ~(state[i] & state[count + i] & state[2u * count + i] &
+                                   state[3u * count + i]);
+    for (k = 0; k < 4; k++) /* what was culled is in all four, and so is not missing in visible */
+        terrimpi_cull_step(visible, width, height, k & 1 ? 1 : -1, k & 2 ? 1 : -1,
+                           state + (size_t)k * count);
+    return TERRIMP_OK;
+}
+
+/* --- rectangles that hold all opaque texels --- */
+
+#define TERRIMPI_COVER_LINES 8u   /* a rectangle is cut along so many lines of a grid at once */
+#define TERRIMPI_COVER_SPANS 36u  /* from one of them to another */
+
+/* A rectangle that might be taken whole or in parts. */
+typedef struct terrimpi_cover_node {
+    terrimp_rect rect;
+    uint32_t cost, parts, part_count; /* where its parts stand; 0: none */
+} terrimpi_cover_node;
+
+/* What lies in a span of columns and a span of rows of the grid, and the cheapest way to cover it
+   with cuts along the grid. Corners of the opaque texels, ends excluded; x1 is 0 for none. */
+typedef struct terrimpi_cover_span {
+    uint16_t x0, y0, x1, y1;
+    uint32_t cost;
+    uint8_t cut_x, cut_y; /* the line of the first cut, or 0: whole */
+} terrimpi_cover_span;
+
+typedef struct terrimpi_cover {
+    terrimp_cover_desc desc;
+    terrimpi_cover_node *nodes;
+    uint32_t node_count, node_limit;
+    uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
+    uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
+    uint32_t *seen;       /* a row of bits */
+    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
+    terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
+} terrimpi_cover;
+
+static uint32_t terrimpi_bit_count(uint32_t bits)
+{
+    bits -= bits >> 1 & 0x55555555u;
+    bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
+    return ((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
+}
+
+/* The number of the lowest bit that is set, and clears it. */
+static uint32_t terrimpi_next_bit(uint32_t *bits)
+{
+    uint32_t below = terrimpi_bit_count((*bits & (0u - *bits)) - 1u);
+    *bits &= *bits - 1u;
+    return below;
+}
+
+/* A word of a mask's row y, without what lies outside of columns x to end. */
+static uint32_t terrimpi_mask_word(const terrimp_cover_desc *d, uint32_t y, uint32_t word,
+                                   uint32_t x, uint32_t end)
+{
+    uint32_t bits = d->mask[(size_t)y * TERRIMP_MASK_WORDS(d->width) + word];
+    if (word == x / 32u)
+        bits &= 0xffffffffu << x % 32u;
+    if (word == (end - 1u) / 32u)
+        bits &= terrimpi_mask_tail(end);
+    return bits;
+}
+
+/* Extents of the columns of a rectangle, in its rows; an empty one has low > high. */
+static void terrimpi_cover_columns(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t end = r->x + r->width, turn, i, word;
+    for (i = 0; i < r->width; i++) {
+        c->low[i] = 1;
+        c->high[i] = 0;
+    }
+    for (turn = 0; turn < 2u; turn++) {
+        memset(c->seen, 0, TERRIMP_MASK_WORDS(c->desc.width) * sizeof *c->seen);
+        for (i = 0; i < r->height; i++) {
+            uint32_t y = turn ? r->height - 1u - i : i;
+            for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
+                uint32_t fresh = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end);
+                fresh &= ~c->seen[word];
+                c->seen[word] |= fresh;
+                while (fresh)
+                    (turn ? c->high : c->low)[word * 32u + terrimpi_next_bit(&fresh) - r->x] = y;
+            }
+        }
+    }
+}
+
+/* The same of its rows; returns how many of its texels are opaque. */
+static uint32_t terrimpi_cover_rows(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t end = r->x + r->width, y, word, opaque = 0;
+    for (y = 0; y < r->height; y++) {
+        c->low[y] = 1;
+        c->high[y] = 0;
+        for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
+            uint32_t bits = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end), last = bits;
+            if (!bits)
+                continue;
+            opaque += terrimpi_bit_count(bits);
+            if (c->low[y] > c->high[y])
+                c->low[y] = word * 32u + terrimpi_next_bit(&bits) - r->x;
+            last |= last >> 1, last |= last >> 2, last |= last >> 4, last |= last >> 8;
+            last |= last >> 16;
+            c->high[y] = word * 32u + terrimpi_bit_count(last) - 1u - r->x;
+        }
+    }
+    return opaque;
+}
+
+/* A growing extent of rows or columns. */
+typedef struct terrimpi_extent {
+    uint32_t first, last, low, high;
+} terrimpi_extent;
+
+static uint32_t terrimpi_cover_cost(const terrimpi_cover *c, uint32_t width, uint32_t height)
+{
+    return (width + 2u * c->desc.gutter) * (height + 2u * c->desc.gutter) + c->desc.quad_cost;
+}
+
+/* Adds column or row i; returns what the rectangle of all so far costs. */
+static uint32_t terrimpi_extent_add(const terrimpi_cover *c, terrimpi_extent *e, uint32_t i)
+{
+    if (c->low[i] <= c->high[i]) {
+        if (e->first > e->last) {
+            e->first = e->last = i;
+            e->low = c->low[i];
+            e->high = c->high[i];
+        }
+        e->first = terrimpi_min_u32(e->first, i);
+        e->last = terrimpi_max_u32(e->last, i);
+        e->low = terrimpi_min_u32(e->low, c->low[i]);
+        e->high = terrimpi_max_u32(e->high, c->high[i]);
+    }
+    return e->first > e->last
+               ? 0u
+               : terrimpi_cover_cost(c, e->last - e->first + 1u, e->high - e->low + 1u);
+}
+
+/* The cut between `count` columns or rows with the cheapest two parts; returns their cost. */
+static uint32_t terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
+{
+    terrimpi_extent e = {1, 0, 0, 0};
+    uint32_t i, best = 0xffffffffu;
+    for (i = count; i-- > 0;)
+        c->beyond[i] = terrimpi_extent_add(c, &e, i);
+    e.first = 1;
+    e.last = 0;
+    for (i = 1; i < count; i++) {
+        uint32_t cost = terrimpi_extent_add(c, &e, i - 1u) + c->beyond[i];
+        if (cost < best) {
+            best = cost;
+            *at = i;
+        }
+    }
+    return best;
+}
+
+/* Shrinks a rectangle to its opaque texels; returns how many there are. */
+static uint32_t terrimpi_cover_tighten(terrimpi_cover *c, terrimp_rect *r)
+{
+    uint32_t opaque = terrimpi_cover_rows(c, r), y;
+    terrimpi_extent e = {1, 0, 0, 0};
+    for (y = 0; y < r->height; y++)
+        terrimpi_extent_add(c, &e, y);
+    if (opaque)
+        *r = terrimpi_rect(r->x + e.low, r->y + e.first, e.high - e.low + 1u,
+                           e.last - e.first + 1u);
+    return opaque;
+}
+
+/* The number of the span from line a to line b > a: after those that it is made of. */
+static uint32_t terrimpi_cover_span_of(uint32_t a, uint32_t b)
+{
+    return b * (b - 1u) / 2u + b - 1u - a;
+}
+
+static void terrimpi_cover_unite(const terrimpi_cover_span *a, const terrimpi_cover_span *b,
+                                 terrimpi_cover_span *out)
+{
+    terrimpi_cover_span u = *a;
+    if (!a->x1)
+        u = *b;
+    else if (b->x1) {
+        u.x0 = a->x0 < b->x0 ? a->x0 : b->x0;
+        u.y0 = a->y0 < b->y0 ? a->y0 : b->y0;
+        u.x1 = a->x1 > b->x1 ? a->x1 : b->x1;
+        u.y1 = a->y1 > b->y1 ? a->y1 : b->y1;
+    }
+    *out = u;
+}
+
+/* The spans of single cells of a rectangle's grid: of the texels of each. */
+static void terrimpi_cover_cells(terrimpi_cover *c, const terrimp_rect *r)
+{
+    const uint32_t n = TERRIMPI_COVER_LINES;
+    uint32_t i, k;
+    for (k = 0; k < n; k++)
+        for (i = 0; i < n; i++) {
+            terrimpi_cover_span *s = &c->spans[terrimpi_cover_span_of(k, k + 1u)]
+                                              [terrimpi_cover_span_of(i, i + 1u)];
+            uint32_t x = r->x + i * r->width / n, y = r->y + k * r->height / n;
+            terrimp_rect cell = terrimpi_rect(x, y, r->x + (i + 1u) * r->width / n - x,
+                                              r->y + (k + 1u) * r->height / n - y);
+            memset(s, 0, sizeof *s);
+            if (!cell.width || !cell.height || !terrimpi_cover_tighten(c, &cell))
+                continue;
+            s->x0 = (uint16_t)cell.x;
+            s->y0 = (uint16_t)cell.y;
+            s->x1 = (uint16_t)(cell.x + cell.width);
+            s->y1 = (uint16_t)(cell.y + cell.height);
+        }
+}
+
+/* Lowers the cost of a span to that of its best cut. */
+static void terrimpi_cover_best(terrimpi_cover *c, uint32_t a, uint32_t b, uint32_t p, uint32_t q)
+{
+    uint32_t columns = terrimpi_cover_span_of(a, b), rows = terrimpi_cover_span_of(p, q), m;
+    terrimpi_cover_span *s = &c->spans[rows][columns];
+    s->cut_x = s->cut_y = 0;
+    s->cost = s->x1 ? terrimpi_cover_cost(c, (uint32_t)s->x1 - s->x0, (uint32_t)s->y1 - s->y0) : 0u;
+    for (m = a + 1u; m < b; m++) {
+        uint32_t cost = c->spans[rows][terrimpi_cover_span_of(a, m)].cost +
+                        c->spans[rows][terrimpi_cover_span_of(m, b)].cost;
+        if (cost < s->cost) {
+            s->cost = cost;
+            s->cut_x = (uint8_t)m;
+        }
+    }
+    for (m = p + 1u; m < q; m++) {
+        uint32_t cost = c->spans[terrimpi_cover_span_of(p, m)][columns].cost +
+                        c->spans[terrimpi_cover_span_of(m, q)][columns].cost;
+        if (cost < s->cost) {
+            s->cost = cost;
+            s->cut_x = 0;
+            s->cut_y = (uint8_t)m;
+        }
+    }
+}
+
+/* The cheapest ways to cover all spans of a rectangle's grid, the smaller ones first. */
+static void terrimpi_cover_solve(terrimpi_cover *c, const terrimp_rect *r)
+{
+    uint32_t a, b, p, q;
+    terrimpi_cover_cells(c, r);
+    for (q = 1; q <= TERRIMPI_COVER_LINES; q++)
+        for (p = q; p-- > 0;)
+            for (b = 1; b <= TERRIMPI_COVER_LINES; b++)
+                for (a = b; a-- > 0;) {
+                    uint32_t columns = terrimpi_cover_span_of(a, b);
+                    uint32_t rows = terrimpi_cover_span_of(p, q);
+                    terrimpi_cover_span *s = &c->spans[rows][columns];
+                    if (b - a > 1u)
+                        terrimpi_cover_unite(&c->spans[rows][terrimpi_cover_span_of(a, b - 1u)],
+                                             &c->spans[rows][terrimpi_cover_span_of(b - 1u, b)], s);
+                    else if (q - p > 1u)
+                        terrimpi_cover_unite(&c->spans[terrimpi_cover_span_of(p, q - 1u)][columns],
+                                             &c->spans[terrimpi_cover_span_of(q - 1u, q)][columns],
+                                             s);
+                    terrimpi_cover_best(c, a, b, p, q);
+                }
+}
+
+static int terrimpi_cover_add(terrimpi_cover *c, uint32_t node, const terrimp_rect *r)
+{
+    if (c->node_count == c->node_limit)
+        return 0;
+    c->nodes[node].part_count++;
+    c->nodes[c->node_count++].rect = *r;
+    return 1;
+}
+
+/* Makes parts of a node from the best cuts along its grid; returns 0 when there are none. */
+static int terrimpi_cover_by_grid(terrimpi_cover *c, uint32_t node)
+{
+    uint8_t stack[TERRIMPI_COVER_LINES * TERRIMPI_COVER_LINES][4];
+    uint32_t top = 1, k;
+    terrimpi_cover_solve(c, &c->nodes[node].rect);
+    memset(stack[0], 0, sizeof stack[0]);
+    stack[0][1] = stack[0][3] = TERRIMPI_COVER_LINES;
+    while (top) {
+        uint8_t *at = stack[--top];
+        const terrimpi_cover_span *s =
+            &c->spans[terrimpi_cover_span_of(at[2], at[3])][terrimpi_cover_span_of(at[0], at[1])];
+        uint8_t cut = s->cut_x ? s->cut_x : s->cut_y;
+        terrimp_rect r = terrimpi_rect(s->x0, s->y0, (uint32_t)s->x1 - s->x0,
+                                       (uint32_t)s->y1 - s->y0);
+        if (!cut && top == 0 && c->nodes[node].part_count == 0)
+            return 0;
+        if (!cut && s->x1 && !terrimpi_cover_add(c, node, &r)) {
+            c->node_count -= c->nodes[node].part_count;
+            c->nodes[node].part_count = 0;
+            return 0;
+        }
+        if (!cut)
+            continue;
+        k = s->cut_x ? 0 : 2;
+        memcpy(stack[top + 1u], at, sizeof stack[0]);
+        at[k] = cut; /* the part before the cut is the next one */
+        stack[top + 1u][k + 1u] = cut;
+        top += 2u;
+    }
+    return 1;
+}
+
+/* Makes two parts of a node, with the best cut between any two of its columns or rows. */
+static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
+{
+    terrimp_rect r = c->nodes[node].rect, part[2];
+    uint32_t x = 0, y = 0, by_y, k;
+    if (c->node_count + 2u > c->node_limit)
+        return;
+    terrimpi_cover_rows(c, &r);
+    by_y = terrimpi_cover_cut(c, r.height, &y);
+    terrimpi_cover_columns(c, &r);
+    part[0] = part[1] = r;
+    if (terrimpi_cover_cut(c, r.width, &x) < by_y) {
+        part[0].width = x;
+        part[1].x += x;
+        part[1].width -= x;
+    } else {
+        part[0].height = y;
+        part[1].y += y;
+        part[1].height -= y;
+    }
+    for (k = 0; k < 2u; k++) {
+        terrimpi_cover_tighten(c, &part[k]);
+        terrimpi_cover_add(c, node, &part[k]);
+    }
+}
+
+/* Cuts a node up, if more is lost in it than another rectangle costs. */
+static void terrimpi_cover_split(terrimpi_cover *c, uint32_t node)
+{
+    terrimpi_cover_node *n = &c->nodes[node];
+    uint32_t opaque = terrimpi_cover_rows(c, &n->rect);
+    n->cost = terrimpi_cover_cost(c, n->rect.width, n->rect.height);
+    n->parts = c->node_count;
+    n->part_count = 0;
+    if (n->rect.width * n->rect.height - opaque > c->desc.quad_cost &&
+        !terrimpi_cover_by_grid(c, node))
+        terrimpi_cover_in_two(c, node);
+}
+
+/* What a rectangle saves by taking the place of all that lie within it; less than 0 when it reaches
+   into others, which would then overlap. */
+static float terrimpi_cover_gain(const terrimpi_cover *c, const terrimp_rect *r,
+                                 const terrimp_rect *rects, uint32_t count)
+{
+    float gain = -(float)terrimpi_cover_cost(c, r->width, r->height);
+    uint32_t i;
+    for (i = 0; i < count; i++) {
+        const terrimp_rect *o = &rects[i];
+        if (o->x >= r->x + r->width || r->x >= o->x + o->width || o->y >= r->y + r->height ||
+            r->y >= o->y + o->height)
+            continue;
+        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
+            o->y + o->height > r->y + r->height)
+            return -1.0f;
+        gain += (float)terrimpi_cover_cost(c, o->width, o->height);
+    }
+    return gain;
+}
+
+static terrimp_rect terrimpi_rect_union(const terrimp_rect *a, const terrimp_rect *b)
+{
+    uint32_t x = terrimpi_min_u32(a->x, b->x), y = terrimpi_min_u32(a->y, b->y);
+    return terrimpi_rect(x, y, terrimpi_max_u32(a->x + a->width, b->x + b->width) - x,
+                         terrimpi_max_u32(a->y + a->height, b->y + b->height) - y);
+}
+
+/* Puts r in place of all that lie within it; returns how many rectangles are left. */
+static uint32_t terrimpi_cover_swallow(const terrimp_rect *r, terrimp_rect *rects, uint32_t count)
+{
+    uint32_t i, kept = 0, placed = 0;
+    for (i = 0; i < count; i++) {
+        const terrimp_rect *o = &rects[i];
+        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
+            o->y + o->height > r->y + r->height)
+            rects[kept++] = *o;
+        else if (!placed++)
+            rects[kept++] = *r;
+    }
+    return kept;
+}
+
+/* Joins rectangles as long as one in their place costs less than they do. */
+static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects, uint32_t count)
+{
+    uint32_t a, b, joined;
+    do {
+        joined = 0;
+        for (a = 0; a < count; a++)
+            for (b = a + 1u; b < count; b++) {
+                terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
+                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                    continue;
+                count = terrimpi_cover_swallow(&r, rects, count);
+                joined = 1;
+                b = a;
+            }
+    } while (joined);
+    return count;
+}
+
+/* Checks a descriptor and lays out the scratch memory; in base NULL only to count it. */
+static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void *base,
+                                           uint32_t capacity, terrimpi_cover *c, size_t *bytes)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    uint32_t longest = terrimpi_max_u32(desc->width, desc->height);
+    c->desc = *desc;
+    TERRIMPI_DEFAULT(c->desc.quad_cost, 20u);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(desc->width, 1, 16384) || desc->gutter > 64u ||
+                        !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
+                        c->desc.quad_cost > 1u << 24,
+                    TERRIMP_E_RANGE);
+    c->node_count = 0;
+    c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
+    c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
+    c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
+    c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
+    c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
+    c->cells = (uint32_t *)terrimpi_take(
+        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
+        sizeof *c->cells);
+    c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
+        &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
+    c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
+    *bytes = arena.bytes;
+    return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
+}
+
+TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity)
+{
+    terrimpi_cover c;
+    size_t bytes;
+    return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
+}
+
+/* What both ways to cover begin with. */
+static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
+                                          size_t bytes, const terrimp_rect *rects,
+                                          uint32_t capacity, const uint32_t *count,
+                                          terrimpi_cover *c)
+{
+    size_t needed;
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
+    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
+}
+
+/* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
+   room; returns how many they are. Parts stand behind what they are parts of. */
+static uint32_t terrimpi_cover_prune(terrimpi_cover *c, terrimp_rect *rects, uint32_t capacity)
+{
+    uint32_t i, kept = 0;
+    for (i = c->node_count; i-- > 0;) {
+        terrimpi_cover_node *n = &c->nodes[i];
+        uint32_t sum = 0, k;
+        for (k = 0; k < n->part_count; k++)
+            sum += c->nodes[n->parts + k].cost;
+        if (n->part_count && sum < n->cost)
+            n->cost = sum;
+        else
+            n->part_count = 0;
+    }
+    for (i = 0; i < c->node_count; i++)
+        c->nodes[i].cost = i == 0; /* from here on: whether it is left */
+    for (i = 0; i < c->node_count; i++) {
+        const terrimpi_cover_node *n = &c->nodes[i];
+        uint32_t k;
+        for (k = 0; n->cost && k < n->part_count; k++)
+            c->nodes[n->parts + k].cost = 1;
+        if (n->cost && !n->part_count && kept++ < capacity)
+            rects[kept - 1u] = n->rect;
+    }
+    return kept;
+}
+
+TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
+                                         size_t bytes, terrimp_rect *rects, uint32_t capacity,
+                                         uint32_t *count)
+{
+    terrimpi_cover c;
+    uint32_t i, kept;
+    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
+    c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
+    for (i = 0; i < c.node_count; i++)
+        terrimpi_cover_split(&c, i);
+    kept = terrimpi_cover_prune(&c, rects, capacity);
+    TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
+    *count = terrimpi_cover_join(&c, rects, kept);
+    return TERRIMP_OK;
+}
+
+/* A box of cells, ends excluded, and how many of them are filled. */
+typedef struct terrimpi_grow_box {
+    uint32_t x0, y0, x1, y1, filled;
+} terrimpi_grow_box;
+
+/* How many cells of a box are filled, on a grid that is a mask. */
+static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
+                                     uint32_t x1, uint32_t y1)
+{
+    uint32_t y, word, filled = 0;
+    for (y = y0; y < y1 && x0 < x1; y++)
+        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
+            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
+    return filled;
+}
+
+/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
+static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
+                              int dy, terrimpi_grow_box *out)
+{
+    *out = *b;
+    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
+        (dy > 0 && b->y1 == g->height))
+        return 0;
+    out->x0 -= dx < 0;
+    out->x1 += dx > 0;
+    out->y0 -= dy < 0;
+    out->y1 += dy > 0;
+    if (dx)
+        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
+                                            dx < 0 ? b->x0 : out->x1, out->y1);
+    if (dy)
+        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
+                                            dy < 0 ? b->y0 : out->y1);
+    return 1;
+}
+
+static float terrimpi_grow_area(const terrimpi_grow_box *b)
+{
+    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
+}
+
+/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
+static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
+                                 terrimpi_grow_box *box)
+{
+    for (;;) {
+        terrimpi_grow_box best = *box, next;
+        float best_ratio = 0.0f;
+        int k;
+        for (k = 0; k < 9; k++) {
+            float ratio;
+            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
+                continue;
+            ratio = (float)(next.filled - box->filled) /
+                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
+            if (ratio > best_ratio) {
+                best_ratio = ratio;
+                best = next;
+            }
+        }
+        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
+            return;
+        *box = best;
+    }
+}
+
+/* The mask of the cells that hold opaque texels. */
+static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
+{
+    terrimp_cover_desc g = c->desc;
+    uint32_t y, word;
+    g.mask = c->cells;
+    g.width = (c->desc.width - 1u) / cell + 1u;
+    g.height = (c->desc.height - 1u) / cell + 1u;
+    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
+    for (y = 0; y < c->desc.height; y++)
+        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
+            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
+            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
+            while (bits) {
+                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
+                row[x / 32u] |= 1u << x % 32u;
+            }
+        }
+    return g;
+}
+
+/* Grows a box from a cell, empties its cells, and returns it in texels. */
+static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
+                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
+{
+    terrimpi_grow_box b;
+    b.x0 = x;
+    b.y0 = y;
+    b.x1 = x + 1u;
+    b.y1 = y + 1u;
+    b.filled = 1;
+    terrimpi_grow_box_up(g, min_fill, &b);
+    for (y = b.y0; y < b.y1; y++)
+        for (x = b.x0; x < b.x1; x++)
+            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
+    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
+                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
+                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
+}
+
+TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
+                                              float min_fill, void *scratch, size_t bytes,
+                                              terrimp_rect *rects, uint32_t capacity,
+                                              uint32_t *count)
+{
+    terrimpi_cover c;
+    terrimp_cover_desc g;
+    uint32_t made = 0, y, word;
+    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
+                        !terrimpi_within_u32(cell, 1, 16384),
+                    TERRIMP_E_RANGE);
+    g = terrimpi_grow_grid(&c, cell);
+    for (y = 0; y < g.height; y++)
+        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
+            uint32_t bits;
+            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
+                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
+                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
+                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
+                terrimpi_cover_tighten(&c, &rects[made++]);
+            }
+        }
+    *count = made;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+                                              uint32_t count, uint32_t gutter,
+                                              terrimp_pack_item *items, uint32_t *order)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!shelves || !shelves->items || !quads || !items || !order, TERRIMP_E_NULL);
+    for (i = 0; i < count; i++)
+        TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
+                            !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
+                        TERRIMP_E_RANGE);
+    for (i = 0; i < count; i++) {
+        items[i].rect = quads[i].texels;
+        items[i].rect.width += 2u * gutter;
+        items[i].rect.height += 2u * gutter;
+        TERRIMPI_REFUSE(items[i].rect.width > shelves->width ||
+                            items[i].rect.height > shelves->height,
+                        TERRIMP_E_CAPACITY); /* or it would be scaled */
+    }
+    TERRIMPI_TRY(terrimp_pack_ffdh(shelves, items, count, order, NULL));
+    for (i = 0; i < count; i++) {
+        quads[i].x = items[i].rect.x + gutter;
+        quads[i].y = items[i].rect.y + gutter;
+    }
     return TERRIMP_OK;
 }
 

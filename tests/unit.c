@@ -29,6 +29,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_view.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
+#include "unit_layers.h"
 #include "unit_golden.h"
 
 int main(int argc, char **argv)
@@ -49,6 +50,7 @@ int main(int argc, char **argv)
     bake_tests();
     view_tests();
     bad_input_tests();
+    layers_tests();
     golden_tests();
     return check_report();
 }
