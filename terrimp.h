@@ -80,16 +80,17 @@
 
               eye           fade_start    fade_end
                o=================|-------------|- - - - - - - - - - - - - - - ->
-                 ground, opaque   ground fades    impostors of growing nodes,
-                                  over impostors  or ground where that is cheaper
+                 ground           impostors       impostors of growing nodes,
+                                  fade in         or ground where that is cheaper
 
        A picture is renewed when the direction to the node has turned by max_angle_rad, when the
        parallax error could pass tolerance_px, or when the node has come so close that texels would
        show. It is made from a place ahead of the eye, where it lasts longer. What waits for its
        picture is drawn from those of its children or its parent, or as ground.
 
-       Impostors are drawn deeper than they are, so that ground covers them: give the projection
-       matrix the z_far of the statistics, or a generous one.
+       In the fade band a node is drawn as ground and, on a growing share of the pixels, as the
+       impostor, whose mesh stands just above that ground. So all lies at its own depth, and water,
+       houses and shadows meet it there.
 
                picture in the atlas             coarse mesh, a little proud of the terrain
               +--------------------+                 .--'`--.__         upper skirt
@@ -133,12 +134,10 @@
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
        A picture shows a hidden slope with the ridge before it smeared over it once the eye has
        moved; max_angle_rad bounds how far that goes, and pictures in two parts spare the worst.
-       What moves on the terrain belongs into the host's own draws, not into captures. Ground fades
-       by blending, and only whole nodes are sorted: in the fade band a hidden slope can shine
-       faintly through the ridge of its own node. Ground and impostors of one place are alike to
-       within the tolerances, not to the bit: where a node changes from one to the other beyond the
-       fade band, that much can be seen to change. From beside the terrain no floor is drawn, since
-       it would show below the border.
+       What moves on the terrain belongs into the host's own draws, not into captures. Ground and
+       impostors of one place are alike to within the tolerances, not to the bit: where a node
+       changes from one to the other beyond the fade band, that much can be seen to change. From
+       beside the terrain no floor is drawn, since it would show below the border.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -1103,10 +1102,10 @@ typedef struct terrimp_view_desc {
     int ground_rule;        /* terrimp_geomip_rule */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
-    float fade_start;       /* [wu] from the eye: nodes that come closer are opaque ground
+    float fade_start;       /* [wu] from the eye: nodes that come closer are ground
                                [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
-                               ground fades over the impostors [Limits: > fade_start]
+                               impostors fade in over it [Limits: > fade_start]
                                [Default 0 -> 1.5 * fade_start; in AUTO 1.1] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
@@ -1143,8 +1142,6 @@ typedef struct terrimp_ground_command {
     uint32_t level;
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
-    float alpha;          /* 1: opaque; below: blended over what is there */
-    float depth_bias;     /* as for impostors; 0 but for ground beyond the fade band */
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
@@ -1152,7 +1149,7 @@ typedef struct terrimp_ground_command {
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
    it to the farthest depth and, when `clear` is set, to transparent black. The ground commands up
-   to end_capture are drawn with these matrices, opaque. */
+   to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
     uint32_t node;
     uint32_t level;
@@ -1171,11 +1168,9 @@ typedef struct terrimp_capture_command {
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
    texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. A vertex p is
-   drawn at eye + (p - eye) * (1 + depth_bias): at the same place of the screen, only deeper, so
-   that ground is drawn over it. Of a picture in two parts both are drawn, each only where r / q is
-   within 0..1: by a discard, or by the clip planes r >= 0 and q - r >= 0, which are rows of the
-   matrix. */
+   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
+   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
+   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1184,20 +1179,20 @@ typedef struct terrimp_impostor_command {
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
     uint32_t first_index;
     uint32_t index_count;
+    float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
+                             by a dither pattern: its ground shows on the others */
     float texture_matrix[16];
-    float depth_bias;
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain and has no gap. It comes after the impostors and shows only where none
    of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
    terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
-   border: there it is not drawn.) Vertices, indices, depth bias: as for impostors. */
+   border: there it is not drawn.) Vertices and indices as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
-    float depth_bias;
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1235,8 +1230,8 @@ typedef struct terrimp_stats {
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
-                                    drawn, depth bias included: update with a camera that sees far
-                                    enough, then draw with these; z_near is 0 within a box */
+                                    drawn: update with a camera that sees far enough, then draw with
+                                    these; z_near is 0 within a box */
 } terrimp_stats;
 
 /* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
@@ -1265,9 +1260,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Calls back with the frame's commands: captures, each with its ground; opaque ground; impostors
-   and the ground between them; the floor; fading ground. Each kind front to back: what is hidden by
-   something drawn before it need not be shaded.
+/* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
+   floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate and touch until the next one */
@@ -5956,6 +5950,7 @@ typedef struct terrimpi_record {
     uint32_t node;
     uint32_t seen;            /* the last frame that had a use for it; 0: the record is free */
     uint32_t listed;          /* the last frame that draws it */
+    float alpha;              /* the share of the pixels that it has in that frame */
     uint32_t part_count;      /* 0: no picture yet */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
@@ -6002,12 +5997,6 @@ typedef struct terrimpi_job {
     float wanted, cost;
 } terrimpi_job;
 
-/* What is drawn before the floor: an impostor or distant ground. */
-typedef struct terrimpi_item {
-    uint32_t index;  /* of the record or the ground draw */
-    int is_impostor;
-} terrimpi_item;
-
 struct terrimp_view {
     const terrimp_terrain *terrain;
     uint32_t frame;             /* updates so far */
@@ -6016,11 +6005,10 @@ struct terrimp_view {
     uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
     uint16_t *record_of;           /* [node_count] */
     unsigned char *prefers;        /* [node_count] the unit was drawn as impostors */
-    float *shown;                  /* [max_ground] alpha of each ground draw, 0: not drawn, -1:
-                                      opaque beyond the fade band */
+    unsigned char *shown;          /* [max_ground] nonzero: the ground draw is drawn */
     uint32_t *leaves;              /* [max_ground] ground draws, by unit */
     terrimpi_unit *units;          /* [max_ground] front to back */
-    terrimpi_item *items;          /* [max_ground + max_impostors] front to back */
+    uint32_t *items;               /* [max_impostors] records that are drawn, front to back */
     terrimpi_want *wants;          /* [max_impostors] by unit */
     uint32_t *queue;               /* [max_impostors] wants to capture, most urgent first */
     terrimpi_record *records;      /* [max_impostors] */
@@ -6033,7 +6021,6 @@ struct terrimp_view {
     terrimp_geomip_view ground;
     terrimp_view_desc desc;     /* resolved */
     float pixel_factor;
-    float depth_bias;
     float motion[3];            /* [wu] a frame, smoothed */
     float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
     terrimp_camera camera;      /* resolved, of the last update */
@@ -6163,10 +6150,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->leaf_at = (uint32_t *)terrimpi_take(&l, nodes, sizeof *v->leaf_at);
     v->record_of = (uint16_t *)terrimpi_take(&l, nodes, sizeof *v->record_of);
     v->prefers = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->prefers);
-    v->shown = (float *)terrimpi_take(&l, ground, sizeof *v->shown);
+    v->shown = (unsigned char *)terrimpi_take(&l, ground, sizeof *v->shown);
     v->leaves = (uint32_t *)terrimpi_take(&l, ground, sizeof *v->leaves);
     v->units = (terrimpi_unit *)terrimpi_take(&l, ground, sizeof *v->units);
-    v->items = (terrimpi_item *)terrimpi_take(&l, ground + impostors, sizeof *v->items);
+    v->items = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->items);
     v->wants = (terrimpi_want *)terrimpi_take(&l, impostors, sizeof *v->wants);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->records = (terrimpi_record *)terrimpi_take(&l, impostors, sizeof *v->records);
@@ -7276,15 +7263,17 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
-    if (record->listed == v->frame)
+    if (record->listed == v->frame) {
+        record->alpha = 1.0f;
         return 1;
+    }
     s = terrimpi_tree_node(&v->terrain->tree, node);
     eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
     record->listed = record->seen = v->frame;
-    v->items[v->item_count].index = index;
-    v->items[v->item_count++].is_impostor = 1;
+    record->alpha = 1.0f;
+    v->items[v->item_count++] = index;
     v->stats.impostors++;
     v->stats.impostors_by_level[s.level]++;
     return 1;
@@ -7338,20 +7327,16 @@ static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrim
 }
 
 /* Shows a unit's ground. */
-static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
+static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit)
 {
     terrimp_pattern pattern;
     uint32_t i;
-    for (i = 0; i < unit->leaf_count && alpha != 0.0f; i++) {
+    for (i = 0; i < unit->leaf_count; i++) {
         uint32_t leaf = v->leaves[unit->first_leaf + i];
-        v->shown[leaf] = alpha;
+        v->shown[leaf] = 1;
         terrimpi_ground_pattern(v, leaf, &pattern);
         v->stats.ground++;
         v->stats.triangles += pattern.triangle_count;
-        if (alpha < 0.0f) {
-            v->items[v->item_count].index = leaf;
-            v->items[v->item_count++].is_impostor = 0;
-        }
     }
 }
 
@@ -7359,54 +7344,46 @@ static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, flo
 static void terrimpi_unlist(terrimp_view *v, uint32_t first)
 {
     while (v->item_count > first) {
-        terrimpi_record *record = &v->records[v->items[--v->item_count].index];
+        terrimpi_record *record = &v->records[v->items[--v->item_count]];
         record->listed = 0;
         v->stats.impostors--;
         v->stats.impostors_by_level[terrimpi_tree_node(&v->terrain->tree, record->node).level]--;
     }
 }
 
-/* Settles what each unit is drawn as, now that it is known which pictures will exist. */
+/* Settles what each unit is drawn as, now that it is known which pictures will exist. An impostor
+   that is drawn for other units too does not fade. */
 static void terrimpi_settle(terrimp_view *v)
 {
-    float closest = v->desc.fade_end; /* of all impostors */
+    float band = v->desc.fade_end - v->desc.fade_start;
     uint32_t u, i;
     v->item_count = 0;
     for (u = 0; u < v->unit_count; u++) {
         const terrimpi_unit *unit = &v->units[u];
         uint32_t before = v->item_count;
-        int covered = unit->want_count > 0, impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
+        int covered = unit->want_count > 0;
         for (i = 0; i < unit->want_count; i++)
             covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
-        if (!covered) {
+        if (!covered)
             terrimpi_unlist(v, before);
-            terrimpi_show_ground(v, unit,
-                                 impostors && unit->closest >= v->desc.fade_end ? -1.0f : 1.0f);
-        } else
-            terrimpi_show_ground(v, unit,
-                                 terrimpi_max(0.0f, (v->desc.fade_end - unit->closest) /
-                                                        (v->desc.fade_end - v->desc.fade_start)));
+        if (!covered || unit->closest < v->desc.fade_end)
+            terrimpi_show_ground(v, unit);
+        for (i = before; i < v->item_count; i++)
+            v->records[v->items[i]].alpha =
+                terrimpi_min(1.0f, (unit->closest - v->desc.fade_start) / band);
     }
-    for (i = 0; i < v->item_count; i++)
-        if (v->items[i].is_impostor) {
-            terrimp_node s = terrimpi_tree_node(&v->terrain->tree,
-                                               v->records[v->items[i].index].node);
-            float angle, parallax;
-            terrimp_mesh_info mesh;
-            terrimp_box box;
-            uint32_t parts;
-            terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
-                           &parallax);
-            terrimpi_mesh_place(v->terrain, s.number, &mesh);
-            v->stats.triangles += mesh.index_count / 3u * parts;
-            v->stats.draws += parts;
-            v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
-            v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
-            terrimpi_site_box(v, &s, &box);
-            closest = terrimpi_min(closest, terrimp_box_distance(&box, v->camera.eye));
-        }
-    /* All impostors go behind all ground: the closest one is moved to the end of the fade band. */
-    v->depth_bias = v->desc.fade_end / terrimpi_max(closest, v->desc.fade_end / 8.0f) - 1.0f;
+    for (i = 0; i < v->item_count; i++) {
+        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, v->records[v->items[i]].node);
+        float angle, parallax;
+        terrimp_mesh_info mesh;
+        uint32_t parts;
+        terrimpi_judge(v, terrimpi_picture(v, v->items[i], &parts), &s, &angle, &parallax);
+        terrimpi_mesh_place(v->terrain, s.number, &mesh);
+        v->stats.triangles += mesh.index_count / 3u * parts;
+        v->stats.draws += parts;
+        v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
+        v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
+    }
 }
 
 /* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
@@ -7442,8 +7419,7 @@ static void terrimpi_count_frame(terrimp_view *v)
         terrimpi_site_box(v, &v->units[u].site, &box);
         if (u == 0 || v->units[u].closest < s->z_near)
             s->z_near = v->units[u].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye) *
-                                              (1.0f + v->depth_bias));
+        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye));
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
@@ -7565,7 +7541,6 @@ static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job,
     callbacks->begin_capture(callbacks->user, &command);
     memset(&ground, 0, sizeof ground);
     ground.level = job->source;
-    ground.alpha = 1.0f;
     for (k = job->cell_from; k < job->cell_to; k++) {
         if (!terrimpi_cell(v, job, k, &ground.node, &pattern) ||
             !terrimpi_cell_in_part(v, job, ground.node, part))
@@ -7607,7 +7582,7 @@ static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    command.depth_bias = v->depth_bias;
+    command.alpha = record->alpha;
     record->drawn_count++;
     for (part = 0; part < record->part_count; part++) {
         command.part = part;
@@ -7625,7 +7600,6 @@ static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks
     command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
     command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
     command.index_count = terrimpi_floor_indices(v->terrain);
-    command.depth_bias = v->depth_bias;
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -7641,8 +7615,6 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     command.level = draw->node.level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
-    command.alpha = v->shown[index] < 0.0f ? 1.0f : v->shown[index];
-    command.depth_bias = v->shown[index] < 0.0f ? v->depth_bias : 0.0f;
     command.morph = draw->morph;
     memcpy(command.side, draw->side, sizeof command.side);
     memcpy(command.side_coarse, draw->side_coarse, sizeof command.side_coarse);
@@ -7663,18 +7635,12 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         terrimpi_render_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
     for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] >= 1.0f)
+        if (view->shown[view->leaves[i]])
             terrimpi_render_ground(view, view->leaves[i], callbacks);
     for (i = 0; i < view->item_count; i++)
-        if (view->items[i].is_impostor)
-            terrimpi_render_impostor(view, &view->records[view->items[i].index], callbacks);
-        else
-            terrimpi_render_ground(view, view->items[i].index, callbacks);
+        terrimpi_render_impostor(view, &view->records[view->items[i]], callbacks);
     if (callbacks->draw_floor && terrimpi_floor_wanted(view))
         terrimpi_render_floor(view, callbacks);
-    for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] > 0.0f && view->shown[view->leaves[i]] < 1.0f)
-            terrimpi_render_ground(view, view->leaves[i], callbacks);
     return TERRIMP_OK;
 }
 
