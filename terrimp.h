@@ -1742,18 +1742,18 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
 
-   shelves     in: where; empty or partly filled; out: its top is the height that was needed
+   atlas       [2] [texels] its width and height [Limits: 1..65536]
    quads       [count] in: texels; out: x and y
    gutter      [texels] [Limits: 0..64]
-   items       [count] scratch; out: PLACED in the flags of those that were
-   order       [count] scratch
+   rects       [count] out: the places, gutters included
+   order       [2 * count] scratch
    Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
-               fit: quads are unchanged, and the shelves hold what did
+               fit: quads are unchanged
    Cost        that of terrimp_pack_ffdh
    Source      Jeschke 2004, section 3.6, without his powers of two */
-TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
-                                              terrimp_pack_item *items, uint32_t *order);
+                                              terrimp_rect *rects, uint32_t *order);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -11626,28 +11626,27 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
-                                              terrimp_pack_item *items, uint32_t *order)
+                                              terrimp_rect *rects, uint32_t *order)
 {
     uint32_t i;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || !quads || !items || !order, TERRIMP_E_NULL);
+    float scale;
+    TERRIMPI_REFUSE(!atlas || !quads || !rects || !order, TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
                             !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
                         TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
-        items[i].rect = quads[i].texels;
-        items[i].rect.width += 2u * gutter;
-        items[i].rect.height += 2u * gutter;
-        TERRIMPI_REFUSE(items[i].rect.width > shelves->width ||
-                            items[i].rect.height > shelves->height,
-                        TERRIMP_E_CAPACITY); /* or it would be scaled */
+        rects[i] = quads[i].texels;
+        rects[i].width += 2u * gutter;
+        rects[i].height += 2u * gutter;
     }
-    TERRIMPI_TRY(terrimp_pack_ffdh(shelves, items, count, order, NULL));
+    TERRIMPI_TRY(terrimp_pack_ffdh(atlas[0], atlas[1], rects, count, order, &scale));
+    TERRIMPI_REFUSE(scale < 1.0f, TERRIMP_E_CAPACITY);
     for (i = 0; i < count; i++) {
-        quads[i].x = items[i].rect.x + gutter;
-        quads[i].y = items[i].rect.y + gutter;
+        quads[i].x = rects[i].x + gutter;
+        quads[i].y = rects[i].y + gutter;
     }
     return TERRIMP_OK;
 }
