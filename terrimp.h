@@ -1360,20 +1360,11 @@ typedef struct terrimp_border_point {
     float height; /* [wu] fitted; at both ends the sample's own height */
 } terrimp_border_point;
 
-/* One border polyline of a tile: `at` rises from 0 to the last sample of that border. */
+/* One border polyline of a tile: `at` rises, along +x or +z, from 0 to the last sample. */
 typedef struct terrimp_border {
     const terrimp_border_point *points; /* (required) [point_count] */
     uint32_t point_count;               /* [Limits: 2..samples of the border] */
 } terrimp_border;
-
-/* Which border of a tile is which. Points run along +x or +z, never around the tile. */
-enum {
-    TERRIMP_BORDER_Z0 = 0, /* row 0, along +x */
-    TERRIMP_BORDER_Z1,     /* last row, along +x */
-    TERRIMP_BORDER_X0,     /* column 0, along +z */
-    TERRIMP_BORDER_X1,     /* last column, along +z */
-    TERRIMP_BORDER_COUNT
-};
 
 typedef struct terrimp_simplify_desc {
     const float *heights; /* (required) [rows][cols] of the tile, packed, finite [wu] */
@@ -1382,7 +1373,7 @@ typedef struct terrimp_simplify_desc {
     uint32_t triangle_budget; /* surface triangles at most [Limits: at least the border's own
                                  need, that is border vertices - 2; ..TERRIMP_MAX_TRIANGLES]
                                  [Default 0 -> TERRIMP_TRIANGLE_BUDGET] */
-    terrimp_border borders[TERRIMP_BORDER_COUNT]; /* (required) the four polylines; where two
+    terrimp_border borders[TERRIMP_SIDE_COUNT]; /* (required) the four polylines; where two
                                                      meet, both have the same height */
 } terrimp_simplify_desc;
 
@@ -1871,6 +1862,11 @@ static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
+static float terrimpi_clamp(float value, float low, float high)
+{
+    return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
+}
+
 static uint32_t terrimpi_clamp_u32(uint32_t value, uint32_t low, uint32_t high)
 {
     return terrimpi_min_u32(terrimpi_max_u32(value, low), high);
@@ -1936,6 +1932,14 @@ static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
 {
     size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
     return arena->base && arena->ok ? arena->base + at : NULL;
+}
+
+/* Whether a block of memory of the caller's will do. */
+static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
+{
+    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
+    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 static float terrimpi_dot(const float a[3], const float b[3])
@@ -2005,15 +2009,31 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
     terrimpi_cross(right, forward, up);
 }
 
+/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
+   extra memory. */
+static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
+                          int (*after)(const void *items, uint32_t a, uint32_t b))
+{
+    uint32_t i, k, gap;
+    for (gap = 1; gap < count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < count; i++) {
+            uint32_t moved = order[i];
+            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
+                order[k] = order[k - gap];
+            order[k] = moved;
+        }
+}
+
 /* Whether a side runs along x. */
 static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
 
 /* Twice the area of a triangle of samples (x, z); positive when it is counter-clockwise from above:
    when its normal has y > 0. */
-static int64_t terrimpi_twice_area(const uint32_t a[2], const uint32_t b[2], const uint32_t c[2])
+static int64_t terrimpi_twice_area(const int64_t a[2], const int64_t b[2], const int64_t c[2])
 {
-    return ((int64_t)b[1] - a[1]) * ((int64_t)c[0] - a[0]) -
-           ((int64_t)b[0] - a[0]) * ((int64_t)c[1] - a[1]);
+    return (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1]);
 }
 
 /* Where point k of a lattice of every 2^level-th sample lies; beyond the last sample, on it. */
@@ -2048,11 +2068,6 @@ static void terrimpi_widen(float *low, float *high, float slope)
 
    A raw value is a sample as stored, converted to float: exact for all formats. Voids are told by
    raw values; two different raw values may well share one world height. */
-
-static float terrimpi_clamp(float value, float low, float high)
-{
-    return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
-}
 
 /* Bytes of one sample of an effective format. */
 static size_t terrimpi_sample_bytes(int format)
@@ -4402,23 +4417,6 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 /* ==== Atlas ============================================================== >>impl-atlas */
 /* Based on: Hess 2010, section 4.3. */
 
-/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
-   extra memory. */
-static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
-                          int (*after)(const void *items, uint32_t a, uint32_t b))
-{
-    uint32_t i, k, gap;
-    for (gap = 1; gap < count / 3u;)
-        gap = 3u * gap + 1u;
-    for (; gap > 0; gap /= 3u)
-        for (i = gap; i < count; i++) {
-            uint32_t moved = order[i];
-            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
-                order[k] = order[k - gap];
-            order[k] = moved;
-        }
-}
-
 /* Whether rectangle a comes after b: lower, or as high and narrower, or later. */
 static int terrimpi_pack_after(const void *rects, uint32_t a, uint32_t b)
 {
@@ -4998,13 +4996,6 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
     return b.ok ? b.bytes : 0;
 }
 
-static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
-{
-    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
-}
-
 /* Where a node lies: its first sample, how many quads of the field it spans, and its tile of every
    2^level-th sample, whose last column and row are the node's last. */
 typedef struct terrimpi_patch {
@@ -5030,12 +5021,12 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 /* Samples from the node's first one to a point of its mesh. */
 static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
 {
-    return terrimpi_min_u32((uint32_t)point->x << p->level, p->span_x);
+    return terrimpi_lattice(point->x, p->level, p->span_x);
 }
 
 static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
 {
-    return terrimpi_min_u32((uint32_t)point->z << p->level, p->span_z);
+    return terrimpi_lattice(point->z, p->level, p->span_z);
 }
 
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
@@ -5394,8 +5385,7 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
     for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
-        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
+        uint32_t x = terrimpi_point_x(&p, &points[i]), z = terrimpi_point_z(&p, &points[i]);
         xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
         xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
         xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
@@ -5679,15 +5669,14 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const te
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
-        int32_t x[3], z[3];
-        int64_t area;
+        int64_t at[3][2], area;
         for (k = 0; k < 3u; k++) {
             if (corners[k] >= mesh->vertex_count)
                 return 0;
-            x[k] = (int32_t)terrimpi_point_x(p, &points[corners[k]]);
-            z[k] = (int32_t)terrimpi_point_z(p, &points[corners[k]]);
+            at[k][0] = terrimpi_point_x(p, &points[corners[k]]);
+            at[k][1] = terrimpi_point_z(p, &points[corners[k]]);
         }
-        area = (int64_t)(z[1] - z[0]) * (x[2] - x[0]) - (int64_t)(x[1] - x[0]) * (z[2] - z[0]);
+        area = terrimpi_twice_area(at[0], at[1], at[2]);
         if (area <= 0)
             return 0;
         all += area;
@@ -6050,12 +6039,6 @@ static void terrimpi_setting(float *value, float otherwise, float low, float hig
         *result = TERRIMP_E_RANGE;
 }
 
-static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
-{
-    if (*value == 0)
-        *value = otherwise;
-}
-
 /* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels
    that live for longer and begin closer to the eye. (Measured on the rough terrain of 4097 samples:
    at 4 px 0.035 of the full mesh's time at 30 dB; before that 0.075 at 32 dB.) */
@@ -6101,15 +6084,14 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_TRY(terrimpi_settings_resolve(terrain, &d));
     if (d.ground_rule == TERRIMP_GEOMIP_DEFAULT)
         d.ground_rule = TERRIMP_GEOMIP_PICTURE;
-    terrimpi_default_u32(&d.atlas_size, 4096);
-    terrimpi_default_u32(&d.atlas_count, 1);
-    terrimpi_default_u32(&d.max_impostors, 1024);
-    terrimpi_default_u32(&d.max_captures, 64);
+    TERRIMPI_DEFAULT(d.atlas_size, 4096);
+    TERRIMPI_DEFAULT(d.atlas_count, 1);
+    TERRIMPI_DEFAULT(d.max_impostors, 1024);
+    TERRIMPI_DEFAULT(d.max_captures, 64);
     chunks = terrain->tree.level_first[1];
-    terrimpi_default_u32(&d.max_ground,
-                         d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
-                             ? terrimpi_min_u32(chunks, 4096)
-                             : chunks);
+    TERRIMPI_DEFAULT(d.max_ground, d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
+                                       ? terrimpi_min_u32(chunks, 4096)
+                                       : chunks);
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
@@ -7920,7 +7902,7 @@ static int terrimpi_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b,
     terrimpi_true_place(s, a, p[0]);
     terrimpi_true_place(s, b, p[1]);
     terrimpi_true_place(s, c, p[2]);
-    return (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]) > (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]);
+    return terrimpi_twice_area(p[0], p[1], p[2]) > 0;
 }
 
 /* --- which samples belong to a triangle, and sums over them --- */
@@ -8871,8 +8853,8 @@ static void terrimpi_lattice_size(int32_t inner_cols, int32_t inner_rows, int32_
 static void terrimpi_place_border(terrimpi_simplifier *s, const terrimp_border *borders,
                                   terrimp_mesh_vertex *loop, int32_t side[5])
 {
-    static const int order[4] = {TERRIMP_BORDER_X0, TERRIMP_BORDER_Z1, TERRIMP_BORDER_X1,
-                                 TERRIMP_BORDER_Z0};
+    static const int order[4] = {TERRIMP_SIDE_X0, TERRIMP_SIDE_Z1, TERRIMP_SIDE_X1,
+                                 TERRIMP_SIDE_Z0};
     int32_t w = s->cols - 1, h = s->rows - 1, v = 0, i, j;
     float steps;
     for (i = 0; i < 4; i++) {
@@ -9227,7 +9209,7 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
     TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
         terrimp_result r = terrimpi_check_border(
             b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
         if (r != TERRIMP_OK)
@@ -9235,8 +9217,8 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
     }
     for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
         uint32_t x_end = i & 1u, z_end = i >> 1;
-        const terrimp_border *p = b + (z_end ? TERRIMP_BORDER_Z1 : TERRIMP_BORDER_Z0);
-        const terrimp_border *q = b + (x_end ? TERRIMP_BORDER_X1 : TERRIMP_BORDER_X0);
+        const terrimp_border *p = b + (z_end ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_Z0);
+        const terrimp_border *q = b + (x_end ? TERRIMP_SIDE_X1 : TERRIMP_SIDE_X0);
         if (p->points[x_end ? p->point_count - 1 : 0].height !=
             q->points[z_end ? q->point_count - 1 : 0].height)
             return TERRIMP_E_RANGE;
@@ -9298,7 +9280,7 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
     TERRIMPI_REFUSE(!desc || !scratch || !mesh, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_check_desc(desc));
     budget = desc->triangle_budget ? desc->triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++)
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
         border += desc->borders[i].point_count - 1;
     TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
     plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
@@ -9920,29 +9902,35 @@ static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
     }
 }
 
+static float terrimpi_mip_sample(const terrimp_quadtree *t, const int64_t at[2])
+{
+    return terrimpi_sample(&t->field, (uint32_t)at[0], (uint32_t)at[1]);
+}
+
 /* Compares the samples in a triangle of three samples, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const uint32_t a[2],
-                                         const uint32_t b[2], const uint32_t c[2],
+static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const int64_t a[2],
+                                         const int64_t b[2], const int64_t c[2],
                                          terrimpi_mip_misses *misses)
 {
-    uint32_t x0 = terrimpi_min_u32(a[0], terrimpi_min_u32(b[0], c[0]));
-    uint32_t x1 = terrimpi_max_u32(a[0], terrimpi_max_u32(b[0], c[0]));
-    uint32_t z0 = terrimpi_min_u32(a[1], terrimpi_min_u32(b[1], c[1]));
-    uint32_t z1 = terrimpi_max_u32(a[1], terrimpi_max_u32(b[1], c[1]));
-    int64_t all = terrimpi_twice_area(a, b, c);
-    float height = terrimpi_sample(&t->field, a[0], a[1]);
-    float to_b = terrimpi_sample(&t->field, b[0], b[1]) - height;
-    float to_c = terrimpi_sample(&t->field, c[0], c[1]) - height;
-    uint32_t at[2];
+    int64_t all = terrimpi_twice_area(a, b, c), low[2], high[2], at[2];
+    float height = terrimpi_mip_sample(t, a);
+    float to_b = terrimpi_mip_sample(t, b) - height, to_c = terrimpi_mip_sample(t, c) - height;
+    int k;
     if (all <= 0)
         return;
-    for (at[1] = z0; at[1] <= z1; at[1]++)
-        for (at[0] = x0; at[0] <= x1; at[0]++) {
+    for (k = 0; k < 2; k++) {
+        low[k] = a[k] < b[k] ? a[k] : b[k];
+        high[k] = a[k] > b[k] ? a[k] : b[k];
+        low[k] = low[k] < c[k] ? low[k] : c[k];
+        high[k] = high[k] > c[k] ? high[k] : c[k];
+    }
+    for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+        for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
             int64_t by_b = terrimpi_twice_area(c, a, at), by_c = terrimpi_twice_area(a, b, at);
             float sample, miss;
             if (by_b < 0 || by_c < 0 || by_b + by_c > all)
                 continue;
-            sample = terrimpi_sample(&t->field, at[0], at[1]);
+            sample = terrimpi_mip_sample(t, at);
             miss = sample - height;
             miss -= (to_b * (float)by_b + to_c * (float)by_c) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
@@ -9962,7 +9950,8 @@ static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p
     block.quads = 2;
     block.pattern = 1u << (side ^ 1);
     for (along = 0; along < 2u * quads; along++) {
-        uint32_t across = last ? 0u : 1u, at[4][2], first[2];
+        uint32_t across = last ? 0u : 1u, first[2];
+        int64_t at[4][2];
         first[!along_x] = along & ~1u;
         first[along_x] = last ? 2u * quads : (uint32_t)-2;
         for (c = 0; c < 4u; c++) { /* counter-clockwise */
@@ -10088,12 +10077,6 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     return b.ok ? b.bytes : 0;
 }
 
-/* The sample of a node that column or row k of its tile stands on. */
-static uint32_t terrimpi_tile_place(uint32_t k, uint32_t level, uint32_t span)
-{
-    return terrimpi_min_u32(k << level, span);
-}
-
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
 static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex *from,
                               const terrimp_mesh_vertex *to, terrimpi_facet *facet)
@@ -10104,10 +10087,10 @@ static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex
     if (a->z == b->z)
         return;
     side = a == from ? &facet->left[facet->left_count++] : &facet->right[facet->right_count++];
-    side->low = terrimpi_tile_place(a->z, p->level, p->span_z);
-    side->high = terrimpi_tile_place(b->z, p->level, p->span_z);
-    side->x = (float)terrimpi_tile_place(a->x, p->level, p->span_x);
-    x = (float)terrimpi_tile_place(b->x, p->level, p->span_x);
+    side->low = terrimpi_lattice(a->z, p->level, p->span_z);
+    side->high = terrimpi_lattice(b->z, p->level, p->span_z);
+    side->x = (float)terrimpi_lattice(a->x, p->level, p->span_x);
+    x = (float)terrimpi_lattice(b->x, p->level, p->span_x);
     inverse = 1.0f / (float)(side->high - side->low);
     side->slope = (x - side->x) * inverse;
     side->h = a->height;
@@ -10172,8 +10155,8 @@ static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *me
             a = b;
             b = swap;
         }
-        from = terrimpi_tile_place(terrimpi_min_u32(a_at, b_at), p->level, span);
-        to = terrimpi_tile_place(terrimpi_max_u32(a_at, b_at), p->level, span);
+        from = terrimpi_lattice(terrimpi_min_u32(a_at, b_at), p->level, span);
+        to = terrimpi_lattice(terrimpi_max_u32(a_at, b_at), p->level, span);
         terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
                            (b->height - a->height) / (float)(to - from));
     }
@@ -10189,7 +10172,7 @@ static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *
     float *row = build->row, last = (float)p->span_x;
     terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
-        terrimpi_take_border(p, mesh, TERRIMP_BORDER_Z1, row);
+        terrimpi_take_border(p, mesh, TERRIMP_SIDE_Z1, row);
         return;
     }
     for (; facet < end; facet++) {
@@ -10237,8 +10220,8 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
                                      float *line)
 {
     int along_x = terrimpi_along_x(side);
-    uint32_t x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
-    uint32_t z = side == TERRIMP_BORDER_Z1 ? p->z + p->span_z : p->z;
+    uint32_t x = side == TERRIMP_SIDE_X1 ? p->x + p->span_x : p->x;
+    uint32_t z = side == TERRIMP_SIDE_Z1 ? p->z + p->span_z : p->z;
     uint32_t span = along_x ? p->span_x : p->span_z;
     terrimpi_heightfield_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
                               along_x ? 1u : span + 1u, 1, line);
@@ -10249,8 +10232,8 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
 static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t *first,
                                      uint32_t *step)
 {
-    *first = side == TERRIMP_BORDER_Z1   ? (p->rows - 1u) * p->cols
-             : side == TERRIMP_BORDER_X1 ? p->cols - 1u
+    *first = side == TERRIMP_SIDE_Z1   ? (p->rows - 1u) * p->cols
+             : side == TERRIMP_SIDE_X1 ? p->cols - 1u
                                          : 0u;
     *step = terrimpi_along_x(side) ? 1u : p->cols;
     return terrimpi_along_x(side) ? p->cols : p->rows;
@@ -10278,12 +10261,12 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
         for (i = 0; i < p->cols; i++)
             out[i] /= (float)(to - from);
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t span = terrimpi_read_border(t, p, side, build->row);
         uint32_t count = terrimpi_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             build->tile[first + k * step] =
-                k == 0 || k + 1u == count ? build->row[terrimpi_tile_place(k, p->level, span)]
+                k == 0 || k + 1u == count ? build->row[terrimpi_lattice(k, p->level, span)]
                                           : terrimpi_line_mean(build->row, k, p->level, span);
     }
 }
@@ -10292,7 +10275,7 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
 static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const terrimpi_patch *p,
                                              const terrimpi_build *build, terrimp_mesh *mesh)
 {
-    terrimp_border_point points[TERRIMP_BORDER_COUNT][16];
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][16];
     float line[129];
     terrimp_simplify_desc desc;
     terrimpi_squeeze squeeze;
@@ -10301,7 +10284,7 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     desc.cols = p->cols;
     desc.rows = p->rows;
     desc.triangle_budget = t->desc.triangle_budget;
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
@@ -10368,7 +10351,7 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
             }
         }
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++)
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         terrimpi_miss_border(t, p, side, mesh, build);
 }
 
