@@ -1,6 +1,6 @@
 /* Two atlases in turn, after Hess 2010, section 4.3, on top of terrimp_pack_ffdh: pictures move
    from the outdated atlas to the newest one as they are renewed; when all have moved, the outdated
-   atlas is emptied, packed anew and becomes the newest one. What the live atlas is measured against. */
+   one is emptied, packed anew and becomes the newest. What the live atlas is measured against. */
 #ifndef ATLAS_PAIR_H
 #define ATLAS_PAIR_H
 
