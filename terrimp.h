@@ -45,7 +45,7 @@
        >>quadtree     which node: its place, box, parent, neighbours, children closest first
        >>geomipmap    levels, crack-free index patterns, selection, morphing
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
-       >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
+       >>atlas        first-fit decreasing height packing; an atlas whose slots come and go
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
        >>view         the per-frame decision, the schedule, the draw commands
@@ -790,107 +790,22 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 
 /* ==== Atlas ============================================================== >>atlas */
 
-/* One rectangle to be packed. */
-typedef struct terrimp_pack_item {
-    terrimp_rect rect; /* width, height: in, > 0, reduced when SCALED; x, y: out */
-    uint32_t flags;    /* out: TERRIMP_PACK_... */
-} terrimp_pack_item;
+/* First-fit decreasing height: rectangles stand side by side on shelves, from the tallest on, each
+   on the lowest shelf with room for it. If they do not all fit, all are reduced alike, in steps of
+   6 %, until they do. For texels between two of them, ask for larger ones.
 
-enum {
-    TERRIMP_PACK_PLACED = 1 << 0, /* x and y are set */
-    TERRIMP_PACK_SCALED = 1 << 1  /* was larger than the atlas: both sides were reduced alike */
-};
-
-/* A row of rectangles side by side. */
-typedef struct terrimp_shelf {
-    uint32_t y, height; /* fixed by the first rectangle on the shelf */
-    uint32_t used;      /* from x = 0 */
-} terrimp_shelf;
-
-/* An atlas that is filled shelf by shelf and emptied as a whole. */
-typedef struct terrimp_shelves {
-    uint32_t width, height; /* of the atlas [texels] */
-    uint32_t padding;       /* texels kept free between two rectangles */
-    terrimp_shelf *items;   /* the caller's array; one entry a rectangle always suffices */
-    uint32_t capacity;
-    uint32_t count;
-    uint32_t top;           /* first row above the shelves */
-} terrimp_shelves;
-
-/* Empties an atlas. The array stays the caller's and outlives the shelves.
-   Errors: E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
-TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
-                                                uint32_t height, uint32_t padding,
-                                                terrimp_shelf *items, uint32_t capacity);
-
-/* First fit: puts a rectangle on the lowest shelf with room for it, or on a new shelf.
-
-   rect       in: width and height [Limits: > 0]; out: x and y
-   Errors     E_CAPACITY when it fits nowhere: nothing is changed
-   Cost       O(shelves) */
-TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect);
-
-/* First-fit decreasing height: packs rectangles into an empty or partly filled atlas.
-
-   items      [count] in and out; the order is kept
-   order      [count] out: the order of insertion, from the tallest
-   placed     out, how many were placed; may be NULL
-   Errors     E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all fit:
-              those that did are flagged PLACED
-   Cost       O(n^1.5 + n * shelves), no allocation
+   width, height  of the atlas [texels] [Limits: 1..65536]
+   rects      [count] in: sizes, as large as they may be; one of width or height 0 is passed over;
+              out: the sizes that fitted, and the places
+   order      [2 * count] out: the first half is the order of insertion; the rest is scratch
+   scale      out: what the sizes were multiplied by, 1 when they fitted; may be NULL
+   Errors     E_RANGE; E_CAPACITY when not even one texel each fits: only places and order may
+              have changed
+   Cost       O(n^1.5 + n * shelves) for each step, no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
-TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_pack_item *items,
-                                             uint32_t count, uint32_t *order, uint32_t *placed);
-
-/* Where one impostor stands in the two atlases of a pair. */
-typedef struct terrimp_pair_slot {
-    terrimp_rect rect[2];      /* its rectangle in each atlas, where assigned */
-    unsigned char assigned[2];
-    unsigned char filled[2];   /* a picture is there */
-} terrimp_pair_slot;
-
-/* The double-buffered scheme: pictures move from the outdated atlas to the newest one as they are
-   renewed; when all have moved, the outdated atlas is emptied, packed anew and becomes the newest
-   one. */
-typedef struct terrimp_atlas_pair {
-    terrimp_shelves shelves[2];
-    uint32_t newest;  /* 0 or 1 */
-    uint32_t repacks; /* so far */
-} terrimp_atlas_pair;
-
-/* Two empty atlases (Hess 2010, section 4.3); items [2 * capacity] is the caller's.
-   Errors: those of terrimp_shelves_init. */
-TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t width,
-                                             uint32_t height, terrimp_shelf *items,
-                                             uint32_t capacity);
-
-/* Empties the outdated atlas, packs a set of sizes into it and makes it the newest. Every slot of
-   `slots` loses what it had in that atlas; what it has in the other one stays.
-   If the sizes do not fit, all are reduced alike until they do.
-
-   slots      [count] in and out
-   items      [count] in: sizes, in the order of slots, an empty one for a slot that needs none;
-              out: rectangles
-   order      [count] scratch
-   scale      out, factor by which all sides were reduced, 1 when they fitted; may be NULL
-   Errors     E_CAPACITY when even one texel each does not fit: slots are left unassigned */
-TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
-                                               terrimp_pack_item *items, uint32_t count,
-                                               uint32_t *order, float *scale);
-
-/* Gives a slot a rectangle of the wanted size in the newest atlas, on a shelf with room for it.
-   Errors: those of terrimp_shelves_insert. */
-TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp_pair_slot *slot,
-                                               uint32_t width, uint32_t height);
-
-/* Notes that the picture has been rendered into the slot of the newest atlas: it has moved.
-   Errors: E_STATE when the slot has no rectangle there. */
-TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
-                                             terrimp_pair_slot *slot);
-
-/* The atlas that holds the slot's latest picture, 0 or 1, or -1 when it has none. */
-TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terrimp_pair_slot *slot);
+TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, terrimp_rect *rects,
+                                             uint32_t count, uint32_t *order, float *scale);
 
 /* An atlas whose slots are allocated and freed one by one, in any order, while the others stay
    where they are. */
@@ -902,28 +817,20 @@ typedef struct terrimp_live_atlas_desc {
 
 typedef struct terrimp_live_atlas {
     terrimp_live_atlas_desc desc;
-    terrimp_rect *slots; /* [max_slots] width 0: unused, x is the next unused one */
+    terrimp_rect *slots; /* [max_slots] where each lies; width 0: unused, x is the next unused */
     terrimp_rect *holes; /* [max_holes] the maximal free rectangles, which overlap each other */
     uint32_t hole_count, max_holes;
     uint32_t unused;     /* the first unused slot, max_slots for none */
     uint32_t slot_end;   /* above every slot that was ever used */
-    uint32_t slot_count, texels_used, failures;
+    uint32_t slot_count, texels_used; /* without padding */
+    uint32_t failures;   /* allocations that found no room, since init */
 } terrimp_live_atlas;
-
-typedef struct terrimp_live_atlas_stats {
-    uint32_t slots;          /* in use */
-    uint32_t texels_used;    /* within these, without padding */
-    uint32_t texels_free;    /* all others */
-    uint32_t largest_width;  /* of the free rectangle of most texels; */
-    uint32_t largest_height; /* 0 when nothing is free */
-    uint32_t failures;       /* allocations that found no room, since init or reset */
-} terrimp_live_atlas_stats;
 
 /* The size of the block of memory that an atlas needs beside its struct; 0 when init would refuse
    the descriptor, or for NULL. */
 TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc);
 
-/* An empty atlas.
+/* An empty atlas; also empties one.
 
    memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
    bytes      at least terrimp_live_atlas_bytes(desc)
@@ -931,9 +838,6 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes);
-
-/* Frees all slots and sets the failures to 0. */
-TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas);
 
 /* Finds room for a rectangle and keeps it.
 
@@ -949,10 +853,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
-/* Where a slot lies. Errors: those of terrimp_live_atlas_free. */
-TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
-                                                   terrimp_rect *rect);
-
 /* The largest rectangle of a shape that could be allocated now, for hosts that take a smaller slot
    rather than none.
 
@@ -962,26 +862,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
-
-/* Frees what costs least so that a rectangle fits, for an atlas that is full or fragmented: of the
-   places where it would border on slots or on free rectangles, the one whose slots have the lowest
-   sum of costs. It does not allocate: alloc will then find room.
-
-   costs      [max_slots] of losing each slot that is in use; one whose cost is negative, infinite
-              or NaN stays. Texels times how likely they are to be made again is a good cost
-   victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
-              only handles were wanting. Scratch: it changes on E_CAPACITY too
-   count      out: how many
-   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it is larger than the atlas or every
-              such place holds a slot that stays: nothing changes
-   Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
-TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, const float *costs,
-                                                    uint32_t *victims, uint32_t *count);
-
-/* What the atlas holds. Cost: O(free rectangles). */
-TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
-                                                    terrimp_live_atlas_stats *stats);
 
 /* ==== Terrain ============================================================ >>terrain */
 
@@ -1349,7 +1229,7 @@ typedef struct terrimp_stats {
     uint32_t captures_due;       /* pictures that the tolerances wanted renewed */
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
-    uint32_t texels_used, texels_free; /* of all atlases */
+    uint64_t texels_used, texels_free; /* of all atlases */
     uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
@@ -2026,18 +1906,18 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
 
-   shelves     in: where; empty or partly filled; out: its top is the height that was needed
+   atlas       [2] [texels] its width and height [Limits: 1..65536]
    quads       [count] in: texels; out: x and y
    gutter      [texels] [Limits: 0..64]
-   items       [count] scratch; out: PLACED in the flags of those that were
-   order       [count] scratch
+   rects       [count] out: the places, gutters included
+   order       [2 * count] scratch
    Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
-               fit: quads are unchanged, and the shelves hold what did
+               fit: quads are unchanged
    Cost        that of terrimp_pack_ffdh
    Source      Jeschke 2004, section 3.6, without his powers of two */
-TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
-                                              terrimp_pack_item *items, uint32_t *order);
+                                              terrimp_rect *rects, uint32_t *order);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -4760,56 +4640,11 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 /* ==== Atlas ============================================================== >>impl-atlas */
 /* Based on: Hess 2010, section 4.3. */
 
-TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
-                                                uint32_t height, uint32_t padding,
-                                                terrimp_shelf *items, uint32_t capacity)
+/* Whether rectangle a comes after b: lower, or as high and narrower, or later. */
+static int terrimpi_pack_after(const void *rects, uint32_t a, uint32_t b)
 {
-    TERRIMPI_REFUSE(!shelves || !items, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) || padding > 65536u ||
-                    !terrimpi_within_u32(height, 1u, 65536u) || capacity < 1u, TERRIMP_E_RANGE);
-    shelves->width = width;
-    shelves->height = height;
-    shelves->padding = padding;
-    shelves->items = items;
-    shelves->capacity = capacity;
-    shelves->count = shelves->top = 0;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect)
-{
-    terrimp_shelf *shelf;
-    uint32_t i;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || !rect, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(rect->width < 1u || rect->height < 1u, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(rect->width > shelves->width ||
-                    rect->height > shelves->height, TERRIMP_E_CAPACITY);
-    for (i = 0; i < shelves->count; i++) {
-        shelf = &shelves->items[i];
-        if (rect->height <= shelf->height && shelf->used <= shelves->width - rect->width)
-            break;
-    }
-    if (i == shelves->count) {
-        if (i == shelves->capacity || shelves->top > shelves->height - rect->height)
-            return TERRIMP_E_CAPACITY;
-        shelf = &shelves->items[shelves->count++];
-        shelf->y = shelves->top;
-        shelf->height = rect->height;
-        shelf->used = 0;
-        shelves->top += rect->height + shelves->padding;
-    }
-    shelf = &shelves->items[i];
-    rect->x = shelf->used;
-    rect->y = shelf->y;
-    shelf->used += rect->width + shelves->padding;
-    return TERRIMP_OK;
-}
-
-/* Whether item a comes after item b: lower, or as high and narrower, or later. */
-static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
-{
-    const terrimp_pack_item *item = (const terrimp_pack_item *)items;
-    const terrimp_rect *p = &item[a].rect, *q = &item[b].rect;
+    const terrimp_rect *p = (const terrimp_rect *)rects + a;
+    const terrimp_rect *q = (const terrimp_rect *)rects + b;
     if (p->height != q->height)
         return p->height < q->height;
     if (p->width != q->width)
@@ -4817,157 +4652,69 @@ static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
     return a > b;
 }
 
-static void terrimpi_pack_sort(const terrimp_pack_item *items, uint32_t *order, uint32_t count)
+/* A side at a scale <= 1; whole at 1, since a float could round a huge one out of its type. */
+static uint32_t terrimpi_pack_side(uint32_t side, float scale)
 {
+    return scale < 1.0f && side ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
+}
+
+/* Finds places for all at a scale; returns whether there are. `shelves` lists the first rectangle
+   of each shelf, whose x meanwhile says how far the shelf is taken. */
+static int terrimpi_pack_try(uint32_t width, uint32_t height, terrimp_rect *rects, uint32_t count,
+                             const uint32_t *order, uint32_t *shelves, float scale)
+{
+    uint32_t i, k, shelf_count = 0, top = 0;
+    for (i = 0; i < count; i++) {
+        terrimp_rect *rect = &rects[order[i]], *first;
+        uint32_t wide = terrimpi_pack_side(rect->width, scale);
+        uint32_t high = terrimpi_pack_side(rect->height, scale);
+        if (wide == 0 || high == 0)
+            continue;
+        if (wide > width || high > height)
+            return 0;
+        for (k = 0; k < shelf_count && rects[shelves[k]].x > width - wide;)
+            k++;
+        if (k == shelf_count) {
+            if (top > height - high)
+                return 0;
+            shelves[shelf_count++] = order[i];
+            rect->x = 0;
+            rect->y = top;
+            top += high;
+        }
+        first = &rects[shelves[k]];
+        rect->y = first->y;
+        rect->x = first->x;
+        first->x += wide;
+    }
+    for (k = 0; k < shelf_count; k++)
+        rects[shelves[k]].x = 0;
+    return 1;
+}
+
+TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, terrimp_rect *rects,
+                                             uint32_t count, uint32_t *order, float *scale)
+{
+    float by = 1.0f;
     uint32_t i;
+    TERRIMPI_REFUSE(count && (!rects || !order), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < count; i++)
         order[i] = i;
-    terrimpi_sort(order, count, items, terrimpi_pack_after);
-}
-
-/* Reduces a rectangle that is larger than the atlas, keeping its shape; returns whether it was. */
-static int terrimpi_pack_reduce(const terrimp_shelves *shelves, terrimp_rect *rect)
-{
-    float x = (float)shelves->width / (float)rect->width;
-    float y = (float)shelves->height / (float)rect->height;
-    float scale = terrimpi_min(x, y);
-    if (rect->width <= shelves->width && rect->height <= shelves->height)
-        return 0;
-    rect->width = terrimpi_clamp_u32((uint32_t)((float)rect->width * scale), 1u, shelves->width);
-    rect->height = terrimpi_clamp_u32((uint32_t)((float)rect->height * scale), 1u, shelves->height);
-    return 1;
-}
-
-TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_pack_item *items,
-                                             uint32_t count, uint32_t *order, uint32_t *placed)
-{
-    uint32_t i, done = 0;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || (count && (!items || !order)), TERRIMP_E_NULL);
-    for (i = 0; i < count; i++)
-        TERRIMPI_REFUSE(items[i].rect.width < 1u || items[i].rect.height < 1u, TERRIMP_E_RANGE);
-    for (i = 0; i < count; i++)
-        items[i].flags =
-            terrimpi_pack_reduce(shelves, &items[i].rect) ? (uint32_t)TERRIMP_PACK_SCALED : 0u;
-    terrimpi_pack_sort(items, order, count);
-    for (i = 0; i < count; i++) {
-        terrimp_pack_item *item = &items[order[i]];
-        if (terrimp_shelves_insert(shelves, &item->rect) != TERRIMP_OK)
-            continue;
-        item->flags |= (uint32_t)TERRIMP_PACK_PLACED;
-        done++;
-    }
-    if (placed)
-        *placed = done;
-    return done == count ? TERRIMP_OK : TERRIMP_E_CAPACITY;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t width,
-                                             uint32_t height, terrimp_shelf *items,
-                                             uint32_t capacity)
-{
-    TERRIMPI_REFUSE(!pair || !items, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimp_shelves_init(&pair->shelves[0], width, height, 0, items, capacity));
-    terrimp_shelves_init(&pair->shelves[1], width, height, 0, items + capacity, capacity);
-    pair->newest = 0;
-    pair->repacks = 0;
-    return TERRIMP_OK;
-}
-
-/* A side at a scale <= 1; whole at 1, since a float could round a huge one out of its type. */
-static uint32_t terrimpi_pair_side(uint32_t side, float scale)
-{
-    return scale < 1.0f ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
-}
-
-/* Inserts the non-empty items, tallest first, at a scale, into emptied shelves; returns whether all
-   of them fitted. The sizes of `items` stay as asked for; rectangles go to the slots. */
-static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_pair_slot *slots,
-                             const terrimp_pack_item *items, uint32_t count, const uint32_t *order,
-                             float scale)
-{
-    uint32_t i;
-    shelves->count = shelves->top = 0;
-    for (i = 0; i < count; i++) {
-        uint32_t k = order[i];
-        terrimp_rect *rect = &slots[k].rect[atlas];
-        if (items[k].rect.width < 1u || items[k].rect.height < 1u)
-            continue;
-        rect->width = terrimpi_pair_side(items[k].rect.width, scale);
-        rect->height = terrimpi_pair_side(items[k].rect.height, scale);
-        if (terrimp_shelves_insert(shelves, rect) != TERRIMP_OK)
-            return 0;
-    }
-    return 1;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
-                                               terrimp_pack_item *items, uint32_t count,
-                                               uint32_t *order, float *scale)
-{
-    uint32_t i, atlas;
-    float by = 1.0f;
-    int fits;
-    TERRIMPI_REFUSE(!pair || !pair->shelves[0].items ||
-                    (count && (!slots || !items || !order)), TERRIMP_E_NULL);
-    atlas = 1u - pair->newest;
-    for (i = 0; i < count; i++)
-        slots[i].assigned[atlas] = slots[i].filled[atlas] = 0;
-    terrimpi_pack_sort(items, order, count);
-    /* Steps of 6 %: at most about 190 of them from the largest atlas down to one texel. */
-    while (!(fits = terrimpi_pair_try(&pair->shelves[atlas], atlas, slots, items, count, order,
-                                      by)) &&
-           by > 1e-5f)
+    terrimpi_sort(order, count, rects, terrimpi_pack_after);
+    /* at most 360 steps, from 2^32 texels down to one */
+    while (!terrimpi_pack_try(width, height, rects, count, order, order + count, by)) {
+        TERRIMPI_REFUSE(by < 2e-10f, TERRIMP_E_CAPACITY);
         by *= 0.94f;
-    pair->newest = atlas;
-    pair->repacks++;
+    }
+    for (i = 0; i < count; i++) {
+        rects[i].width = terrimpi_pack_side(rects[i].width, by);
+        rects[i].height = terrimpi_pack_side(rects[i].height, by);
+    }
     if (scale)
         *scale = by;
-    if (!fits) {
-        pair->shelves[atlas].count = pair->shelves[atlas].top = 0;
-        return TERRIMP_E_CAPACITY;
-    }
-    for (i = 0; i < count; i++)
-        if (items[i].rect.width >= 1u && items[i].rect.height >= 1u) {
-            slots[i].assigned[atlas] = 1;
-            items[i].rect = slots[i].rect[atlas];
-            items[i].flags = (uint32_t)TERRIMP_PACK_PLACED |
-                             (by < 1.0f ? (uint32_t)TERRIMP_PACK_SCALED : 0u);
-        }
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp_pair_slot *slot,
-                                               uint32_t width, uint32_t height)
-{
-    terrimp_rect rect;
-    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
-    rect.x = rect.y = 0;
-    rect.width = width;
-    rect.height = height;
-    TERRIMPI_TRY(terrimp_shelves_insert(&pair->shelves[pair->newest], &rect));
-    slot->rect[pair->newest] = rect;
-    slot->assigned[pair->newest] = 1;
-    slot->filled[pair->newest] = 0;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
-                                             terrimp_pair_slot *slot)
-{
-    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!slot->assigned[pair->newest], TERRIMP_E_STATE);
-    slot->filled[pair->newest] = 1;
-    slot->assigned[1u - pair->newest] = slot->filled[1u - pair->newest] = 0;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terrimp_pair_slot *slot)
-{
-    if (!pair || !slot)
-        return -1;
-    if (slot->filled[pair->newest])
-        return (int)pair->newest;
-    return slot->filled[1u - pair->newest] ? (int)(1u - pair->newest) : -1;
 }
 
 /* ---- the live atlas ----
@@ -5152,14 +4899,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
-{
-    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    terrimpi_live_reset(atlas);
-    return TERRIMP_OK;
-}
-
 /* The smallest hole that a size fits into, the first of equals; hole_count for none. */
 static uint32_t terrimpi_live_find(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
 {
@@ -5259,15 +4998,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     return terrimpi_live_alloc(atlas, width, height, slot);
 }
 
-/* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
-static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint32_t slot)
-{
-    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
-    return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
-}
-
 /* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
    contain, which touch it. */
 static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
@@ -5292,22 +5022,16 @@ static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
 {
     terrimp_rect freed;
-    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
+    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(atlas->slots[slot].width == 0, TERRIMP_E_STATE);
     freed = terrimpi_live_padded(atlas, slot);
     atlas->texels_used -= atlas->slots[slot].width * atlas->slots[slot].height;
     atlas->slot_count--;
     atlas->slots[slot] = terrimpi_rect(atlas->unused, 0, 0, 0);
     atlas->unused = slot;
     terrimpi_live_reclaim(atlas, &freed);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
-                                                   terrimp_rect *rect)
-{
-    TERRIMPI_REFUSE(!rect, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
-    *rect = atlas->slots[slot];
     return TERRIMP_OK;
 }
 
@@ -5347,180 +5071,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
     TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
                     !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     terrimpi_live_room(atlas, width, height, size);
-    return TERRIMP_OK;
-}
-
-/* The search for the place whose slots cost least. */
-typedef struct terrimpi_live_search {
-    const terrimp_live_atlas *atlas;
-    const float *costs;
-    uint32_t *by_x;    /* the slots in use from left to right */
-    uint32_t count;
-    uint32_t widest;   /* of these, with padding */
-    terrimp_rect best; /* its size is the one that is searched for */
-    float best_cost;
-} terrimpi_live_search;
-
-static int terrimpi_live_right_of(const void *slots, uint32_t a, uint32_t b)
-{
-    return ((const terrimp_rect *)slots)[a].x > ((const terrimp_rect *)slots)[b].x;
-}
-
-/* Lists the slots in use from left to right. */
-static void terrimpi_live_list(terrimpi_live_search *s)
-{
-    const terrimp_rect *slots = s->atlas->slots;
-    uint32_t i;
-    s->count = s->widest = 0;
-    for (i = 0; i < s->atlas->slot_end; i++)
-        if (slots[i].width > 0) {
-            s->by_x[s->count++] = i;
-            s->widest = terrimpi_max_u32(s->widest, slots[i].width + s->atlas->desc.padding);
-        }
-    terrimpi_sort(s->by_x, s->count, slots, terrimpi_live_right_of);
-}
-
-/* The first in the list of slots that may reach over a column. */
-static uint32_t terrimpi_live_reaching(const terrimpi_live_search *s, uint32_t x)
-{
-    uint32_t low = 0, high = s->count;
-    while (low < high) {
-        uint32_t middle = (low + high) / 2u;
-        if (s->atlas->slots[s->by_x[middle]].x + s->widest <= x)
-            low = middle + 1u;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-/* Takes a place if its slots cost less than those of the best one so far. */
-static void terrimpi_live_weigh(terrimpi_live_search *s, const terrimp_rect *place)
-{
-    float cost = 0.0f;
-    uint32_t i;
-    for (i = terrimpi_live_reaching(s, place->x); i < s->count; i++) {
-        uint32_t slot = s->by_x[i];
-        terrimp_rect taken = terrimpi_live_padded(s->atlas, slot);
-        if (taken.x >= place->x + place->width)
-            break;
-        if (!terrimpi_rects_overlap(place, &taken))
-            continue;
-        cost += s->costs[slot];
-        if (!(s->costs[slot] >= 0.0f && cost < s->best_cost))
-            return;
-    }
-    if (cost < s->best_cost) {
-        s->best_cost = cost;
-        s->best = *place;
-    }
-}
-
-/* Tries a place at the four corners of a rectangle, shifted into the atlas. */
-static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
-{
-    terrimp_rect whole = terrimpi_live_whole(s->atlas);
-    uint32_t corner, right = at->x + at->width, top = at->y + at->height;
-    for (corner = 0; corner < 4u; corner++) {
-        terrimp_rect place = s->best;
-        place.x = corner & 1u ? right - terrimpi_min_u32(right, place.width) : at->x;
-        place.y = corner & 2u ? top - terrimpi_min_u32(top, place.height) : at->y;
-        place.x = terrimpi_min_u32(place.x, whole.width - place.width);
-        place.y = terrimpi_min_u32(place.y, whole.height - place.height);
-        terrimpi_live_weigh(s, &place);
-    }
-}
-
-/* Searches at the corners of holes and slots; where these are very many, of every n-th. */
-static void terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
-{
-    const terrimp_live_atlas *atlas = s->atlas;
-    uint32_t i, step = 1u + (atlas->hole_count + atlas->slot_count) / 512u;
-    s->best = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
-    terrimpi_live_list(s);
-    for (i = 0; i < atlas->hole_count; i += step)
-        terrimpi_live_try(s, &atlas->holes[i]);
-    for (i = 0; i < s->count; i += step) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, s->by_x[i]);
-        terrimpi_live_try(s, &slot);
-    }
-}
-
-/* The same for a mere handle: the slot that costs least. */
-static void terrimpi_live_cheapest_slot(terrimpi_live_search *s)
-{
-    uint32_t i;
-    for (i = 0; i < s->atlas->slot_end; i++)
-        if (s->atlas->slots[i].width > 0 && s->costs[i] >= 0.0f && s->costs[i] < s->best_cost) {
-            s->best_cost = s->costs[i];
-            s->best = terrimpi_live_padded(s->atlas, i);
-        }
-}
-
-/* Frees the slots that overlap a place; returns how many. */
-static uint32_t terrimpi_live_clear(terrimp_live_atlas *atlas, const terrimp_rect *place,
-                                    uint32_t *victims)
-{
-    uint32_t i, count = 0;
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &slot))
-            continue;
-        terrimp_live_atlas_free(atlas, i);
-        victims[count++] = i;
-    }
-    return count;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, const float *costs,
-                                                    uint32_t *victims, uint32_t *count)
-{
-    terrimpi_live_search search;
-    int fits;
-    TERRIMPI_REFUSE(!atlas || !costs || !victims || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(width > atlas->desc.width || height > atlas->desc.height, TERRIMP_E_CAPACITY);
-    fits = terrimpi_live_find(atlas, width, height) < atlas->hole_count;
-    if (fits && atlas->unused < atlas->desc.max_slots) {
-        *count = 0;
-        return TERRIMP_OK;
-    }
-    search.atlas = atlas;
-    search.costs = costs;
-    search.by_x = victims;
-    search.best_cost = TERRIMPI_FLOAT_MAX;
-    if (fits)
-        terrimpi_live_cheapest_slot(&search);
-    else
-        terrimpi_live_cheapest(&search, width, height);
-    TERRIMPI_REFUSE(!(search.best_cost < TERRIMPI_FLOAT_MAX), TERRIMP_E_CAPACITY);
-    *count = terrimpi_live_clear(atlas, &search.best, victims);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
-                                                    terrimp_live_atlas_stats *stats)
-{
-    uint32_t i, padding;
-    TERRIMPI_REFUSE(!atlas || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    padding = atlas->desc.padding;
-    stats->slots = atlas->slot_count;
-    stats->texels_used = atlas->texels_used;
-    stats->texels_free = atlas->desc.width * atlas->desc.height - atlas->texels_used;
-    stats->largest_width = stats->largest_height = 0;
-    stats->failures = atlas->failures;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        if (hole->width > padding && hole->height > padding &&
-            (hole->width - padding) * (hole->height - padding) >
-                stats->largest_width * stats->largest_height) {
-            stats->largest_width = hole->width - padding;
-            stats->largest_height = hole->height - padding;
-        }
-    }
     return TERRIMP_OK;
 }
 
@@ -8081,7 +7631,7 @@ static void terrimpi_count_frame(terrimp_view *v)
     s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
         s->texels_used += v->atlases[i].texels_used;
-    s->texels_free = v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
                      s->texels_used;
 }
 
@@ -13258,28 +12808,27 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
-                                              terrimp_pack_item *items, uint32_t *order)
+                                              terrimp_rect *rects, uint32_t *order)
 {
     uint32_t i;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || !quads || !items || !order, TERRIMP_E_NULL);
+    float scale;
+    TERRIMPI_REFUSE(!atlas || !quads || !rects || !order, TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
                             !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
                         TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
-        items[i].rect = quads[i].texels;
-        items[i].rect.width += 2u * gutter;
-        items[i].rect.height += 2u * gutter;
-        TERRIMPI_REFUSE(items[i].rect.width > shelves->width ||
-                            items[i].rect.height > shelves->height,
-                        TERRIMP_E_CAPACITY); /* or it would be scaled */
+        rects[i] = quads[i].texels;
+        rects[i].width += 2u * gutter;
+        rects[i].height += 2u * gutter;
     }
-    TERRIMPI_TRY(terrimp_pack_ffdh(shelves, items, count, order, NULL));
+    TERRIMPI_TRY(terrimp_pack_ffdh(atlas[0], atlas[1], rects, count, order, &scale));
+    TERRIMPI_REFUSE(scale < 1.0f, TERRIMP_E_CAPACITY);
     for (i = 0; i < count; i++) {
-        quads[i].x = items[i].rect.x + gutter;
-        quads[i].y = items[i].rect.y + gutter;
+        quads[i].x = rects[i].x + gutter;
+        quads[i].y = rects[i].y + gutter;
     }
     return TERRIMP_OK;
 }
