@@ -1881,6 +1881,67 @@ TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_
                                               uint32_t count, uint32_t gutter,
                                               terrimp_pack_item *items, uint32_t *order);
 
+/* --- recording without gaps (Jeschke 3.3.2) --- */
+
+/* Cuts what lies between two depths out of a triangle, for hosts that draw layers by hardware: they
+   then draw it with its outline, each line in one direction, for instance from left to right. Cuts
+   of an edge depend on its two ends alone, not on their order: so the two layers that meet in a cut
+   get the same bits, and so do two triangles that share an edge.
+
+   vertices   [3][stride] any numbers that change linearly over the triangle
+   stride     [Limits: >= 1]
+   depths     [3] of the vertices [wu], finite
+   low, high  [wu] borders of the layer [Limits: low <= high]
+   out        [5][stride] the polygon, with the triangle's winding; not vertices
+   count      out: of its vertices; 0 when nothing is between
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE */
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count);
+
+/* Masks of all layers that are recorded together: [layers->count][height][words of width]. */
+typedef struct terrimp_layer_record {
+    const terrimp_layers *layers;    /* (required) */
+    const terrimp_capture *picture;  /* (required) as in terrimp_layer_corners */
+    uint32_t width, height;          /* (required) of the picture [texels] [Limits: 1..16384] */
+    uint32_t *masks;                 /* (required) begins as 0 */
+    int no_outline;                  /* nonzero: only texels whose centre is covered, for leaves and
+                                        the like: they are not fattened, and their gaps hide */
+} terrimp_layer_record;
+
+/* Sets in each layer the texels that a triangle touches between the layer's borders. What touches a
+   border is in both layers; what lies outside of the picture or of all layers is left out.
+
+   xyz        [3][3] [wu]
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE for a vertex
+   Cost       O(rows that are touched, in all layers) */
+TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
+                                                  const float xyz[9]);
+
+/* The same for a picture with depth, such as one of a heightfield: each texel is in all layers that
+   its depths touch, from the least to the greatest at its corners. Neighbours share two corners: so
+   there is no gap between layers, and nothing is to be clipped.
+
+   depths     [height + 1][width + 1] of the corners of texels, row 0 the lowest [wu]; <= 0, NaN or
+              infinite where there is nothing. Texels without any depth stay empty
+   Errors     E_NULL; E_RANGE
+   Cost       O(width * height * log(count)) */
+TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
+                                                const float *depths);
+
+/* Closes what hardware leaves open between two layers: its lines go over corners. Where a block of
+   2 x 2 texels has one diagonal in both layers, and of the other one each texel in one layer only,
+   the one of the closer layer is wanted in the other as well.
+
+   front, back   [height][TERRIMP_MASK_WORDS(width)] layer k and layer k + 1
+   wanted        [height][TERRIMP_MASK_WORDS(width)] out: texels whose colours are to be copied from
+                 front to back; neither of the two
+   Errors        E_NULL; E_RANGE for an empty layer
+   Cost          O(width * height / 32) */
+TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
+                                                uint32_t width, uint32_t height,
+                                                uint32_t *wanted);
+
 #endif /* TERRIMP_NO_BUILD */
 
 #ifdef __cplusplus
@@ -12133,6 +12194,252 @@ TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_
         quads[i].x = items[i].rect.x + gutter;
         quads[i].y = items[i].rect.y + gutter;
     }
+    return TERRIMP_OK;
+}
+
+/* --- recording without gaps --- */
+
+/* Appends the point of edge a-b at a depth between those of its ends. */
+static void terrimpi_clip_cut(const float *vertices, uint32_t stride, const float depths[3],
+                              uint32_t a, uint32_t b, float depth, float *out)
+{
+    uint32_t low = depths[a] < depths[b] ? a : b, high = low == a ? b : a, i;
+    float part = (depth - depths[low]) / (depths[high] - depths[low]);
+    for (i = 0; i < stride; i++) {
+        float from = vertices[(size_t)low * stride + i];
+        out[i] = from + part * (vertices[(size_t)high * stride + i] - from);
+    }
+}
+
+/* A polygon between two parallel planes has the vertices of the triangle that lie there, and those
+   where its edges pass the planes: so no polygon is clipped twice. */
+static uint32_t terrimpi_layer_clip(const float *vertices, uint32_t stride, const float depths[3],
+                                    float low, float high, float *out)
+{
+    uint32_t a, k, count = 0;
+    for (a = 0; a < 3u; a++) {
+        uint32_t b = a == 2u ? 0u : a + 1u;
+        int rises = depths[b] > depths[a];
+        if (depths[a] >= low && depths[a] <= high)
+            memcpy(out + (size_t)count++ * stride, vertices + (size_t)a * stride,
+                   stride * sizeof *out);
+        for (k = 0; k < 2u; k++) {
+            float plane = (k == 0) == rises ? low : high;
+            if ((depths[a] < plane && plane < depths[b]) ||
+                (depths[b] < plane && plane < depths[a]))
+                terrimpi_clip_cut(vertices, stride, depths, a, b, plane,
+                                  out + (size_t)count++ * stride);
+        }
+    }
+    return count;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count)
+{
+    TERRIMPI_REFUSE(!vertices || !depths || !out || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(depths), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!stride || !(low <= high), TERRIMP_E_RANGE);
+    *count = terrimpi_layer_clip(vertices, stride, depths, low, high, out);
+    return TERRIMP_OK;
+}
+
+static terrimp_result terrimpi_record_check(const terrimp_layer_record *r)
+{
+    TERRIMPI_REFUSE(!r || !r->layers || !r->picture || !r->masks, TERRIMP_E_NULL);
+    return terrimpi_within_u32(r->width, 1, 16384) && terrimpi_within_u32(r->height, 1, 16384) &&
+                   r->layers->count
+               ? TERRIMP_OK
+               : TERRIMP_E_RANGE;
+}
+
+static uint32_t *terrimpi_record_row(const terrimp_layer_record *r, uint32_t layer, uint32_t y)
+{
+    return r->masks + ((size_t)layer * r->height + y) * TERRIMP_MASK_WORDS(r->width);
+}
+
+/* Sets the texels of a row from column x to column end - 1. */
+static void terrimpi_mask_fill(uint32_t *row, uint32_t x, uint32_t end)
+{
+    uint32_t word;
+    for (word = x / 32u; x < end && word <= (end - 1u) / 32u; word++)
+        row[word] |= (word == x / 32u ? 0xffffffffu << x % 32u : 0xffffffffu) &
+                     (word == (end - 1u) / 32u ? terrimpi_mask_tail(end) : 0xffffffffu);
+}
+
+/* The part of a convex polygon [count][2] between two heights, in columns; 0 when there is none. */
+static int terrimpi_polygon_row(const float *uv, uint32_t count, float bottom, float top,
+                                float *left, float *right)
+{
+    uint32_t a, k;
+    *left = TERRIMPI_FLOAT_MAX;
+    *right = -TERRIMPI_FLOAT_MAX;
+    for (a = 0; a < count; a++) {
+        const float *p = uv + 2u * a, *q = uv + 2u * (a + 1u == count ? 0u : a + 1u);
+        if (p[1] >= bottom && p[1] <= top) {
+            *left = terrimpi_min(*left, p[0]);
+            *right = terrimpi_max(*right, p[0]);
+        }
+        if (q[1] < p[1]) { /* an edge crosses a row at one place, from whichever side it is seen */
+            const float *swap = p;
+            p = q;
+            q = swap;
+        }
+        for (k = 0; k < 2u; k++) {
+            float y = k ? top : bottom, x;
+            if (!(p[1] < y && y < q[1]))
+                continue;
+            x = p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1]));
+            *left = terrimpi_min(*left, x);
+            *right = terrimpi_max(*right, x);
+        }
+    }
+    return *left <= *right;
+}
+
+/* The least column or row from which texels count, for a coordinate; within 0..size. */
+static uint32_t terrimpi_texel(float at, uint32_t size)
+{
+    return !(at > 0.0f) ? 0u : at >= (float)size ? size : (uint32_t)at;
+}
+
+/* Sets the texels of a layer that a convex polygon [count][2] touches, or whose centres it holds. */
+static void terrimpi_record_polygon(const terrimp_layer_record *r, uint32_t layer, const float *uv,
+                                    uint32_t count)
+{
+    float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, left, right;
+    uint32_t i, y, end;
+    for (i = 0; i < count; i++) {
+        low = terrimpi_min(low, uv[2u * i + 1u]);
+        high = terrimpi_max(high, uv[2u * i + 1u]);
+    }
+    if (!count || high < 0.0f)
+        return;
+    end = terrimpi_min_u32(terrimpi_texel(high, r->height) + 1u, r->height);
+    for (y = terrimpi_texel(low, r->height); y < end; y++) {
+        float bottom = (float)y + (r->no_outline ? 0.5f : 0.0f);
+        float top = (float)y + (r->no_outline ? 0.5f : 1.0f);
+        if (!terrimpi_polygon_row(uv, count, bottom, top, &left, &right) || right < 0.0f)
+            continue;
+        if (r->no_outline)
+            terrimpi_mask_fill(terrimpi_record_row(r, layer, y),
+                               terrimpi_texel(left + 0.5f, r->width),
+                               terrimpi_texel(right + 0.5f, r->width));
+        else
+            terrimpi_mask_fill(
+                terrimpi_record_row(r, layer, y), terrimpi_texel(left, r->width),
+                terrimpi_min_u32(terrimpi_texel(right, r->width) + 1u, r->width));
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
+                                                  const float xyz[9])
+{
+    float seen[9], depths[3], polygon[15], uv[10], low, high;
+    uint32_t layer, last, count, i;
+    TERRIMPI_TRY(terrimpi_record_check(record));
+    TERRIMPI_REFUSE(!xyz, TERRIMP_E_NULL);
+    for (i = 0; i < 3u; i++) {
+        const terrimp_capture *p = record->picture;
+        float to[3];
+        TERRIMPI_REFUSE(!terrimpi_finite3(xyz + 3u * i), TERRIMP_E_NOT_FINITE);
+        terrimpi_sub(xyz + 3u * i, p->eye, to);
+        depths[i] = seen[3u * i + 2u] = terrimpi_dot(to, p->forward);
+        seen[3u * i] = terrimpi_dot(to, p->right) - p->tan_left * depths[i];
+        seen[3u * i + 1u] = terrimpi_dot(to, p->up) - p->tan_down * depths[i];
+    }
+    low = terrimpi_min(depths[0], terrimpi_min(depths[1], depths[2]));
+    high = terrimpi_max(depths[0], terrimpi_max(depths[1], depths[2]));
+    if (!(high >= record->layers->start) || !(low <= record->layers->end))
+        return TERRIMP_OK;
+    layer = terrimp_layer_of(record->layers, low);
+    if (layer && low <= terrimp_layer_border(record->layers, layer))
+        layer--; /* what touches a border is in both */
+    last = terrimp_layer_of(record->layers, high);
+    for (; layer <= last; layer++) {
+        count = terrimpi_layer_clip(seen, 3, depths, terrimp_layer_border(record->layers, layer),
+                                    terrimp_layer_border(record->layers, layer + 1u), polygon);
+        for (i = 0; i < count; i++) {
+            float texel = record->layers->texel * polygon[3u * i + 2u];
+            uv[2u * i] = polygon[3u * i] / texel;
+            uv[2u * i + 1u] = polygon[3u * i + 1u] / texel;
+        }
+        terrimpi_record_polygon(record, layer, uv, count);
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
+                                                const float *depths)
+{
+    uint32_t x, y, k, layer, last;
+    TERRIMPI_TRY(terrimpi_record_check(record));
+    TERRIMPI_REFUSE(!depths, TERRIMP_E_NULL);
+    for (y = 0; y < record->height; y++)
+        for (x = 0; x < record->width; x++) {
+            float low = TERRIMPI_FLOAT_MAX, high = 0.0f;
+            for (k = 0; k < 4u; k++) {
+                float d = depths[(size_t)(y + (k >> 1)) * (record->width + 1u) + x + (k & 1u)];
+                if (!(d > 0.0f) || !terrimpi_finite(d))
+                    continue;
+                low = terrimpi_min(low, d);
+                high = terrimpi_max(high, d);
+            }
+            if (!(high >= record->layers->start) || !(low <= record->layers->end))
+                continue;
+            layer = terrimp_layer_of(record->layers, low);
+            last = terrimp_layer_of(record->layers, high);
+            for (; layer <= last; layer++)
+                terrimpi_record_row(record, layer, y)[x / 32u] |= 1u << x % 32u;
+        }
+    return TERRIMP_OK;
+}
+
+/* A word of a row's bits, each moved to the place of its neighbour before it (dx = 1: of the bit at
+   x + 1), without what lies beyond the width. */
+static uint32_t terrimpi_mask_at(const uint32_t *row, uint32_t width, uint32_t word, int dx)
+{
+    uint32_t words = TERRIMP_MASK_WORDS(width), here = row[word], next = 0;
+    if (word + 1u == words)
+        here &= terrimpi_mask_tail(width);
+    if (!dx)
+        return here;
+    if (word + 2u == words)
+        next = row[word + 1u] & terrimpi_mask_tail(width);
+    else if (word + 1u < words)
+        next = row[word + 1u];
+    return here >> 1 | next << 31;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
+                                                uint32_t width, uint32_t height,
+                                                uint32_t *wanted)
+{
+    size_t words = TERRIMP_MASK_WORDS(width), y;
+    uint32_t word, k;
+    TERRIMPI_REFUSE(!front || !back || !wanted, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!width || !height, TERRIMP_E_RANGE);
+    memset(wanted, 0, height * words * sizeof *wanted);
+    for (y = 0; y + 1u < height; y++)
+        for (word = 0; word < words; word++) {
+            uint32_t f[4], both[4], one[4], missing[4]; /* of the block's corner at dx + 2 dy */
+            for (k = 0; k < 4u; k++) {
+                size_t row = (y + (k >> 1)) * words;
+                uint32_t b = terrimpi_mask_at(back + row, width, word, (int)(k & 1u));
+                f[k] = terrimpi_mask_at(front + row, width, word, (int)(k & 1u));
+                both[k] = f[k] & b;
+                one[k] = f[k] ^ b;
+                missing[k] = f[k] & ~b;
+            }
+            for (k = 0; k < 4u; k++) {
+                uint32_t want = both[k ^ 1u] & both[k ^ 2u] & one[k] & one[k ^ 3u] & missing[k];
+                uint32_t *to = wanted + (y + (k >> 1)) * words + word;
+                to[0] |= k & 1u ? want << 1 : want;
+                if ((k & 1u) && want >> 31)
+                    to[1] |= 1u; /* inside: the bit beyond the last column is never set */
+            }
+        }
     return TERRIMP_OK;
 }
 
