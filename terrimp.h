@@ -80,16 +80,17 @@
 
               eye           fade_start    fade_end
                o=================|-------------|- - - - - - - - - - - - - - - ->
-                 ground, opaque   ground fades    impostors of growing nodes,
-                                  over impostors  or ground where that is cheaper
+                 ground           impostors       impostors of growing nodes,
+                                  fade in         or ground where that is cheaper
 
        A picture is renewed when the direction to the node has turned by max_angle_rad, when the
        parallax error could pass tolerance_px, or when the node has come so close that texels would
        show. It is made from a place ahead of the eye, where it lasts longer. What waits for its
        picture is drawn from those of its children or its parent, or as ground.
 
-       Impostors are drawn deeper than they are, so that ground covers them: give the projection
-       matrix the z_far of the statistics, or a generous one.
+       In the fade band a node is drawn as ground and, on a growing share of the pixels, as the
+       impostor, whose mesh stands just above that ground. So all lies at its own depth, and water,
+       houses and shadows meet it there.
 
                picture in the atlas             coarse mesh, a little proud of the terrain
               +--------------------+                 .--'`--.__         upper skirt
@@ -133,12 +134,10 @@
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
        A picture shows a hidden slope with the ridge before it smeared over it once the eye has
        moved; max_angle_rad bounds how far that goes, and pictures in two parts spare the worst.
-       What moves on the terrain belongs into the host's own draws, not into captures. Ground fades
-       by blending, and only whole nodes are sorted: in the fade band a hidden slope can shine
-       faintly through the ridge of its own node. Ground and impostors of one place are alike to
-       within the tolerances, not to the bit: where a node changes from one to the other beyond the
-       fade band, that much can be seen to change. From beside the terrain no floor is drawn, since
-       it would show below the border.
+       What moves on the terrain belongs into the host's own draws, not into captures. Ground and
+       impostors of one place are alike to within the tolerances, not to the bit: where a node
+       changes from one to the other beyond the fade band, that much can be seen to change. From
+       beside the terrain no floor is drawn, since it would show below the border.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -1223,10 +1222,10 @@ typedef struct terrimp_view_desc {
     int ground_rule;        /* terrimp_geomip_rule */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
-    float fade_start;       /* [wu] from the eye: nodes that come closer are opaque ground
+    float fade_start;       /* [wu] from the eye: nodes that come closer are ground
                                [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
-                               ground fades over the impostors [Limits: > fade_start]
+                               impostors fade in over it [Limits: > fade_start]
                                [Default 0 -> 1.5 * fade_start; in AUTO 1.1] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
@@ -1263,8 +1262,6 @@ typedef struct terrimp_ground_command {
     uint32_t level;
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
-    float alpha;          /* 1: opaque; below: blended over what is there */
-    float depth_bias;     /* as for impostors; 0 but for ground beyond the fade band */
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
@@ -1272,7 +1269,7 @@ typedef struct terrimp_ground_command {
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
    it to the farthest depth and, when `clear` is set, to transparent black. The ground commands up
-   to end_capture are drawn with these matrices, opaque. */
+   to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
     uint32_t node;
     uint32_t level;
@@ -1291,11 +1288,9 @@ typedef struct terrimp_capture_command {
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
    texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. A vertex p is
-   drawn at eye + (p - eye) * (1 + depth_bias): at the same place of the screen, only deeper, so
-   that ground is drawn over it. Of a picture in two parts both are drawn, each only where r / q is
-   within 0..1: by a discard, or by the clip planes r >= 0 and q - r >= 0, which are rows of the
-   matrix. */
+   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
+   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
+   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1304,20 +1299,20 @@ typedef struct terrimp_impostor_command {
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
     uint32_t first_index;
     uint32_t index_count;
+    float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
+                             by a dither pattern: its ground shows on the others */
     float texture_matrix[16];
-    float depth_bias;
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain and has no gap. It comes after the impostors and shows only where none
    of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
    terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
-   border: there it is not drawn.) Vertices, indices, depth bias: as for impostors. */
+   border: there it is not drawn.) Vertices and indices as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
-    float depth_bias;
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1355,8 +1350,8 @@ typedef struct terrimp_stats {
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
-                                    drawn, depth bias included: update with a camera that sees far
-                                    enough, then draw with these; z_near is 0 within a box */
+                                    drawn: update with a camera that sees far enough, then draw with
+                                    these; z_near is 0 within a box */
 } terrimp_stats;
 
 /* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
@@ -1385,9 +1380,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Calls back with the frame's commands: captures, each with its ground; opaque ground; impostors
-   and the ground between them; the floor; fading ground. Each kind front to back: what is hidden by
-   something drawn before it need not be shaded.
+/* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
+   floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate and touch until the next one */
@@ -1486,20 +1480,11 @@ typedef struct terrimp_border_point {
     float height; /* [wu] fitted; at both ends the sample's own height */
 } terrimp_border_point;
 
-/* One border polyline of a tile: `at` rises from 0 to the last sample of that border. */
+/* One border polyline of a tile: `at` rises, along +x or +z, from 0 to the last sample. */
 typedef struct terrimp_border {
     const terrimp_border_point *points; /* (required) [point_count] */
     uint32_t point_count;               /* [Limits: 2..samples of the border] */
 } terrimp_border;
-
-/* Which border of a tile is which. Points run along +x or +z, never around the tile. */
-enum {
-    TERRIMP_BORDER_Z0 = 0, /* row 0, along +x */
-    TERRIMP_BORDER_Z1,     /* last row, along +x */
-    TERRIMP_BORDER_X0,     /* column 0, along +z */
-    TERRIMP_BORDER_X1,     /* last column, along +z */
-    TERRIMP_BORDER_COUNT
-};
 
 typedef struct terrimp_simplify_desc {
     const float *heights; /* (required) [rows][cols] of the tile, packed, finite [wu] */
@@ -1508,7 +1493,7 @@ typedef struct terrimp_simplify_desc {
     uint32_t triangle_budget; /* surface triangles at most [Limits: at least the border's own
                                  need, that is border vertices - 2; ..TERRIMP_MAX_TRIANGLES]
                                  [Default 0 -> TERRIMP_TRIANGLE_BUDGET] */
-    terrimp_border borders[TERRIMP_BORDER_COUNT]; /* (required) the four polylines; where two
+    terrimp_border borders[TERRIMP_SIDE_COUNT]; /* (required) the four polylines; where two
                                                      meet, both have the same height */
 } terrimp_simplify_desc;
 
@@ -2058,6 +2043,11 @@ static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
+static float terrimpi_clamp(float value, float low, float high)
+{
+    return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
+}
+
 static uint32_t terrimpi_clamp_u32(uint32_t value, uint32_t low, uint32_t high)
 {
     return terrimpi_min_u32(terrimpi_max_u32(value, low), high);
@@ -2123,6 +2113,14 @@ static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
 {
     size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
     return arena->base && arena->ok ? arena->base + at : NULL;
+}
+
+/* Whether a block of memory of the caller's will do. */
+static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
+{
+    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
+    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 static float terrimpi_dot(const float a[3], const float b[3])
@@ -2192,15 +2190,31 @@ static void terrimpi_basis(const float forward[3], float up[3], float right[3])
     terrimpi_cross(right, forward, up);
 }
 
+/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
+   extra memory. */
+static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
+                          int (*after)(const void *items, uint32_t a, uint32_t b))
+{
+    uint32_t i, k, gap;
+    for (gap = 1; gap < count / 3u;)
+        gap = 3u * gap + 1u;
+    for (; gap > 0; gap /= 3u)
+        for (i = gap; i < count; i++) {
+            uint32_t moved = order[i];
+            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
+                order[k] = order[k - gap];
+            order[k] = moved;
+        }
+}
+
 /* Whether a side runs along x. */
 static int terrimpi_along_x(int side) { return side < (int)TERRIMP_SIDE_X0; }
 
 /* Twice the area of a triangle of samples (x, z); positive when it is counter-clockwise from above:
    when its normal has y > 0. */
-static int64_t terrimpi_twice_area(const uint32_t a[2], const uint32_t b[2], const uint32_t c[2])
+static int64_t terrimpi_twice_area(const int64_t a[2], const int64_t b[2], const int64_t c[2])
 {
-    return ((int64_t)b[1] - a[1]) * ((int64_t)c[0] - a[0]) -
-           ((int64_t)b[0] - a[0]) * ((int64_t)c[1] - a[1]);
+    return (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1]);
 }
 
 /* Where point k of a lattice of every 2^level-th sample lies; beyond the last sample, on it. */
@@ -2235,11 +2249,6 @@ static void terrimpi_widen(float *low, float *high, float slope)
 
    A raw value is a sample as stored, converted to float: exact for all formats. Voids are told by
    raw values; two different raw values may well share one world height. */
-
-static float terrimpi_clamp(float value, float low, float high)
-{
-    return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
-}
 
 /* Bytes of one sample of an effective format. */
 static size_t terrimpi_sample_bytes(int format)
@@ -4634,23 +4643,6 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
     return TERRIMP_OK;
 }
 
-/* Shell's sort of some numbers by `after`, which says whether a comes after b: no recursion, no
-   extra memory. */
-static void terrimpi_sort(uint32_t *order, uint32_t count, const void *items,
-                          int (*after)(const void *items, uint32_t a, uint32_t b))
-{
-    uint32_t i, k, gap;
-    for (gap = 1; gap < count / 3u;)
-        gap = 3u * gap + 1u;
-    for (; gap > 0; gap /= 3u)
-        for (i = gap; i < count; i++) {
-            uint32_t moved = order[i];
-            for (k = i; k >= gap && after(items, order[k - gap], moved); k -= gap)
-                order[k] = order[k - gap];
-            order[k] = moved;
-        }
-}
-
 /* Whether item a comes after item b: lower, or as high and narrower, or later. */
 static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
 {
@@ -5515,13 +5507,6 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
     return b.ok ? b.bytes : 0;
 }
 
-static terrimp_result terrimpi_check_block(const void *memory, size_t bytes, size_t needed)
-{
-    TERRIMPI_REFUSE(!memory, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)memory % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
-}
-
 /* Where a node lies: its first sample, how many quads of the field it spans, and its tile of every
    2^level-th sample, whose last column and row are the node's last. */
 typedef struct terrimpi_patch {
@@ -5547,12 +5532,12 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 /* Samples from the node's first one to a point of its mesh. */
 static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
 {
-    return terrimpi_min_u32((uint32_t)point->x << p->level, p->span_x);
+    return terrimpi_lattice(point->x, p->level, p->span_x);
 }
 
 static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
 {
-    return terrimpi_min_u32((uint32_t)point->z << p->level, p->span_z);
+    return terrimpi_lattice(point->z, p->level, p->span_z);
 }
 
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
@@ -5911,8 +5896,7 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
     for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_min_u32((uint32_t)points[i].x << p.level, p.span_x);
-        uint32_t z = terrimpi_min_u32((uint32_t)points[i].z << p.level, p.span_z);
+        uint32_t x = terrimpi_point_x(&p, &points[i]), z = terrimpi_point_z(&p, &points[i]);
         xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
         xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
         xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
@@ -6196,15 +6180,14 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const te
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
-        int32_t x[3], z[3];
-        int64_t area;
+        int64_t at[3][2], area;
         for (k = 0; k < 3u; k++) {
             if (corners[k] >= mesh->vertex_count)
                 return 0;
-            x[k] = (int32_t)terrimpi_point_x(p, &points[corners[k]]);
-            z[k] = (int32_t)terrimpi_point_z(p, &points[corners[k]]);
+            at[k][0] = terrimpi_point_x(p, &points[corners[k]]);
+            at[k][1] = terrimpi_point_z(p, &points[corners[k]]);
         }
-        area = (int64_t)(z[1] - z[0]) * (x[2] - x[0]) - (int64_t)(x[1] - x[0]) * (z[2] - z[0]);
+        area = terrimpi_twice_area(at[0], at[1], at[2]);
         if (area <= 0)
             return 0;
         all += area;
@@ -6467,6 +6450,7 @@ typedef struct terrimpi_record {
     uint32_t node;
     uint32_t seen;            /* the last frame that had a use for it; 0: the record is free */
     uint32_t listed;          /* the last frame that draws it */
+    float alpha;              /* the share of the pixels that it has in that frame */
     uint32_t part_count;      /* 0: no picture yet */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
@@ -6513,12 +6497,6 @@ typedef struct terrimpi_job {
     float wanted, cost;
 } terrimpi_job;
 
-/* What is drawn before the floor: an impostor or distant ground. */
-typedef struct terrimpi_item {
-    uint32_t index;  /* of the record or the ground draw */
-    int is_impostor;
-} terrimpi_item;
-
 struct terrimp_view {
     const terrimp_terrain *terrain;
     uint32_t frame;             /* updates so far */
@@ -6527,11 +6505,10 @@ struct terrimp_view {
     uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
     uint16_t *record_of;           /* [node_count] */
     unsigned char *prefers;        /* [node_count] the unit was drawn as impostors */
-    float *shown;                  /* [max_ground] alpha of each ground draw, 0: not drawn, -1:
-                                      opaque beyond the fade band */
+    unsigned char *shown;          /* [max_ground] nonzero: the ground draw is drawn */
     uint32_t *leaves;              /* [max_ground] ground draws, by unit */
     terrimpi_unit *units;          /* [max_ground] front to back */
-    terrimpi_item *items;          /* [max_ground + max_impostors] front to back */
+    uint32_t *items;               /* [max_impostors] records that are drawn, front to back */
     terrimpi_want *wants;          /* [max_impostors] by unit */
     uint32_t *queue;               /* [max_impostors] wants to capture, most urgent first */
     terrimpi_record *records;      /* [max_impostors] */
@@ -6544,7 +6521,6 @@ struct terrimp_view {
     terrimp_geomip_view ground;
     terrimp_view_desc desc;     /* resolved */
     float pixel_factor;
-    float depth_bias;
     float motion[3];            /* [wu] a frame, smoothed */
     float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
     terrimp_camera camera;      /* resolved, of the last update */
@@ -6572,12 +6548,6 @@ static void terrimpi_setting(float *value, float otherwise, float low, float hig
         *value = otherwise;
     if (!terrimpi_within(*value, low, high) && *result == TERRIMP_OK)
         *result = TERRIMP_E_RANGE;
-}
-
-static void terrimpi_default_u32(uint32_t *value, uint32_t otherwise)
-{
-    if (*value == 0)
-        *value = otherwise;
 }
 
 /* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels
@@ -6625,15 +6595,14 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_TRY(terrimpi_settings_resolve(terrain, &d));
     if (d.ground_rule == TERRIMP_GEOMIP_DEFAULT)
         d.ground_rule = TERRIMP_GEOMIP_PICTURE;
-    terrimpi_default_u32(&d.atlas_size, 4096);
-    terrimpi_default_u32(&d.atlas_count, 1);
-    terrimpi_default_u32(&d.max_impostors, 1024);
-    terrimpi_default_u32(&d.max_captures, 64);
+    TERRIMPI_DEFAULT(d.atlas_size, 4096);
+    TERRIMPI_DEFAULT(d.atlas_count, 1);
+    TERRIMPI_DEFAULT(d.max_impostors, 1024);
+    TERRIMPI_DEFAULT(d.max_captures, 64);
     chunks = terrain->tree.level_first[1];
-    terrimpi_default_u32(&d.max_ground,
-                         d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
-                             ? terrimpi_min_u32(chunks, 4096)
-                             : chunks);
+    TERRIMPI_DEFAULT(d.max_ground, d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
+                                       ? terrimpi_min_u32(chunks, 4096)
+                                       : chunks);
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
@@ -6674,10 +6643,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->leaf_at = (uint32_t *)terrimpi_take(&l, nodes, sizeof *v->leaf_at);
     v->record_of = (uint16_t *)terrimpi_take(&l, nodes, sizeof *v->record_of);
     v->prefers = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->prefers);
-    v->shown = (float *)terrimpi_take(&l, ground, sizeof *v->shown);
+    v->shown = (unsigned char *)terrimpi_take(&l, ground, sizeof *v->shown);
     v->leaves = (uint32_t *)terrimpi_take(&l, ground, sizeof *v->leaves);
     v->units = (terrimpi_unit *)terrimpi_take(&l, ground, sizeof *v->units);
-    v->items = (terrimpi_item *)terrimpi_take(&l, ground + impostors, sizeof *v->items);
+    v->items = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->items);
     v->wants = (terrimpi_want *)terrimpi_take(&l, impostors, sizeof *v->wants);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->records = (terrimpi_record *)terrimpi_take(&l, impostors, sizeof *v->records);
@@ -7787,15 +7756,17 @@ static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urg
     if (index == TERRIMPI_NO_RECORD)
         return 0;
     record = &v->records[index];
-    if (record->listed == v->frame)
+    if (record->listed == v->frame) {
+        record->alpha = 1.0f;
         return 1;
+    }
     s = terrimpi_tree_node(&v->terrain->tree, node);
     eye = terrimpi_picture(v, index, &parts);
     if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
         return 0;
     record->listed = record->seen = v->frame;
-    v->items[v->item_count].index = index;
-    v->items[v->item_count++].is_impostor = 1;
+    record->alpha = 1.0f;
+    v->items[v->item_count++] = index;
     v->stats.impostors++;
     v->stats.impostors_by_level[s.level]++;
     return 1;
@@ -7849,20 +7820,16 @@ static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrim
 }
 
 /* Shows a unit's ground. */
-static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, float alpha)
+static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit)
 {
     terrimp_pattern pattern;
     uint32_t i;
-    for (i = 0; i < unit->leaf_count && alpha != 0.0f; i++) {
+    for (i = 0; i < unit->leaf_count; i++) {
         uint32_t leaf = v->leaves[unit->first_leaf + i];
-        v->shown[leaf] = alpha;
+        v->shown[leaf] = 1;
         terrimpi_ground_pattern(v, leaf, &pattern);
         v->stats.ground++;
         v->stats.triangles += pattern.triangle_count;
-        if (alpha < 0.0f) {
-            v->items[v->item_count].index = leaf;
-            v->items[v->item_count++].is_impostor = 0;
-        }
     }
 }
 
@@ -7870,54 +7837,46 @@ static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit, flo
 static void terrimpi_unlist(terrimp_view *v, uint32_t first)
 {
     while (v->item_count > first) {
-        terrimpi_record *record = &v->records[v->items[--v->item_count].index];
+        terrimpi_record *record = &v->records[v->items[--v->item_count]];
         record->listed = 0;
         v->stats.impostors--;
         v->stats.impostors_by_level[terrimpi_tree_node(&v->terrain->tree, record->node).level]--;
     }
 }
 
-/* Settles what each unit is drawn as, now that it is known which pictures will exist. */
+/* Settles what each unit is drawn as, now that it is known which pictures will exist. An impostor
+   that is drawn for other units too does not fade. */
 static void terrimpi_settle(terrimp_view *v)
 {
-    float closest = v->desc.fade_end; /* of all impostors */
+    float band = v->desc.fade_end - v->desc.fade_start;
     uint32_t u, i;
     v->item_count = 0;
     for (u = 0; u < v->unit_count; u++) {
         const terrimpi_unit *unit = &v->units[u];
         uint32_t before = v->item_count;
-        int covered = unit->want_count > 0, impostors = v->desc.mode >= TERRIMP_MODE_IMPOSTOR;
+        int covered = unit->want_count > 0;
         for (i = 0; i < unit->want_count; i++)
             covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
-        if (!covered) {
+        if (!covered)
             terrimpi_unlist(v, before);
-            terrimpi_show_ground(v, unit,
-                                 impostors && unit->closest >= v->desc.fade_end ? -1.0f : 1.0f);
-        } else
-            terrimpi_show_ground(v, unit,
-                                 terrimpi_max(0.0f, (v->desc.fade_end - unit->closest) /
-                                                        (v->desc.fade_end - v->desc.fade_start)));
+        if (!covered || unit->closest < v->desc.fade_end)
+            terrimpi_show_ground(v, unit);
+        for (i = before; i < v->item_count; i++)
+            v->records[v->items[i]].alpha =
+                terrimpi_min(1.0f, (unit->closest - v->desc.fade_start) / band);
     }
-    for (i = 0; i < v->item_count; i++)
-        if (v->items[i].is_impostor) {
-            terrimp_node s = terrimpi_tree_node(&v->terrain->tree,
-                                               v->records[v->items[i].index].node);
-            float angle, parallax;
-            terrimp_mesh_info mesh;
-            terrimp_box box;
-            uint32_t parts;
-            terrimpi_judge(v, terrimpi_picture(v, v->items[i].index, &parts), &s, &angle,
-                           &parallax);
-            terrimpi_mesh_place(v->terrain, s.number, &mesh);
-            v->stats.triangles += mesh.index_count / 3u * parts;
-            v->stats.draws += parts;
-            v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
-            v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
-            terrimpi_site_box(v, &s, &box);
-            closest = terrimpi_min(closest, terrimp_box_distance(&box, v->camera.eye));
-        }
-    /* All impostors go behind all ground: the closest one is moved to the end of the fade band. */
-    v->depth_bias = v->desc.fade_end / terrimpi_max(closest, v->desc.fade_end / 8.0f) - 1.0f;
+    for (i = 0; i < v->item_count; i++) {
+        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, v->records[v->items[i]].node);
+        float angle, parallax;
+        terrimp_mesh_info mesh;
+        uint32_t parts;
+        terrimpi_judge(v, terrimpi_picture(v, v->items[i], &parts), &s, &angle, &parallax);
+        terrimpi_mesh_place(v->terrain, s.number, &mesh);
+        v->stats.triangles += mesh.index_count / 3u * parts;
+        v->stats.draws += parts;
+        v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
+        v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
+    }
 }
 
 /* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
@@ -7953,8 +7912,7 @@ static void terrimpi_count_frame(terrimp_view *v)
         terrimpi_site_box(v, &v->units[u].site, &box);
         if (u == 0 || v->units[u].closest < s->z_near)
             s->z_near = v->units[u].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye) *
-                                              (1.0f + v->depth_bias));
+        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye));
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
     terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
@@ -8076,7 +8034,6 @@ static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job,
     callbacks->begin_capture(callbacks->user, &command);
     memset(&ground, 0, sizeof ground);
     ground.level = job->source;
-    ground.alpha = 1.0f;
     for (k = job->cell_from; k < job->cell_to; k++) {
         if (!terrimpi_cell(v, job, k, &ground.node, &pattern) ||
             !terrimpi_cell_in_part(v, job, ground.node, part))
@@ -8118,7 +8075,7 @@ static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    command.depth_bias = v->depth_bias;
+    command.alpha = record->alpha;
     record->drawn_count++;
     for (part = 0; part < record->part_count; part++) {
         command.part = part;
@@ -8136,7 +8093,6 @@ static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks
     command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
     command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
     command.index_count = terrimpi_floor_indices(v->terrain);
-    command.depth_bias = v->depth_bias;
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -8152,8 +8108,6 @@ static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
     command.level = draw->node.level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
-    command.alpha = v->shown[index] < 0.0f ? 1.0f : v->shown[index];
-    command.depth_bias = v->shown[index] < 0.0f ? v->depth_bias : 0.0f;
     command.morph = draw->morph;
     memcpy(command.side, draw->side, sizeof command.side);
     memcpy(command.side_coarse, draw->side_coarse, sizeof command.side_coarse);
@@ -8174,18 +8128,12 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         terrimpi_render_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
     for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] >= 1.0f)
+        if (view->shown[view->leaves[i]])
             terrimpi_render_ground(view, view->leaves[i], callbacks);
     for (i = 0; i < view->item_count; i++)
-        if (view->items[i].is_impostor)
-            terrimpi_render_impostor(view, &view->records[view->items[i].index], callbacks);
-        else
-            terrimpi_render_ground(view, view->items[i].index, callbacks);
+        terrimpi_render_impostor(view, &view->records[view->items[i]], callbacks);
     if (callbacks->draw_floor && terrimpi_floor_wanted(view))
         terrimpi_render_floor(view, callbacks);
-    for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]] > 0.0f && view->shown[view->leaves[i]] < 1.0f)
-            terrimpi_render_ground(view, view->leaves[i], callbacks);
     return TERRIMP_OK;
 }
 
@@ -8465,7 +8413,7 @@ static int terrimpi_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b,
     terrimpi_true_place(s, a, p[0]);
     terrimpi_true_place(s, b, p[1]);
     terrimpi_true_place(s, c, p[2]);
-    return (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]) > (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]);
+    return terrimpi_twice_area(p[0], p[1], p[2]) > 0;
 }
 
 /* --- which samples belong to a triangle, and sums over them --- */
@@ -9416,8 +9364,8 @@ static void terrimpi_lattice_size(int32_t inner_cols, int32_t inner_rows, int32_
 static void terrimpi_place_border(terrimpi_simplifier *s, const terrimp_border *borders,
                                   terrimp_mesh_vertex *loop, int32_t side[5])
 {
-    static const int order[4] = {TERRIMP_BORDER_X0, TERRIMP_BORDER_Z1, TERRIMP_BORDER_X1,
-                                 TERRIMP_BORDER_Z0};
+    static const int order[4] = {TERRIMP_SIDE_X0, TERRIMP_SIDE_Z1, TERRIMP_SIDE_X1,
+                                 TERRIMP_SIDE_Z0};
     int32_t w = s->cols - 1, h = s->rows - 1, v = 0, i, j;
     float steps;
     for (i = 0; i < 4; i++) {
@@ -9772,7 +9720,7 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
     TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
         terrimp_result r = terrimpi_check_border(
             b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
         if (r != TERRIMP_OK)
@@ -9780,8 +9728,8 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
     }
     for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
         uint32_t x_end = i & 1u, z_end = i >> 1;
-        const terrimp_border *p = b + (z_end ? TERRIMP_BORDER_Z1 : TERRIMP_BORDER_Z0);
-        const terrimp_border *q = b + (x_end ? TERRIMP_BORDER_X1 : TERRIMP_BORDER_X0);
+        const terrimp_border *p = b + (z_end ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_Z0);
+        const terrimp_border *q = b + (x_end ? TERRIMP_SIDE_X1 : TERRIMP_SIDE_X0);
         if (p->points[x_end ? p->point_count - 1 : 0].height !=
             q->points[z_end ? q->point_count - 1 : 0].height)
             return TERRIMP_E_RANGE;
@@ -9843,7 +9791,7 @@ static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
     TERRIMPI_REFUSE(!desc || !scratch || !mesh, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_check_desc(desc));
     budget = desc->triangle_budget ? desc->triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++)
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
         border += desc->borders[i].point_count - 1;
     TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
     plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
@@ -10465,29 +10413,35 @@ static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
     }
 }
 
+static float terrimpi_mip_sample(const terrimp_quadtree *t, const int64_t at[2])
+{
+    return terrimpi_sample(&t->field, (uint32_t)at[0], (uint32_t)at[1]);
+}
+
 /* Compares the samples in a triangle of three samples, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const uint32_t a[2],
-                                         const uint32_t b[2], const uint32_t c[2],
+static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const int64_t a[2],
+                                         const int64_t b[2], const int64_t c[2],
                                          terrimpi_mip_misses *misses)
 {
-    uint32_t x0 = terrimpi_min_u32(a[0], terrimpi_min_u32(b[0], c[0]));
-    uint32_t x1 = terrimpi_max_u32(a[0], terrimpi_max_u32(b[0], c[0]));
-    uint32_t z0 = terrimpi_min_u32(a[1], terrimpi_min_u32(b[1], c[1]));
-    uint32_t z1 = terrimpi_max_u32(a[1], terrimpi_max_u32(b[1], c[1]));
-    int64_t all = terrimpi_twice_area(a, b, c);
-    float height = terrimpi_sample(&t->field, a[0], a[1]);
-    float to_b = terrimpi_sample(&t->field, b[0], b[1]) - height;
-    float to_c = terrimpi_sample(&t->field, c[0], c[1]) - height;
-    uint32_t at[2];
+    int64_t all = terrimpi_twice_area(a, b, c), low[2], high[2], at[2];
+    float height = terrimpi_mip_sample(t, a);
+    float to_b = terrimpi_mip_sample(t, b) - height, to_c = terrimpi_mip_sample(t, c) - height;
+    int k;
     if (all <= 0)
         return;
-    for (at[1] = z0; at[1] <= z1; at[1]++)
-        for (at[0] = x0; at[0] <= x1; at[0]++) {
+    for (k = 0; k < 2; k++) {
+        low[k] = a[k] < b[k] ? a[k] : b[k];
+        high[k] = a[k] > b[k] ? a[k] : b[k];
+        low[k] = low[k] < c[k] ? low[k] : c[k];
+        high[k] = high[k] > c[k] ? high[k] : c[k];
+    }
+    for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+        for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
             int64_t by_b = terrimpi_twice_area(c, a, at), by_c = terrimpi_twice_area(a, b, at);
             float sample, miss;
             if (by_b < 0 || by_c < 0 || by_b + by_c > all)
                 continue;
-            sample = terrimpi_sample(&t->field, at[0], at[1]);
+            sample = terrimpi_mip_sample(t, at);
             miss = sample - height;
             miss -= (to_b * (float)by_b + to_c * (float)by_c) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
@@ -10507,7 +10461,8 @@ static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p
     block.quads = 2;
     block.pattern = 1u << (side ^ 1);
     for (along = 0; along < 2u * quads; along++) {
-        uint32_t across = last ? 0u : 1u, at[4][2], first[2];
+        uint32_t across = last ? 0u : 1u, first[2];
+        int64_t at[4][2];
         first[!along_x] = along & ~1u;
         first[along_x] = last ? 2u * quads : (uint32_t)-2;
         for (c = 0; c < 4u; c++) { /* counter-clockwise */
@@ -10633,12 +10588,6 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     return b.ok ? b.bytes : 0;
 }
 
-/* The sample of a node that column or row k of its tile stands on. */
-static uint32_t terrimpi_tile_place(uint32_t k, uint32_t level, uint32_t span)
-{
-    return terrimpi_min_u32(k << level, span);
-}
-
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
 static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex *from,
                               const terrimp_mesh_vertex *to, terrimpi_facet *facet)
@@ -10649,10 +10598,10 @@ static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex
     if (a->z == b->z)
         return;
     side = a == from ? &facet->left[facet->left_count++] : &facet->right[facet->right_count++];
-    side->low = terrimpi_tile_place(a->z, p->level, p->span_z);
-    side->high = terrimpi_tile_place(b->z, p->level, p->span_z);
-    side->x = (float)terrimpi_tile_place(a->x, p->level, p->span_x);
-    x = (float)terrimpi_tile_place(b->x, p->level, p->span_x);
+    side->low = terrimpi_lattice(a->z, p->level, p->span_z);
+    side->high = terrimpi_lattice(b->z, p->level, p->span_z);
+    side->x = (float)terrimpi_lattice(a->x, p->level, p->span_x);
+    x = (float)terrimpi_lattice(b->x, p->level, p->span_x);
     inverse = 1.0f / (float)(side->high - side->low);
     side->slope = (x - side->x) * inverse;
     side->h = a->height;
@@ -10717,8 +10666,8 @@ static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *me
             a = b;
             b = swap;
         }
-        from = terrimpi_tile_place(terrimpi_min_u32(a_at, b_at), p->level, span);
-        to = terrimpi_tile_place(terrimpi_max_u32(a_at, b_at), p->level, span);
+        from = terrimpi_lattice(terrimpi_min_u32(a_at, b_at), p->level, span);
+        to = terrimpi_lattice(terrimpi_max_u32(a_at, b_at), p->level, span);
         terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
                            (b->height - a->height) / (float)(to - from));
     }
@@ -10734,7 +10683,7 @@ static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *
     float *row = build->row, last = (float)p->span_x;
     terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
-        terrimpi_take_border(p, mesh, TERRIMP_BORDER_Z1, row);
+        terrimpi_take_border(p, mesh, TERRIMP_SIDE_Z1, row);
         return;
     }
     for (; facet < end; facet++) {
@@ -10782,8 +10731,8 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
                                      float *line)
 {
     int along_x = terrimpi_along_x(side);
-    uint32_t x = side == TERRIMP_BORDER_X1 ? p->x + p->span_x : p->x;
-    uint32_t z = side == TERRIMP_BORDER_Z1 ? p->z + p->span_z : p->z;
+    uint32_t x = side == TERRIMP_SIDE_X1 ? p->x + p->span_x : p->x;
+    uint32_t z = side == TERRIMP_SIDE_Z1 ? p->z + p->span_z : p->z;
     uint32_t span = along_x ? p->span_x : p->span_z;
     terrimpi_heightfield_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
                               along_x ? 1u : span + 1u, 1, line);
@@ -10794,8 +10743,8 @@ static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_pa
 static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t *first,
                                      uint32_t *step)
 {
-    *first = side == TERRIMP_BORDER_Z1   ? (p->rows - 1u) * p->cols
-             : side == TERRIMP_BORDER_X1 ? p->cols - 1u
+    *first = side == TERRIMP_SIDE_Z1   ? (p->rows - 1u) * p->cols
+             : side == TERRIMP_SIDE_X1 ? p->cols - 1u
                                          : 0u;
     *step = terrimpi_along_x(side) ? 1u : p->cols;
     return terrimpi_along_x(side) ? p->cols : p->rows;
@@ -10823,12 +10772,12 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
         for (i = 0; i < p->cols; i++)
             out[i] /= (float)(to - from);
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t span = terrimpi_read_border(t, p, side, build->row);
         uint32_t count = terrimpi_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             build->tile[first + k * step] =
-                k == 0 || k + 1u == count ? build->row[terrimpi_tile_place(k, p->level, span)]
+                k == 0 || k + 1u == count ? build->row[terrimpi_lattice(k, p->level, span)]
                                           : terrimpi_line_mean(build->row, k, p->level, span);
     }
 }
@@ -10837,7 +10786,7 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
 static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const terrimpi_patch *p,
                                              const terrimpi_build *build, terrimp_mesh *mesh)
 {
-    terrimp_border_point points[TERRIMP_BORDER_COUNT][16];
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][16];
     float line[129];
     terrimp_simplify_desc desc;
     terrimpi_squeeze squeeze;
@@ -10846,7 +10795,7 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     desc.cols = p->cols;
     desc.rows = p->rows;
     desc.triangle_budget = t->desc.triangle_budget;
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
@@ -10913,7 +10862,7 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
             }
         }
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++)
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         terrimpi_miss_border(t, p, side, mesh, build);
 }
 

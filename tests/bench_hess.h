@@ -38,7 +38,7 @@ typedef struct hess {
     uint32_t *order;
     float scale;              /* what the last packing made of the sizes that were wanted */
     terrimp_camera camera;
-    float pixel_factor, depth_bias;
+    float pixel_factor;
     terrimp_stats stats;
     double drawn, captured;   /* impostors so far */
     uint32_t early_packs;     /* before all pictures had moved: some were lost */
@@ -179,7 +179,7 @@ static void hess_count(hess *h)
 {
     uint32_t i, quads = h->info.chunk_quads, impostors = 0;
     terrimp_stats *s = &h->stats;
-    float closest = 1e30f, up;
+    float up;
     float aspect = (float)h->camera.width_px / (float)h->camera.height_px;
     memset(s, 0, sizeof *s);
     for (i = 0; i < h->seen_count; i++) {
@@ -195,18 +195,15 @@ static void hess_count(hess *h)
         }
         if (!hess_is_impostor(h, h->seen[i]))
             continue;
-        closest = impostors++ == 0 ? c->closest : closest;
+        impostors++;
         s->triangles += mesh.index_count / 3;
         s->captures += (uint32_t)c->due;
         s->captured_texels += c->due ? slot->width * slot->height : 0;
     }
     s->impostors = impostors;
     s->draws = s->ground + impostors;
-    h->depth_bias = h->fade_end / fmaxf(closest, h->fade_end / 8.0f) - 1.0f;
-    h->depth_bias = fmaxf(h->depth_bias, 0.0f);
     for (i = 0; i < h->seen_count; i++)
-        s->z_far = fmaxf(s->z_far, terrimp_box_farthest(&h->chunks[h->seen[i]].box, h->camera.eye)
-                                       * (1.0f + h->depth_bias));
+        s->z_far = fmaxf(s->z_far, terrimp_box_farthest(&h->chunks[h->seen[i]].box, h->camera.eye));
     /* A point at that distance in the corner of the screen has the smallest depth. */
     up = tanf(0.5f * h->camera.fov_y_rad);
     s->z_near /= sqrtf(1.0f + up * up * (1.0f + aspect * aspect));
@@ -246,7 +243,6 @@ static void hess_draw_block(const hess *h, uint32_t chunk, const terrimp_callbac
     uint32_t quads = h->info.chunk_quads;
     terrimp_ground_command ground;
     memset(&ground, 0, sizeof ground);
-    ground.alpha = 1.0f;
     for (cell = 0; cell < 9; cell++) {
         uint32_t nx = x + cell % 3 - 1, nz = z + cell / 3 - 1; /* below 0 it wraps: too large */
         uint32_t which = cell == 4 ? 0 : terrimpi_strip_pattern(quads, 0, cell - (cell > 4));
@@ -308,13 +304,14 @@ static void hess_draw_impostor(const hess *h, uint32_t chunk, const terrimp_call
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    command.depth_bias = h->depth_bias;
+    /* Hess 4.4 blends ground over it; here it fades in over the ground. */
+    command.alpha = fminf(1.0f, (h->chunks[chunk].closest - h->fade_start)
+                                    / (h->fade_end - h->fade_start));
     memcpy(command.texture_matrix, h->chunks[chunk].texture_matrix, sizeof command.texture_matrix);
     callbacks->draw_impostor(callbacks->user, &command);
 }
 
-/* The ground that is opaque, or that which fades (Hess 4.4). */
-static void hess_draw_ground(const hess *h, int fading, const terrimp_callbacks *callbacks)
+static void hess_draw_ground(const hess *h, const terrimp_callbacks *callbacks)
 {
     terrimp_ground_command ground;
     terrimp_pattern whole;
@@ -324,11 +321,7 @@ static void hess_draw_ground(const hess *h, int fading, const terrimp_callbacks 
     ground.first_index = whole.first_index;
     ground.index_count = whole.index_count;
     for (i = 0; i < h->seen_count && h->chunks[h->seen[i]].closest < h->fade_end; i++) {
-        float alpha = (h->fade_end - h->chunks[h->seen[i]].closest) / (h->fade_end - h->fade_start);
-        if ((alpha < 1.0f) != fading)
-            continue;
         ground.node = h->seen[i];
-        ground.alpha = fminf(alpha, 1.0f);
         callbacks->draw_ground(callbacks->user, &ground);
     }
 }
@@ -339,11 +332,10 @@ static void hess_render(hess *h, const terrimp_callbacks *callbacks)
     for (i = 0; i < h->seen_count; i++)
         if (h->chunks[h->seen[i]].due)
             hess_capture(h, h->seen[i], callbacks);
-    hess_draw_ground(h, 0, callbacks);
+    hess_draw_ground(h, callbacks);
     for (i = 0; i < h->seen_count; i++)
         if (hess_is_impostor(h, h->seen[i]))
             hess_draw_impostor(h, h->seen[i], callbacks);
-    hess_draw_ground(h, 1, callbacks);
 }
 
 #endif

@@ -319,11 +319,11 @@ static void use_geomip(void)
 static uint32_t border_samples(const float *tile, uint32_t cols, uint32_t rows, int side,
                                float *out)
 {
-    uint32_t count = side == TERRIMP_BORDER_Z0 || side == TERRIMP_BORDER_Z1 ? cols : rows, i;
+    uint32_t count = side == TERRIMP_SIDE_Z0 || side == TERRIMP_SIDE_Z1 ? cols : rows, i;
     for (i = 0; i < count; i++)
-        out[i] = side == TERRIMP_BORDER_Z0   ? tile[i]
-                 : side == TERRIMP_BORDER_Z1 ? tile[(rows - 1u) * cols + i]
-                 : side == TERRIMP_BORDER_X0 ? tile[i * cols]
+        out[i] = side == TERRIMP_SIDE_Z0   ? tile[i]
+                 : side == TERRIMP_SIDE_Z1 ? tile[(rows - 1u) * cols + i]
+                 : side == TERRIMP_SIDE_X0 ? tile[i * cols]
                                              : tile[i * cols + cols - 1u];
     return count;
 }

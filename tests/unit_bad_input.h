@@ -266,12 +266,12 @@ static void simplifier_refuses(void)
     desc.cols = 5;
     desc.rows = 4;
     desc.triangle_budget = 20;
-    for (i = 0; i < TERRIMP_BORDER_COUNT; i++) {
-        static terrimp_border_point kept[TERRIMP_BORDER_COUNT][8];
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
+        static terrimp_border_point kept[TERRIMP_SIDE_COUNT][8];
         float samples[5];
-        uint32_t along_x = i == TERRIMP_BORDER_Z0 || i == TERRIMP_BORDER_Z1, k;
+        uint32_t along_x = i == TERRIMP_SIDE_Z0 || i == TERRIMP_SIDE_Z1, k;
         uint32_t count = along_x ? 5u : 4u, step = along_x ? 1u : 5u;
-        uint32_t first = i == TERRIMP_BORDER_Z1 ? 15u : i == TERRIMP_BORDER_X1 ? 4u : 0u;
+        uint32_t first = i == TERRIMP_SIDE_Z1 ? 15u : i == TERRIMP_SIDE_X1 ? 4u : 0u;
         for (k = 0; k < count; k++)
             samples[k] = flat_samples[first + k * step];
         GIVES(TERRIMP_OK, terrimp_border_simplify(samples, count, 2, kept[i], 8, &point_count));
