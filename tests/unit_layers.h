@@ -837,7 +837,8 @@ static void triangles_set_the_texels_that_they_touch(void)
                     for (k = 0; k < 3; k++) { /* signed distance from each side */
                         const double *p = corner[k], *q = corner[(k + 1) % 3];
                         double dx = q[0] - p[0], dy = q[1] - p[1];
-                        side[k] = (dx * (centre[1] - p[1]) - dy * (centre[0] - p[0])) / hypot(dx, dy);
+                        side[k] = dx * (centre[1] - p[1]) - dy * (centre[0] - p[0]);
+                        side[k] /= hypot(dx, dy);
                     }
                     inside = (side[0] > -reach && side[1] > -reach && side[2] > -reach) ||
                              (side[0] < reach && side[1] < reach && side[2] < reach);
