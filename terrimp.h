@@ -12514,7 +12514,7 @@ static int terrimpi_place_within(const terrimpi_placing *p, uint32_t cluster, ui
     return cluster == other;
 }
 
-/* What a picture would take off a view's cost: less what the pictures of its parts have, whose place
+/* What a picture would take off a view's cost: less what pictures of its parts have, whose place
    it takes; nothing when one already shows all of it. */
 static float terrimpi_place_net(const terrimpi_placing *p, uint32_t gain)
 {
