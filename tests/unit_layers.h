@@ -502,24 +502,22 @@ static void simple_shapes_are_covered_exactly(void)
 static void quads_are_packed_with_their_gutters(void)
 {
     static terrimp_layer_quad quads[200];
-    static terrimp_pack_item items[200];
-    static terrimp_shelf rows[200];
-    static uint32_t order[200];
-    terrimp_shelves shelves;
+    static terrimp_rect rects[200];
+    static uint32_t order[400];
+    static const uint32_t atlas[2] = {512, 700};
     uint32_t i, k, gutter;
     for (gutter = 0; gutter < 4; gutter++) {
         for (i = 0; i < 200; i++) {
             quads[i].texels.width = random_range(1, 40);
             quads[i].texels.height = random_range(1, 30);
         }
-        CHECK(terrimp_shelves_init(&shelves, 512, 1024, 0, rows, 200) == TERRIMP_OK);
-        CHECK(terrimp_layer_pack(&shelves, quads, 200, gutter, items, order) == TERRIMP_OK);
+        CHECK(terrimp_layer_pack(atlas, quads, 200, gutter, rects, order) == TERRIMP_OK);
         for (i = 0; i < 200; i++) {
             terrimp_rect a = quads[i].texels;
             a.x = quads[i].x;
             a.y = quads[i].y;
             CHECK(a.x >= gutter && a.y >= gutter && a.x + a.width + gutter <= 512);
-            CHECK(a.y + a.height + gutter <= shelves.top);
+            CHECK(a.y + a.height + gutter <= atlas[1]);
             for (k = 0; k < i; k++) {
                 terrimp_rect b = quads[k].texels;
                 b.x = quads[k].x;
@@ -528,7 +526,7 @@ static void quads_are_packed_with_their_gutters(void)
             }
         }
         quads[7].texels.width = 513 - 2 * gutter;
-        CHECK(terrimp_layer_pack(&shelves, quads, 200, gutter, items, order) ==
+        CHECK(terrimp_layer_pack(atlas, quads, 200, gutter, rects, order) ==
               TERRIMP_E_CAPACITY);
     }
 }
@@ -1042,10 +1040,8 @@ static void layer_quads_refuse(void)
     terrimp_layer_quad quad;
     terrimp_layers l;
     terrimp_capture picture;
-    terrimp_shelves shelves;
-    terrimp_shelf row[2];
-    terrimp_pack_item item;
-    uint32_t order;
+    terrimp_rect rect;
+    uint32_t order[2];
     float xyz[12];
     memset(&quad, 0, sizeof quad);
     memset(&l, 0, sizeof l);
@@ -1060,14 +1056,13 @@ static void layer_quads_refuse(void)
     REFUSES(TERRIMP_E_RANGE, xyz, terrimp_layer_corners(&l, &picture, &quad, none, xyz, NULL));
     quad.layer = 1;
     REFUSES(TERRIMP_E_RANGE, xyz, terrimp_layer_corners(&l, &picture, &quad, atlas, xyz, NULL));
-    CHECK(terrimp_shelves_init(&shelves, 64, 64, 0, row, 2) == TERRIMP_OK);
-    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(&shelves, &quad, 1, 1, &item, &order));
+    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(atlas, &quad, 1, 1, &rect, order));
     quad.texels.width = quad.texels.height = 5;
-    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(&shelves, &quad, 1, 65, &item, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(NULL, &quad, 1, 1, &item, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(&shelves, NULL, 1, 1, &item, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(&shelves, &quad, 1, 1, NULL, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(&shelves, &quad, 1, 1, &item, NULL));
+    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(atlas, &quad, 1, 65, &rect, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(NULL, &quad, 1, 1, &rect, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, NULL, 1, 1, &rect, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, &quad, 1, 1, NULL, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, &quad, 1, 1, &rect, NULL));
 }
 
 static void layers_tests(void)
