@@ -26,6 +26,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_impostor.h"
 #include "unit_atlas.h"
 #include "unit_terrain.h"
+#include "unit_visibility.h"
 #include "unit_view.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
@@ -47,6 +48,7 @@ int main(int argc, char **argv)
     atlas_tests();
     terrain_tests();
     bake_tests();
+    visibility_tests();
     view_tests();
     bad_input_tests();
     golden_tests();
