@@ -14,12 +14,14 @@ typedef struct visible_scene {
     void *walls;
 } visible_scene;
 
-/* Waves, ridges, a cliff and noise, or flat ground. */
+/* Waves, ridges, a cliff and noise, thin walls that coarse ground lacks, or flat ground. */
 static float visible_height(uint32_t kind, float x, float z)
 {
     float y = 3.0f * sinf(x * 0.19f + 1.0f) * cosf(z * 0.23f) + 9.0f * sinf(x * 0.043f + z * 0.031f);
     if (kind == 0)
         return 0.0f;
+    if (kind == 4)
+        return y * 0.02f + (fmodf(x * 7.0f, 11.0f) == 3.0f || fmodf(z, 13.0f) == 7.0f ? 3.0f : 0.0f);
     if (kind == 1)
         y += fabsf(sinf(x * 0.07f - z * 0.05f)) * 14.0f;
     if (kind == 2)
@@ -30,7 +32,7 @@ static float visible_height(uint32_t kind, float x, float z)
 static void visible_make(visible_scene *s, uint32_t width, uint32_t depth, uint32_t quads)
 {
     terrimp_heightfield field;
-    uint32_t i, kind = random_range(0, 15) == 0 ? 0 : random_range(1, 3);
+    uint32_t i, kind = random_range(0, 15) == 0 ? 0 : random_range(1, 4);
     memset(&field, 0, sizeof field);
     s->samples = (float *)malloc((size_t)width * depth * sizeof *s->samples);
     for (i = 0; i < width * depth; i++)
@@ -314,7 +316,7 @@ static void culled_draws_are_behind_those_that_are_left(void)
         for (i = 0; i < 6; i++) {
             c = visible_camera(&s);
             v.rule = (int)random_range(1, 3);
-            v.tolerance_px = random_magnitude(0.3f, 60.0f);
+            v.tolerance_px = random_magnitude(0.3f, 300.0f);
             v.morph_ratio = random_range(0, 1) ? 1.0f : 1.6f;
             CHECK(terrimp_geomip_select(&s.tree, &v, &c) == TERRIMP_OK);
             memcpy(all, v.draws, v.draw_count * sizeof *all);
