@@ -3,7 +3,7 @@
    and the four callbacks; the lines after them make the terrain and check the pictures.
    Build:  make software
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
-           software.png. Exit code 1 when one has holes or is too far from the full mesh. */
+           build/software.png. Exit code 1 when one has holes or is too far from the full mesh. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/image.h"
@@ -83,8 +83,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     raster_style style = { 0 };
     style.texture = &h->atlas_texture;
     style.texture_matrix = c->texture_matrix;
-    style.depth_bias = c->depth_bias;
-    style.alpha = RASTER_OPAQUE;
+    style.share = (int)(c->alpha * RASTER_ALL + 0.5f);
     style.within_depth = c->part_count > 1;
     draw_mesh(h, c->node, &style, c->index_count);
 }
@@ -96,8 +95,7 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     raster_style style = { 0 };
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
-    style.depth_bias = c->depth_bias;
-    style.alpha = RASTER_OPAQUE;
+    style.share = RASTER_ALL;
     draw_mesh(h, h->node_count, &style, c->index_count);
 }
 
@@ -109,8 +107,7 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
         turn_to_screen(h);
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
-    style.depth_bias = c->depth_bias;
-    style.alpha = (int)(c->alpha * RASTER_OPAQUE + 0.5f);
+    style.share = RASTER_ALL;
     if (terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3) == TERRIMP_OK)
         raster_draw(&h->r, &style, h->ground_xyz, h->indices + c->first_index, c->index_count);
 }
@@ -167,7 +164,7 @@ static int draw_frame(host *h, terrimp_view *view, int frame, uint8_t *rgb)
     return 1;
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     static host h;
     scene s;
@@ -178,6 +175,7 @@ int main(void)
     clock_t clocks = 0, full_clocks = 0, first = 0;
     int i, ok = 1;
 
+    (void)argc;
     settings.texels_per_px = 1.0f; /* the nearest texel is taken: more would only flicker */
     settings.atlas_size = ATLAS;
     settings.max_impostors = 128;
@@ -207,7 +205,8 @@ int main(void)
            (double)first * 1000.0 / CLOCKS_PER_SEC,
            (double)(clocks - first) * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES - 1),
            (double)full_clocks * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES / 10));
-    ok = ok && scene_accepts(&s, 30.0) && !image_write_png("software.png", ours, WIDTH, HEIGHT);
+    ok = ok && scene_accepts(&s, 30.0)
+         && !image_write_beside(argv[0], "software.png", ours, WIDTH, HEIGHT);
     terrimp_view_destroy(full_view), terrimp_view_destroy(view), terrimp_terrain_destroy(terrain);
     free(h.indices), free(h.mesh_indices), free(h.mesh_xyz), scene_close(&s);
     return !ok;

@@ -64,7 +64,7 @@ static uint32_t random_range(uint32_t low, uint32_t high)
 }
 
 /* Prints the closing line; returns the exit code. */
-static int check_report(void)
+static inline int check_report(void)
 {
     printf("%d passed, %d failed", check_passed, check_failed);
     if (check_skipped)

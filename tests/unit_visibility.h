@@ -17,11 +17,12 @@ typedef struct visible_scene {
 /* Waves, ridges, a cliff and noise, thin walls that coarse ground lacks, or flat ground. */
 static float visible_height(uint32_t kind, float x, float z)
 {
-    float y = 3.0f * sinf(x * 0.19f + 1.0f) * cosf(z * 0.23f) + 9.0f * sinf(x * 0.043f + z * 0.031f);
+    float y = 3.0f * sinf(x * 0.19f + 1.0f) * cosf(z * 0.23f);
+    y += 9.0f * sinf(x * 0.043f + z * 0.031f);
     if (kind == 0)
         return 0.0f;
     if (kind == 4)
-        return y * 0.02f + (fmodf(x * 7.0f, 11.0f) == 3.0f || fmodf(z, 13.0f) == 7.0f ? 3.0f : 0.0f);
+        return fmodf(x * 7.0f, 11.0f) == 3.0f || fmodf(z, 13.0f) == 7.0f ? 3.0f : y * 0.02f;
     if (kind == 1)
         y += fabsf(sinf(x * 0.07f - z * 0.05f)) * 14.0f;
     if (kind == 2)
@@ -78,8 +79,10 @@ static terrimp_camera visible_camera(const visible_scene *s)
     terrimp_camera c;
     float height = 0.0f, over = random_range(0, 15) == 0 ? 0.3f : 0.0f;
     memset(&c, 0, sizeof c);
-    c.eye[0] = f->origin_x + random_float(-over, 1.0f + over) * (float)(f->width - 1u) * f->spacing_x;
-    c.eye[2] = f->origin_z + random_float(-over, 1.0f + over) * (float)(f->depth - 1u) * f->spacing_z;
+    c.eye[0] = random_float(-over, 1.0f + over) * (float)(f->width - 1u) * f->spacing_x;
+    c.eye[2] = random_float(-over, 1.0f + over) * (float)(f->depth - 1u) * f->spacing_z;
+    c.eye[0] += f->origin_x;
+    c.eye[2] += f->origin_z;
     if (random_range(0, 3) == 0) { /* just over a sample, where rounding bites */
         c.eye[0] = terrimpi_line(f->origin_x, f->spacing_x, random_range(0, f->width - 1u));
         c.eye[2] = terrimpi_line(f->origin_z, f->spacing_z, random_range(0, f->depth - 1u));
@@ -103,7 +106,8 @@ static terrimp_camera visible_camera(const visible_scene *s)
    camera does not see it. */
 static double visible_start(const terrimp_camera *c, const double point[3])
 {
-    double to[3], eye[3], forward[3], up[3], right[3], ahead, tan_y = tan(0.5 * (double)c->fov_y_rad);
+    double to[3], eye[3], forward[3], up[3], right[3], ahead;
+    double tan_y = tan(0.5 * (double)c->fov_y_rad);
     double tan_x = tan_y * (double)c->width_px / (double)c->height_px;
     oracle_widen(c->eye, eye);
     oracle_widen(c->forward, forward);
