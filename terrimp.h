@@ -57,6 +57,7 @@
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
        >>visible-sets what a horizon is made of
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
+       >>placement    which pictures to prepare so that no view costs too much
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
 
@@ -2037,6 +2038,130 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
 TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
                                               terrimp_rect *rects, uint32_t *order);
+
+/* --- recording without gaps (Jeschke 3.3.2) --- */
+
+/* Cuts what lies between two depths out of a triangle, for hosts that draw layers by hardware: they
+   then draw it with its outline, each line in one direction, for instance from left to right. Cuts
+   of an edge depend on its two ends alone, not on their order: so the two layers that meet in a cut
+   get the same bits, and so do two triangles that share an edge.
+
+   vertices   [3][stride] any numbers that change linearly over the triangle
+   stride     [Limits: >= 1]
+   depths     [3] of the vertices [wu], finite
+   low, high  [wu] borders of the layer [Limits: low <= high]
+   out        [5][stride] the polygon, with the triangle's winding; not vertices
+   count      out: of its vertices; 0 when nothing is between
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE */
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count);
+
+/* Masks of all layers that are recorded together: [layers->count][height][words of width]. */
+typedef struct terrimp_layer_record {
+    const terrimp_layers *layers;    /* (required) */
+    const terrimp_capture *picture;  /* (required) as in terrimp_layer_corners */
+    uint32_t width, height;          /* (required) of the picture [texels] [Limits: 1..16384] */
+    uint32_t *masks;                 /* (required) begins as 0 */
+    int no_outline;                  /* nonzero: only texels whose centre is covered, for leaves and
+                                        the like: they are not fattened, and their gaps hide */
+} terrimp_layer_record;
+
+/* Sets in each layer the texels that a triangle touches between the layer's borders. What touches a
+   border is in both layers; what lies outside of the picture or of all layers is left out.
+
+   xyz        [3][3] [wu]
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE for a vertex
+   Cost       O(rows that are touched, in all layers) */
+TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
+                                                  const float xyz[9]);
+
+/* The same for a picture with depth, such as one of a heightfield: each texel is in all layers that
+   its depths touch, from the least to the greatest at its corners. Neighbours share two corners: so
+   there is no gap between layers, and nothing is to be clipped.
+
+   depths     [height + 1][width + 1] of the corners of texels, row 0 the lowest [wu]; <= 0, NaN or
+              infinite where there is nothing. Texels without any depth stay empty
+   Errors     E_NULL; E_RANGE
+   Cost       O(width * height * log(count)) */
+TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
+                                                const float *depths);
+
+/* Closes what hardware leaves open between two layers: its lines go over corners. Where a block of
+   2 x 2 texels has one diagonal in both layers, and of the other one each texel in one layer only,
+   the one of the closer layer is wanted in the other as well.
+
+   front, back   [height][TERRIMP_MASK_WORDS(width)] layer k and layer k + 1
+   wanted        [height][TERRIMP_MASK_WORDS(width)] out: texels whose colours are to be copied from
+                 front to back; neither of the two
+   Errors        E_NULL; E_RANGE for an empty layer
+   Cost          O(width * height / 32) */
+TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
+                                                uint32_t width, uint32_t height,
+                                                uint32_t *wanted);
+
+/* ==== Placement ========================================================== >>placement */
+
+/* Which pictures to prepare, so that no view costs more than a budget and the pictures take little
+   memory. Views stand for all eyes of a cell that look into a range of directions: what a view
+   costs is what the frustum holds that encloses all of theirs. Clusters are what a picture can show
+   in place of geometry: the nodes of a hierarchy. Candidates are pictures that might be made: of a
+   cluster, for some cells. */
+
+/* What a candidate does for a view. */
+typedef struct terrimp_place_gain {
+    uint32_t view;
+    float saved;  /* cost of the cluster as geometry, less that of its picture [Limits: finite] */
+} terrimp_place_gain;
+
+typedef struct terrimp_place_candidate {
+    uint32_t cluster;
+    uint32_t first_gain, gain_count; /* its gains, which are no other's; one a view at most */
+    float memory;                    /* of the picture, in any unit [Limits: > 0] */
+} terrimp_place_candidate;
+
+typedef struct terrimp_place_desc {
+    const terrimp_place_candidate *candidates; /* (required) [candidate_count] */
+    const terrimp_place_gain *gains;           /* (required) [gain_count] */
+    const uint32_t *parents;                   /* (required) [cluster_count] the cluster that holds
+                                                  it, with a greater number; its own for a root */
+    const float *costs;                        /* (required) [view_count] without pictures
+                                                  [Limits: finite] */
+    uint32_t candidate_count, gain_count, cluster_count, view_count;
+    float budget;                              /* (required) of each view [Limits: finite] */
+} terrimp_place_desc;
+
+typedef struct terrimp_placement {
+    uint32_t chosen;   /* candidates */
+    uint32_t problems; /* views that cost more than the budget without pictures */
+    uint32_t unsolved; /* those that still do: make their cells smaller, or give more candidates */
+    float memory;      /* of the chosen ones */
+} terrimp_placement;
+
+/* Bytes of scratch memory that terrimp_place needs; 0 for NULL or when they overflow. */
+TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
+
+/* Chooses candidates: again and again the one that takes most off what views cost above the budget,
+   for its memory; a picture of a cluster takes the place of pictures of what is in it. Then those
+   are given back that others can stand in for. Small sets are gone through again and again, each
+   time without one of the chosen candidates or with another one to begin with, while that pays.
+   Costs count as within the budget to 1e-5 of it.
+
+   scratch    aligned to 8 bytes
+   shown      [gain_count] out: 1 where the candidate's picture is shown in that view, else 0. A
+              candidate is to be made if it is shown in any
+   costs      [view_count] out: what views cost then
+   placement  out
+   Errors     E_NULL; E_ALIGN; E_MEMORY; E_NOT_FINITE; E_RANGE for a number that points nowhere, a
+              parent that is not greater, memory that is not > 0, or a gain of two candidates.
+              Then shown, costs and placement are untouched
+   Cost       about O(gains + chosen * log(candidates)): scores only ever fall, so that only the
+              best one is scored anew until it stays the best. 2 s for 300,000 candidates with 2.2
+              million gains, 60 bytes of scratch memory for each of these
+   Source     Jeschke 2004, section 5.7; all after the choice is ours */
+TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
+                                         size_t bytes, uint8_t *shown, float *costs,
+                                         terrimp_placement *placement);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -13746,6 +13871,652 @@ TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_l
         quads[i].x = rects[i].x + gutter;
         quads[i].y = rects[i].y + gutter;
     }
+    return TERRIMP_OK;
+}
+
+/* --- recording without gaps --- */
+
+/* Appends the point of edge a-b at a depth between those of its ends. */
+static void terrimpi_clip_cut(const float *vertices, uint32_t stride, const float depths[3],
+                              uint32_t a, uint32_t b, float depth, float *out)
+{
+    uint32_t low = depths[a] < depths[b] ? a : b, high = low == a ? b : a, i;
+    float part = (depth - depths[low]) / (depths[high] - depths[low]);
+    for (i = 0; i < stride; i++) {
+        float from = vertices[(size_t)low * stride + i];
+        out[i] = from + part * (vertices[(size_t)high * stride + i] - from);
+    }
+}
+
+/* A polygon between two parallel planes has the vertices of the triangle that lie there, and those
+   where its edges pass the planes: so no polygon is clipped twice. */
+static uint32_t terrimpi_layer_clip(const float *vertices, uint32_t stride, const float depths[3],
+                                    float low, float high, float *out)
+{
+    uint32_t a, k, count = 0;
+    for (a = 0; a < 3u; a++) {
+        uint32_t b = a == 2u ? 0u : a + 1u;
+        int rises = depths[b] > depths[a];
+        if (depths[a] >= low && depths[a] <= high)
+            memcpy(out + (size_t)count++ * stride, vertices + (size_t)a * stride,
+                   stride * sizeof *out);
+        for (k = 0; k < 2u; k++) {
+            float plane = (k == 0) == rises ? low : high;
+            if ((depths[a] < plane && plane < depths[b]) ||
+                (depths[b] < plane && plane < depths[a]))
+                terrimpi_clip_cut(vertices, stride, depths, a, b, plane,
+                                  out + (size_t)count++ * stride);
+        }
+    }
+    return count;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count)
+{
+    TERRIMPI_REFUSE(!vertices || !depths || !out || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(depths), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!stride || !(low <= high), TERRIMP_E_RANGE);
+    *count = terrimpi_layer_clip(vertices, stride, depths, low, high, out);
+    return TERRIMP_OK;
+}
+
+static terrimp_result terrimpi_record_check(const terrimp_layer_record *r)
+{
+    TERRIMPI_REFUSE(!r || !r->layers || !r->picture || !r->masks, TERRIMP_E_NULL);
+    return terrimpi_within_u32(r->width, 1, 16384) && terrimpi_within_u32(r->height, 1, 16384) &&
+                   r->layers->count
+               ? TERRIMP_OK
+               : TERRIMP_E_RANGE;
+}
+
+static uint32_t *terrimpi_record_row(const terrimp_layer_record *r, uint32_t layer, uint32_t y)
+{
+    return r->masks + ((size_t)layer * r->height + y) * TERRIMP_MASK_WORDS(r->width);
+}
+
+/* Sets the texels of a row from column x to column end - 1. */
+static void terrimpi_mask_fill(uint32_t *row, uint32_t x, uint32_t end)
+{
+    uint32_t word;
+    for (word = x / 32u; x < end && word <= (end - 1u) / 32u; word++)
+        row[word] |= (word == x / 32u ? 0xffffffffu << x % 32u : 0xffffffffu) &
+                     (word == (end - 1u) / 32u ? terrimpi_mask_tail(end) : 0xffffffffu);
+}
+
+/* The part of a convex polygon [count][2] between two heights, in columns; 0 when there is none. */
+static int terrimpi_polygon_row(const float *uv, uint32_t count, float bottom, float top,
+                                float *left, float *right)
+{
+    uint32_t a, k;
+    *left = TERRIMPI_FLOAT_MAX;
+    *right = -TERRIMPI_FLOAT_MAX;
+    for (a = 0; a < count; a++) {
+        const float *p = uv + 2u * a, *q = uv + 2u * (a + 1u == count ? 0u : a + 1u);
+        if (p[1] >= bottom && p[1] <= top) {
+            *left = terrimpi_min(*left, p[0]);
+            *right = terrimpi_max(*right, p[0]);
+        }
+        if (q[1] < p[1]) { /* an edge crosses a row at one place, from whichever side it is seen */
+            const float *swap = p;
+            p = q;
+            q = swap;
+        }
+        for (k = 0; k < 2u; k++) {
+            float y = k ? top : bottom, x;
+            if (!(p[1] < y && y < q[1]))
+                continue;
+            x = p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1]));
+            *left = terrimpi_min(*left, x);
+            *right = terrimpi_max(*right, x);
+        }
+    }
+    return *left <= *right;
+}
+
+/* The least column or row from which texels count, for a coordinate; within 0..size. */
+static uint32_t terrimpi_texel(float at, uint32_t size)
+{
+    return !(at > 0.0f) ? 0u : at >= (float)size ? size : (uint32_t)at;
+}
+
+/* Sets the texels that a convex polygon [count][2] touches, or those whose centres it holds. */
+static void terrimpi_record_polygon(const terrimp_layer_record *r, uint32_t layer, const float *uv,
+                                    uint32_t count)
+{
+    float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, left, right;
+    uint32_t i, y, end;
+    for (i = 0; i < count; i++) {
+        low = terrimpi_min(low, uv[2u * i + 1u]);
+        high = terrimpi_max(high, uv[2u * i + 1u]);
+    }
+    if (!count || high < 0.0f)
+        return;
+    end = terrimpi_min_u32(terrimpi_texel(high, r->height) + 1u, r->height);
+    for (y = terrimpi_texel(low, r->height); y < end; y++) {
+        float bottom = (float)y + (r->no_outline ? 0.5f : 0.0f);
+        float top = (float)y + (r->no_outline ? 0.5f : 1.0f);
+        if (!terrimpi_polygon_row(uv, count, bottom, top, &left, &right) || right < 0.0f)
+            continue;
+        if (r->no_outline)
+            terrimpi_mask_fill(terrimpi_record_row(r, layer, y),
+                               terrimpi_texel(left + 0.5f, r->width),
+                               terrimpi_texel(right + 0.5f, r->width));
+        else
+            terrimpi_mask_fill(
+                terrimpi_record_row(r, layer, y), terrimpi_texel(left, r->width),
+                terrimpi_min_u32(terrimpi_texel(right, r->width) + 1u, r->width));
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
+                                                  const float xyz[9])
+{
+    float seen[9], depths[3], polygon[15], uv[10], low, high;
+    uint32_t layer, last, count, i;
+    TERRIMPI_TRY(terrimpi_record_check(record));
+    TERRIMPI_REFUSE(!xyz, TERRIMP_E_NULL);
+    for (i = 0; i < 3u; i++) {
+        const terrimp_capture *p = record->picture;
+        float to[3];
+        TERRIMPI_REFUSE(!terrimpi_finite3(xyz + 3u * i), TERRIMP_E_NOT_FINITE);
+        terrimpi_sub(xyz + 3u * i, p->eye, to);
+        depths[i] = seen[3u * i + 2u] = terrimpi_dot(to, p->forward);
+        seen[3u * i] = terrimpi_dot(to, p->right) - p->tan_left * depths[i];
+        seen[3u * i + 1u] = terrimpi_dot(to, p->up) - p->tan_down * depths[i];
+    }
+    low = terrimpi_min(depths[0], terrimpi_min(depths[1], depths[2]));
+    high = terrimpi_max(depths[0], terrimpi_max(depths[1], depths[2]));
+    if (!(high >= record->layers->start) || !(low <= record->layers->end))
+        return TERRIMP_OK;
+    layer = terrimp_layer_of(record->layers, low);
+    if (layer && low <= terrimp_layer_border(record->layers, layer))
+        layer--; /* what touches a border is in both */
+    last = terrimp_layer_of(record->layers, high);
+    for (; layer <= last; layer++) {
+        count = terrimpi_layer_clip(seen, 3, depths, terrimp_layer_border(record->layers, layer),
+                                    terrimp_layer_border(record->layers, layer + 1u), polygon);
+        for (i = 0; i < count; i++) {
+            float texel = record->layers->texel * polygon[3u * i + 2u];
+            uv[2u * i] = polygon[3u * i] / texel;
+            uv[2u * i + 1u] = polygon[3u * i + 1u] / texel;
+        }
+        terrimpi_record_polygon(record, layer, uv, count);
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
+                                                const float *depths)
+{
+    uint32_t x, y, k, layer, last;
+    TERRIMPI_TRY(terrimpi_record_check(record));
+    TERRIMPI_REFUSE(!depths, TERRIMP_E_NULL);
+    for (y = 0; y < record->height; y++)
+        for (x = 0; x < record->width; x++) {
+            float low = TERRIMPI_FLOAT_MAX, high = 0.0f;
+            for (k = 0; k < 4u; k++) {
+                float d = depths[(size_t)(y + (k >> 1)) * (record->width + 1u) + x + (k & 1u)];
+                if (!(d > 0.0f) || !terrimpi_finite(d))
+                    continue;
+                low = terrimpi_min(low, d);
+                high = terrimpi_max(high, d);
+            }
+            if (!(high >= record->layers->start) || !(low <= record->layers->end))
+                continue;
+            layer = terrimp_layer_of(record->layers, low);
+            last = terrimp_layer_of(record->layers, high);
+            for (; layer <= last; layer++)
+                terrimpi_record_row(record, layer, y)[x / 32u] |= 1u << x % 32u;
+        }
+    return TERRIMP_OK;
+}
+
+/* A word of a row's bits, each moved to the place of its neighbour before it (dx = 1: of the bit at
+   x + 1), without what lies beyond the width. */
+static uint32_t terrimpi_mask_at(const uint32_t *row, uint32_t width, uint32_t word, int dx)
+{
+    uint32_t words = TERRIMP_MASK_WORDS(width), here = row[word], next = 0;
+    if (word + 1u == words)
+        here &= terrimpi_mask_tail(width);
+    if (!dx)
+        return here;
+    if (word + 2u == words)
+        next = row[word + 1u] & terrimpi_mask_tail(width);
+    else if (word + 1u < words)
+        next = row[word + 1u];
+    return here >> 1 | next << 31;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
+                                                uint32_t width, uint32_t height,
+                                                uint32_t *wanted)
+{
+    size_t words = TERRIMP_MASK_WORDS(width), y;
+    uint32_t word, k;
+    TERRIMPI_REFUSE(!front || !back || !wanted, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!width || !height, TERRIMP_E_RANGE);
+    memset(wanted, 0, height * words * sizeof *wanted);
+    for (y = 0; y + 1u < height; y++)
+        for (word = 0; word < words; word++) {
+            uint32_t f[4], both[4], one[4], missing[4]; /* of the block's corner at dx + 2 dy */
+            for (k = 0; k < 4u; k++) {
+                size_t row = (y + (k >> 1)) * words;
+                uint32_t b = terrimpi_mask_at(back + row, width, word, (int)(k & 1u));
+                f[k] = terrimpi_mask_at(front + row, width, word, (int)(k & 1u));
+                both[k] = f[k] & b;
+                one[k] = f[k] ^ b;
+                missing[k] = f[k] & ~b;
+            }
+            for (k = 0; k < 4u; k++) {
+                uint32_t want = both[k ^ 1u] & both[k ^ 2u] & one[k] & one[k ^ 3u] & missing[k];
+                uint32_t *to = wanted + (y + (k >> 1)) * words + word;
+                to[0] |= k & 1u ? want << 1 : want;
+                if ((k & 1u) && want >> 31)
+                    to[1] |= 1u; /* inside: the bit beyond the last column is never set */
+            }
+        }
+    return TERRIMP_OK;
+}
+
+/* ==== Placement ========================================================== >>impl-placement */
+/* Based on: Jeschke 2004, chapter 5. */
+
+#define TERRIMPI_PLACE_NONE 0xffffffffu
+enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
+#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+
+typedef struct terrimpi_placing {
+    const terrimp_place_desc *desc;
+    float *costs;       /* [view_count] as they are now */
+    uint8_t *shown;     /* [gain_count] */
+    float *scores;      /* [candidate_count] gain for memory when it was last looked at */
+    uint32_t *heap;     /* [candidate_count] the best score first */
+    uint32_t *owner;    /* [gain_count] candidate */
+    uint32_t *first;    /* [view_count] gains shown in each view, as a list */
+    uint32_t *next;     /* [gain_count] */
+    uint32_t heap_count;
+    uint8_t *wish;      /* [candidate_count] TERRIMPI_PLACE_... */
+    uint8_t *best;      /* [gain_count] what the best attempt shows */
+    uint8_t *made;      /* [candidate_count] its memory is paid for */
+    uint32_t *spare;    /* [view_count] gains of those, as a list: */
+    uint32_t *another;  /* [gain_count] */
+    uint32_t *log;      /* [3 * gain_count] gains that were shown or hidden, to be undone */
+    uint32_t log_count;
+} terrimpi_placing;
+
+static size_t terrimpi_place_layout(const terrimp_place_desc *d, void *base, terrimpi_placing *p)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    p->desc = d;
+    p->scores = (float *)terrimpi_take(&arena, d->candidate_count, sizeof *p->scores);
+    p->heap = (uint32_t *)terrimpi_take(&arena, d->candidate_count, sizeof *p->heap);
+    p->owner = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->owner);
+    p->first = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->first);
+    p->next = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->next);
+    p->wish = (uint8_t *)terrimpi_take(&arena, d->candidate_count, 1);
+    p->best = (uint8_t *)terrimpi_take(&arena, d->gain_count, 1);
+    p->made = (uint8_t *)terrimpi_take(&arena, d->candidate_count, 1);
+    p->spare = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->spare);
+    p->another = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->another);
+    p->log = (uint32_t *)terrimpi_take(&arena, d->gain_count, 3 * sizeof *p->log);
+    return arena.ok ? arena.bytes + TERRIMPI_ALIGN : 0;
+}
+
+TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc)
+{
+    terrimpi_placing p;
+    return desc ? terrimpi_place_layout(desc, NULL, &p) : 0;
+}
+
+/* Whether a cluster is another one or lies within it: parents have greater numbers. */
+static int terrimpi_place_within(const terrimpi_placing *p, uint32_t cluster, uint32_t other)
+{
+    while (cluster < other && p->desc->parents[cluster] != cluster)
+        cluster = p->desc->parents[cluster];
+    return cluster == other;
+}
+
+/* What a picture would take off a view's cost: less what pictures of its parts have, whose place
+   it takes; nothing when one already shows all of it. */
+static float terrimpi_place_net(const terrimpi_placing *p, uint32_t gain)
+{
+    const terrimp_place_gain *g = &p->desc->gains[gain];
+    uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i;
+    float net = g->saved;
+    for (i = p->first[g->view]; i != TERRIMPI_PLACE_NONE; i = p->next[i]) {
+        uint32_t other = p->desc->candidates[p->owner[i]].cluster;
+        if (terrimpi_place_within(p, cluster, other))
+            return 0.0f;
+        if (terrimpi_place_within(p, other, cluster))
+            net -= p->desc->gains[i].saved;
+    }
+    return net;
+}
+
+/* But for rounding: costs are added to and taken from many times. */
+static int terrimpi_place_solved(const terrimpi_placing *p, float cost)
+{
+    return cost <= p->desc->budget + 1e-5f * terrimpi_abs(p->desc->budget);
+}
+
+/* What of that counts: nothing below the budget does (his equation 5.4). */
+static float terrimpi_place_useful(const terrimpi_placing *p, uint32_t gain)
+{
+    float cost = p->costs[p->desc->gains[gain].view], over = cost - p->desc->budget;
+    return !terrimpi_place_solved(p, cost) && p->desc->gains[gain].saved > 0.0f
+               ? terrimpi_max(0.0f, terrimpi_min(over, terrimpi_place_net(p, gain)))
+               : 0.0f;
+}
+
+static float terrimpi_place_score(const terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    float sum = 0.0f;
+    uint32_t i;
+    for (i = 0; i < c->gain_count; i++)
+        sum += terrimpi_place_useful(p, c->first_gain + i);
+    return sum / c->memory;
+}
+
+static int terrimpi_place_better(const terrimpi_placing *p, uint32_t a, uint32_t b)
+{
+    return p->scores[a] > p->scores[b] || (!(p->scores[a] < p->scores[b]) && a < b);
+}
+
+static void terrimpi_place_sink(terrimpi_placing *p, uint32_t at)
+{
+    uint32_t item = p->heap[at];
+    for (;;) {
+        uint32_t child = 2u * at + 1u;
+        if (child + 1u < p->heap_count &&
+            terrimpi_place_better(p, p->heap[child + 1u], p->heap[child]))
+            child++;
+        if (child >= p->heap_count || !terrimpi_place_better(p, p->heap[child], item))
+            break;
+        p->heap[at] = p->heap[child];
+        at = child;
+    }
+    p->heap[at] = item;
+}
+
+/* Shows a gain in its view that was not shown, or the reverse. */
+static void terrimpi_place_toggle(terrimpi_placing *p, uint32_t gain)
+{
+    const terrimp_place_gain *g = &p->desc->gains[gain];
+    uint32_t *at = &p->first[g->view];
+    p->log[p->log_count++] = gain;
+    p->shown[gain] = !p->shown[gain];
+    if (p->shown[gain]) {
+        p->next[gain] = *at;
+        *at = gain;
+        p->costs[g->view] -= g->saved;
+        return;
+    }
+    while (*at != gain)
+        at = &p->next[*at];
+    *at = p->next[gain];
+    p->costs[g->view] += g->saved;
+}
+
+/* Shows a picture in a view, in place of the pictures of its parts. */
+static void terrimpi_place_show(terrimpi_placing *p, uint32_t gain)
+{
+    uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i, after;
+    for (i = p->first[p->desc->gains[gain].view]; i != TERRIMPI_PLACE_NONE; i = after) {
+        after = p->next[i];
+        if (terrimpi_place_within(p, p->desc->candidates[p->owner[i]].cluster, cluster))
+            terrimpi_place_toggle(p, i);
+    }
+    terrimpi_place_toggle(p, gain);
+}
+
+/* Shows a candidate wherever it is of use. */
+static void terrimpi_place_choose(terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    uint32_t i;
+    p->log_count = 0;
+    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++)
+        if (terrimpi_place_useful(p, i) > 0.0f)
+            terrimpi_place_show(p, i);
+}
+
+static void terrimpi_place_greedily(terrimpi_placing *p)
+{
+    uint32_t i;
+    for (i = 0; i < p->desc->candidate_count; i++)
+        if (p->wish[i] == TERRIMPI_PLACE_FIRST)
+            terrimpi_place_choose(p, i);
+    p->heap_count = 0;
+    for (i = 0; i < p->desc->candidate_count; i++) {
+        p->scores[i] = p->wish[i] ? 0.0f : terrimpi_place_score(p, i);
+        if (p->scores[i] > 0.0f)
+            p->heap[p->heap_count++] = i;
+    }
+    for (i = p->heap_count / 2u; i-- > 0;)
+        terrimpi_place_sink(p, i);
+    while (p->heap_count) {
+        uint32_t best = p->heap[0];
+        float score = terrimpi_place_score(p, best);
+        int fell = score < p->scores[best];
+        p->scores[best] = score;
+        if (!fell)
+            terrimpi_place_choose(p, best);
+        if (!fell || !(score > 0.0f))
+            p->heap[0] = p->heap[--p->heap_count];
+        if (p->heap_count)
+            terrimpi_place_sink(p, 0);
+    }
+}
+
+static int terrimpi_place_is_shown(const terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    uint32_t i;
+    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++)
+        if (p->shown[i])
+            return 1;
+    return 0;
+}
+
+/* Brings a view back to a cost, with pictures that are paid for; returns whether that worked. */
+static int terrimpi_place_stand_in(terrimpi_placing *p, uint32_t view, float cost)
+{
+    while (!terrimpi_place_solved(p, p->costs[view]) && p->costs[view] > cost) {
+        uint32_t i, best = TERRIMPI_PLACE_NONE;
+        float most = 0.0f;
+        for (i = p->spare[view]; i != TERRIMPI_PLACE_NONE; i = p->another[i]) {
+            float useful = terrimpi_place_useful(p, i);
+            if (useful > most && p->made[p->owner[i]] && !p->shown[i]) {
+                most = useful;
+                best = i;
+            }
+        }
+        if (best == TERRIMPI_PLACE_NONE)
+            return 0;
+        terrimpi_place_show(p, best);
+    }
+    return 1;
+}
+
+/* Does without a candidate, if no view comes to cost more than the budget by that. */
+static void terrimpi_place_drop(terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    uint32_t i;
+    p->log_count = 0;
+    p->made[candidate] = 0;
+    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++) {
+        uint32_t view = p->desc->gains[i].view;
+        float cost = p->costs[view];
+        if (!p->shown[i])
+            continue;
+        terrimpi_place_toggle(p, i);
+        if (terrimpi_place_stand_in(p, view, cost))
+            continue;
+        for (i = p->log_count; i-- > 0;) {
+            p->log_count = i; /* where undoing is noted, and forgotten */
+            terrimpi_place_toggle(p, p->log[i]);
+        }
+        p->made[candidate] = 1;
+        return;
+    }
+}
+
+/* Lists, view by view, what pictures that are paid for could do. */
+static void terrimpi_place_spares(terrimpi_placing *p)
+{
+    uint32_t i;
+    for (i = 0; i < p->desc->candidate_count; i++)
+        p->made[i] = (uint8_t)terrimpi_place_is_shown(p, i);
+    for (i = 0; i < p->desc->view_count; i++)
+        p->spare[i] = TERRIMPI_PLACE_NONE;
+    for (i = p->desc->gain_count; i-- > 0;) {
+        uint32_t view = p->desc->gains[i].view;
+        if (p->owner[i] == TERRIMPI_PLACE_NONE || !p->made[p->owner[i]])
+            continue;
+        p->another[i] = p->spare[view];
+        p->spare[view] = i;
+    }
+}
+
+/* Gives back what others can stand in for, the largest first. */
+static void terrimpi_place_give_back(terrimpi_placing *p)
+{
+    uint32_t i;
+    terrimpi_place_spares(p);
+    p->heap_count = 0;
+    for (i = 0; i < p->desc->candidate_count; i++) {
+        p->scores[i] = p->desc->candidates[i].memory;
+        if (p->made[i])
+            p->heap[p->heap_count++] = i;
+    }
+    for (i = p->heap_count / 2u; i-- > 0;)
+        terrimpi_place_sink(p, i);
+    while (p->heap_count) {
+        uint32_t largest = p->heap[0];
+        p->heap[0] = p->heap[--p->heap_count];
+        if (p->heap_count)
+            terrimpi_place_sink(p, 0);
+        terrimpi_place_drop(p, largest);
+    }
+}
+
+static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!terrimpi_finite(d->budget), TERRIMP_E_NOT_FINITE);
+    for (i = 0; i < d->cluster_count; i++)
+        TERRIMPI_REFUSE(d->parents[i] < i || d->parents[i] >= d->cluster_count, TERRIMP_E_RANGE);
+    for (i = 0; i < d->view_count; i++)
+        TERRIMPI_REFUSE(!terrimpi_finite(d->costs[i]), TERRIMP_E_NOT_FINITE);
+    for (i = 0; i < d->gain_count; i++) {
+        TERRIMPI_REFUSE(!terrimpi_finite(d->gains[i].saved), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(d->gains[i].view >= d->view_count, TERRIMP_E_RANGE);
+    }
+    for (i = 0; i < d->candidate_count; i++) {
+        const terrimp_place_candidate *c = &d->candidates[i];
+        TERRIMPI_REFUSE(!terrimpi_finite(c->memory), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!(c->memory > 0.0f) || c->cluster >= d->cluster_count ||
+                            c->first_gain > d->gain_count ||
+                            c->gain_count > d->gain_count - c->first_gain,
+                        TERRIMP_E_RANGE);
+    }
+    return TERRIMP_OK;
+}
+
+static void terrimpi_place_sum(const terrimpi_placing *p, terrimp_placement *out)
+{
+    uint32_t i;
+    memset(out, 0, sizeof *out);
+    for (i = 0; i < p->desc->view_count; i++) {
+        out->problems += !terrimpi_place_solved(p, p->desc->costs[i]);
+        out->unsolved += !terrimpi_place_solved(p, p->costs[i]);
+    }
+    for (i = 0; i < p->desc->candidate_count; i++)
+        if (terrimpi_place_is_shown(p, i)) {
+            out->chosen++;
+            out->memory += p->desc->candidates[i].memory;
+        }
+}
+
+/* Places from the beginning, as wished. */
+static void terrimpi_place_attempt(terrimpi_placing *p, terrimp_placement *out)
+{
+    uint32_t i;
+    memcpy(p->costs, p->desc->costs, p->desc->view_count * sizeof *p->costs);
+    memset(p->shown, 0, p->desc->gain_count);
+    for (i = 0; i < p->desc->view_count; i++)
+        p->first[i] = TERRIMPI_PLACE_NONE;
+    terrimpi_place_greedily(p);
+    terrimpi_place_give_back(p);
+    terrimpi_place_sum(p, out);
+}
+
+static int terrimpi_place_uses(const terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    return c->gain_count && memchr(p->best + c->first_gain, 1, c->gain_count) != NULL;
+}
+
+/* Attempts to do without each chosen candidate, and to begin with each other one, as long as that
+   pays and work is left to spend. */
+static void terrimpi_place_improve(terrimpi_placing *p, terrimp_placement *best)
+{
+    uint32_t n = p->desc->candidate_count, i = 0, since = 0;
+    uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
+    for (; since < n && tries > 0; i = i + 1u < n ? i + 1u : 0u, since++) {
+        terrimp_placement attempt;
+        uint8_t wish = p->wish[i];
+        p->wish[i] = terrimpi_place_uses(p, i) ? TERRIMPI_PLACE_NEVER : TERRIMPI_PLACE_FIRST;
+        if (p->wish[i] == wish)
+            continue;
+        terrimpi_place_attempt(p, &attempt);
+        tries--;
+        if (attempt.unsolved < best->unsolved ||
+            (attempt.unsolved == best->unsolved && attempt.memory < best->memory)) {
+            *best = attempt;
+            memcpy(p->best, p->shown, p->desc->gain_count);
+            since = 0;
+        } else
+            p->wish[i] = wish;
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
+                                         size_t bytes, uint8_t *shown, float *costs,
+                                         terrimp_placement *placement)
+{
+    terrimpi_placing p;
+    uint32_t i, k;
+    TERRIMPI_REFUSE(!desc || !scratch || !shown || !costs || !placement, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!desc->candidates || !desc->gains || !desc->parents || !desc->costs,
+                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_place_check(desc));
+    TERRIMPI_REFUSE(bytes < terrimp_place_scratch_bytes(desc) ||
+                        !terrimpi_place_layout(desc, scratch, &p),
+                    TERRIMP_E_MEMORY);
+    p.costs = costs;
+    p.shown = shown;
+    memset(p.wish, 0, desc->candidate_count);
+    memset(p.owner, 0xff, desc->gain_count * sizeof *p.owner); /* gains may be nobody's */
+    for (i = 0; i < desc->candidate_count; i++)
+        for (k = 0; k < desc->candidates[i].gain_count; k++) {
+            uint32_t *owner = &p.owner[desc->candidates[i].first_gain + k];
+            TERRIMPI_REFUSE(*owner != TERRIMPI_PLACE_NONE, TERRIMP_E_RANGE);
+            *owner = i;
+        }
+    terrimpi_place_attempt(&p, placement);
+    memcpy(p.best, shown, desc->gain_count);
+    terrimpi_place_improve(&p, placement);
+    memcpy(shown, p.best, desc->gain_count);
+    memcpy(costs, desc->costs, desc->view_count * sizeof *costs);
+    for (i = 0; i < desc->gain_count; i++)
+        if (shown[i])
+            costs[desc->gains[i].view] -= desc->gains[i].saved;
     return TERRIMP_OK;
 }
 

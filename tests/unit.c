@@ -32,6 +32,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_bake.h"
 #include "unit_bad_input.h"
 #include "unit_layers.h"
+#include "unit_placement.h"
 #include "unit_golden.h"
 
 int main(int argc, char **argv)
@@ -55,6 +56,7 @@ int main(int argc, char **argv)
     sorted_tests();
     bad_input_tests();
     layers_tests();
+    placement_tests();
     golden_tests();
     return check_report();
 }
