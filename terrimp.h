@@ -10214,6 +10214,7 @@ typedef struct terrimpi_facet {
 typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
     float *row;             /* samples of one row or column of the node; scratch of its errors */
+    float *tops;            /* of a border: see terrimpi_ground_tops */
     float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
@@ -10236,6 +10237,7 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
     build->tile = (float *)terrimpi_take(&b, side * side, sizeof *build->tile);
     build->row = (float *)terrimpi_take(&b, longest, sizeof *build->row);
+    build->tops = (float *)terrimpi_take(&b, longest, sizeof *build->tops);
     build->heights = (float *)terrimpi_take(&b, vertices, sizeof *build->heights);
     build->work = (float *)terrimpi_take(&b, 2u * vertices, sizeof *build->work);
     build->vertices =
@@ -10315,27 +10317,42 @@ static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x
         row[first + i] -= start + (float)i * slope;
 }
 
+/* A segment of the loop, in rising order, and the samples of the border that it begins and ends at. */
+typedef struct terrimpi_segment {
+    uint32_t a, b, from, to;
+} terrimpi_segment;
+
+/* The segment from vertex i of the loop to the next; returns 0 when it is not on that side. */
+static int terrimpi_segment_of(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
+                               uint32_t i, terrimpi_segment *s)
+{
+    const terrimp_mesh_vertex *v = mesh->vertices;
+    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
+    uint32_t span = along_x ? p->span_x : p->span_z;
+    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
+    uint32_t next = (i + 1u) % mesh->border_vertex_count, from, to;
+    if ((along_x ? v[i].z : v[i].x) != at || (along_x ? v[next].z : v[next].x) != at)
+        return 0;
+    from = along_x ? v[i].x : v[i].z;
+    to = along_x ? v[next].x : v[next].z;
+    s->a = from < to ? i : next; /* the loop runs the other way on the far two sides */
+    s->b = from < to ? next : i;
+    s->from = terrimpi_tile_place(terrimpi_min_u32(from, to), p->level, span);
+    s->to = terrimpi_tile_place(terrimpi_max_u32(from, to), p->level, span);
+    return 1;
+}
+
 /* Takes the surface away from the samples of one border, whose line the loop has. */
 static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
                                  float *line)
 {
-    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
-    uint32_t i, n = mesh->border_vertex_count, span = along_x ? p->span_x : p->span_z;
-    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
-    for (i = 0; i < n; i++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = mesh->vertices + (i + 1u) % n;
-        uint32_t a_at = along_x ? a->x : a->z, b_at = along_x ? b->x : b->z, from, to;
-        if ((along_x ? a->z : a->x) != at || (along_x ? b->z : b->x) != at)
-            continue;
-        if (a_at > b_at) { /* the loop runs the other way on the far two sides */
-            const terrimp_mesh_vertex *swap = a;
-            a = b;
-            b = swap;
-        }
-        from = terrimpi_tile_place(terrimpi_min_u32(a_at, b_at), p->level, span);
-        to = terrimpi_tile_place(terrimpi_max_u32(a_at, b_at), p->level, span);
-        terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
-                           (b->height - a->height) / (float)(to - from));
+    uint32_t i, span = terrimpi_along_x(side) ? p->span_x : p->span_z;
+    terrimpi_segment s;
+    for (i = 0; i < mesh->border_vertex_count; i++) {
+        const terrimp_mesh_vertex *v = mesh->vertices;
+        if (terrimpi_segment_of(p, mesh, side, i, &s))
+            terrimpi_take_away(line, s.from, s.to + (s.to == span), (float)s.from, v[s.a].height,
+                               (v[s.b].height - v[s.a].height) / (float)(s.to - s.from));
     }
 }
 
@@ -10557,6 +10574,67 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
     return TERRIMP_OK;
 }
 
+/* The coarsest level of ground that is looked at beside a node: three above its own, as far as the
+   node's corners are samples of it. */
+static uint32_t terrimpi_tops_level(const terrimp_terrain *t, const terrimpi_patch *p)
+{
+    uint32_t level = 0;
+    while (level < 3u && t->desc.chunk_quads % (2u << level) == 0)
+        level++;
+    return p->level + level;
+}
+
+/* The highest that ground can be drawn at each sample of a border: of some levels the lines between
+   every 2^level-th sample. */
+static void terrimpi_ground_tops(const terrimpi_build *build, uint32_t span, uint32_t top_level)
+{
+    const float *line = build->row;
+    uint32_t level, from, to, k;
+    memcpy(build->tops, line, (span + 1u) * sizeof *line);
+    for (level = 1; level <= top_level; level++)
+        for (from = 0; from < span; from = to) {
+            float slope;
+            to = terrimpi_min_u32(from + (1u << level), span);
+            slope = (line[to] - line[from]) / (float)(to - from);
+            for (k = from + 1u; k < to; k++)
+                build->tops[k] = terrimpi_max(build->tops[k],
+                                              line[from] + slope * (float)(k - from));
+        }
+}
+
+/* Lifts the border until no ground beside it stands out: the corners, samples themselves, keep it
+   from that so far, and lines of coarser ground over valleys. What is missing at a sample is asked
+   of the closer end of its segment, at most twice as much: w of it is what is missing. So a ray
+   that comes in over a mesh's border comes in over all ground behind it, and over all other meshes
+   but for skirts, which reach below the samples (see terrimpi_skirt_foot): there is no gap.
+   Neighbours of one level still share what lies between the corners. */
+static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch *p,
+                                 terrimp_mesh *mesh, const terrimpi_build *build)
+{
+    float *lift = build->work;
+    uint32_t i, k;
+    int side;
+    terrimpi_segment s;
+    for (i = 0; i < mesh->border_vertex_count; i++)
+        lift[i] = 0.0f;
+    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+        uint32_t span = terrimpi_read_border(t, p, side, build->row);
+        terrimpi_ground_tops(build, span, terrimpi_tops_level(t, p));
+        terrimpi_take_border(p, mesh, side, build->tops);
+        for (i = 0; i < mesh->border_vertex_count; i++) {
+            if (!terrimpi_segment_of(p, mesh, side, i, &s))
+                continue;
+            for (k = s.from; k <= s.to; k++) {
+                float w = (float)(k - s.from) / (float)(s.to - s.from);
+                float *to = lift + (w > 0.5f ? s.b : s.a);
+                *to = terrimpi_max(*to, build->tops[k] / terrimpi_max(w, 1.0f - w));
+            }
+        }
+    }
+    for (i = 0; i < mesh->border_vertex_count; i++)
+        mesh->vertices[i].height += lift[i];
+}
+
 /* The steps that a height is stored as: rounded up when meshes stand proud. */
 static uint16_t terrimpi_height_steps(const terrimp_terrain *t, float height)
 {
@@ -10656,8 +10734,10 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
     float rms;
     terrimpi_fill_tile(t, &p, build);
     TERRIMPI_TRY(terrimpi_simplify_tile(t, &p, build, &mesh));
-    if (t->desc.proud > 0.0f)
+    if (t->desc.proud > 0.0f) {
         TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
+        terrimpi_lift_border(t, &p, &mesh, build);
+    }
     terrimpi_store_surface(t, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
     TERRIMPI_REFUSE(!terrimpi_finite2(error.above, error.below), TERRIMP_E_NOT_FINITE);
