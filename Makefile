@@ -3,7 +3,7 @@
 ## make           builds the examples into build/; make NAME builds one program
 ## make deps      installs what is missing, on Debian: a compiler, libpng, OpenGL without a window
 ## make demo      flies over a terrain: pictures and a table of statistics, in build/demo/
-##                  DEM=FILE     over this .hgt or .pgm instead of a made-up terrain
+##                  DEM=FILE     over this elevation file instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
 ## make test      runs every test, as many suites at once as there are cores
 ##                  JOBS=N   so many at once; 1: one after the other
@@ -57,6 +57,10 @@ GL_LIBS_egl     := -lEGL -lOpenGL
 # The benchmark compares with meshoptimizer where that is installed.
 BENCH_FLAGS = $(if $(call has_header,meshoptimizer.h),-DTERRIMP_HAVE_MESHOPT)
 BENCH_LIBS  = $(if $(call has_header,meshoptimizer.h),-lmeshoptimizer)
+
+# GeoTIFF is read where libtiff is installed.
+TIFF_FLAGS = $(if $(call has_header,tiffio.h),-DHOST_TIFF)
+TIFF_LIBS  = $(if $(call has_header,tiffio.h),-ltiff)
 
 EXAMPLES := $(patsubst examples/%.c,%,$(wildcard examples/*.c))
 EXAMPLES_CPP := $(patsubst examples/%.cpp,%,$(wildcard examples/*.cpp))
@@ -122,7 +126,8 @@ vpath %.cpp examples
 
 $(BUILD)/%: $(BUILD)/%.o $(BUILD)/host.a
 	@echo "link    $@"
-	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) -lpng -lm -o $@
+	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) $(TIFF_LIBS) -lpng -lm \
+	    -o $@
 
 $(BUILD)/host.a: $(HOST)
 	@rm -f $@
@@ -139,6 +144,8 @@ $(BUILD)/%.o: %.cpp | $(DEPS)
 	@echo "compile $<"
 	@$(CXX) -std=c++11 -pthread $(CXX_WARNINGS) $(CONFIG_$(CONFIG)) $(FLAGS) -I. -MMD -MP \
 	    $(CXXFLAGS) -c $< -o $@
+
+$(BUILD)/host/dem_tiff.o $(BUILD)/unit_host.o: FLAGS = $(TIFF_FLAGS)
 
 LINK = $(CC)
 $(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread

@@ -112,9 +112,14 @@
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
-       as they were unless their comment says otherwise. NaN, infinities, null pointers, sizes out
-       of their limits and products that overflow are errors in every build; asserts are for this
-       header's own mistakes. terrimp_result_text says what to do.
+       as they were unless their comment says otherwise. Any of them may return, in every build,
+       and their comments do not repeat it:
+         E_NULL                a pointer is null that is not said to be optional
+         E_RANGE, E_NOT_FINITE a number is outside of its limits, or NaN or infinite
+         E_OVERFLOW, E_MEMORY  sizes multiply to more than size_t holds; a block is too small
+         E_ALIGN, E_CAPACITY   a pointer is not aligned for its type; an output array is too small
+         E_STATE               an object is not ready: before init, build_finish, the first update
+       Asserts are for this header's own mistakes. terrimp_result_text says what to do.
 
    THREADS AND DETERMINISM
        No globals, no statics that change. Nodes may be built by several threads at once, each
@@ -280,14 +285,9 @@ typedef struct terrimp_heightfield {
 
    in         what the caller filled in
    out        receives the effective descriptor; may be in itself
-   Errors     E_NULL  in, out or in->samples is null
-              E_RANGE a size, the format, a spacing or the scale is outside its limits; row_bytes is
-                      shorter than a row or no multiple of a sample; the spacing is so fine, or the
-                      origin so distant, that a float cannot tell neighbouring columns apart; a
-                      sample of the integer formats would get an infinite height
-              E_NOT_FINITE  a spacing, the scale, the offset or the origin is NaN or infinite
-              E_OVERFLOW    the samples span more than size_t holds
-              E_ALIGN       samples is not aligned for the format
+   Errors     E_RANGE also when row_bytes is shorter than a row or no multiple of a sample; when the
+              spacing is so fine, or the origin so distant, that a float cannot tell neighbouring
+              columns apart; when a sample of the integer formats would get an infinite height
    Cost       O(1); the samples are not read */
 TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield *in,
                                                        terrimp_heightfield *out);
@@ -296,8 +296,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
 
    x, z       receive its column and row on E_VOID, and on E_NOT_FINITE if a sample is the cause;
               NULL: not wanted
-   Errors     those of resolve; E_VOID  the sample is a void;
-              E_NOT_FINITE  the height of the sample is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample
    Cost       O(width * depth) */
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z);
@@ -308,9 +307,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
    cols, rows size of the tile in samples [Limits: >= 1]
    stride     steps of the field from one sample of the tile to the next [Limits: >= 1]
    out        [rows][cols] [wu] receives the heights; must not overlap the samples
-   Errors     those of resolve; E_NULL  out is null; E_RANGE  an argument is outside its limits;
-              E_OVERFLOW  the tile is larger than size_t holds; E_VOID  the tile has a void;
-              E_NOT_FINITE  a height of the tile is NaN or infinite
+   Errors     E_VOID, E_NOT_FINITE for such a sample in the tile
    Cost       O(cols * rows), read twice: out is written only once the tile is known to be good */
 TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *field, uint32_t x,
                                                     uint32_t z, uint32_t cols, uint32_t rows,
@@ -321,8 +318,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
    x, z       column and row of the first sample [Limits: inside the field]
    cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
    low, high  [wu] receive the heights
-   Errors     those of resolve; E_NULL  low or high is null; E_RANGE  an argument is outside its
-              limits; E_VOID  every sample is a void; E_NOT_FINITE  a height is NaN or infinite
+   Errors     E_VOID when every sample is a void; E_NOT_FINITE for such a height
    Cost       O(cols * rows) */
 TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield *field, uint32_t x,
                                                       uint32_t z, uint32_t cols, uint32_t rows,
@@ -332,8 +328,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
 
    x, z       [wu] position; the outline of the field belongs to it
    height     [wu] receives the height
-   Errors     those of resolve; E_NULL  height is null; E_NOT_FINITE  x, z or a height of the
-              quad; E_MISS  the position is outside the field; E_VOID  the position is in a hole
+   Errors     E_MISS outside of the field; E_VOID in a hole; E_NOT_FINITE also for heights
    Cost       O(1) */
 TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield *field, float x,
                                                       float z, float *height);
@@ -362,9 +357,7 @@ typedef struct terrimp_ray_hit {
    direction     [3] any length but zero
    max_distance  [wu] end of the ray [Limits: > 0; FLT_MAX for no end]
    hit           receives the meeting; NULL: not wanted
-   Errors        those of resolve; E_NULL  origin or direction is null;
-                 E_NOT_FINITE  origin, direction or max_distance is NaN or infinite;
-                 E_RANGE  direction is zero or max_distance <= 0; E_MISS  the ray meets nothing
+   Errors        E_MISS when the ray meets nothing
    Cost          O(number of quads below the ray), at most width + depth
    Source        Amanatides and Woo 1987, A fast voxel traversal algorithm: the walk */
 TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield *field,
@@ -388,22 +381,21 @@ typedef struct terrimp_camera {
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
-/* Writes the effective camera: defaults filled in, forward and up orthonormal. out may be camera.
-   Errors: E_NULL; E_NOT_FINITE; E_RANGE for a field outside its limits. */
+/* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
+   camera. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
                                                   terrimp_camera *out);
 
 /* View and projection matrix, for column vectors, column-major.
 
    view          [16] out, world to eye space (x right, y up, looking along -z)
-   projection    [16] out, eye space to clip space
-   Errors        those of terrimp_camera_resolve */
+   projection    [16] out, eye space to clip space */
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
                                                    float projection[16]);
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
    height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
-   Errors: those of terrimp_camera_resolve. Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
+   Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
 /* The six planes of a viewing volume. A point p is inside plane i when
@@ -419,7 +411,7 @@ enum {
     TERRIMP_PLANES_OUTSIDE = -1
 };
 
-/* The planes of a camera. Errors: those of terrimp_camera_resolve. */
+/* The planes of a camera. */
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum);
 
@@ -452,8 +444,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE when a minimum exceeds its maximum; E_INSIDE when the
-              eye is in the box; E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
+              E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -463,13 +455,12 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
    sides touch their projections. The clip distances stay.
 
    xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
-   Errors       E_NULL; E_RANGE; E_BEHIND when a point is not in front of the eye: the capture is
-                unchanged
+   Errors       E_BEHIND when a point is not in front of the eye: the capture is unchanged
    Cost         O(count) */
 TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
                                                    uint32_t count);
 
-/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. Errors: E_NULL. */
+/* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16]);
@@ -498,8 +489,7 @@ typedef struct terrimp_quadtree {
 /* Lays the quadtree out; nodes is left NULL for the caller to set.
 
    chunk_quads  [Limits: even, 4..128] [Default 0 -> 64] 32 asks for twice as many draws, of a third
-                fewer triangles, for the same picture
-   Errors       E_NULL; E_RANGE; those of terrimp_heightfield_resolve */
+                fewer triangles, for the same picture */
 TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
                                                  uint32_t chunk_quads, terrimp_quadtree *tree);
 
@@ -533,8 +523,7 @@ typedef struct terrimp_pattern {
 
    chunk_quads  quads along a node's side [Limits: even, 4..128]
    form         terrimp_form
-   pattern      [Limits: < TERRIMP_PATTERN_COUNT]
-   Errors       E_NULL; E_RANGE */
+   pattern      [Limits: < TERRIMP_PATTERN_COUNT] */
 TERRIMP_API terrimp_result terrimp_pattern_find(uint32_t chunk_quads, int form, uint32_t pattern,
                                                 terrimp_pattern *found);
 
@@ -547,7 +536,6 @@ TERRIMP_API uint32_t terrimp_pattern_index_count(uint32_t chunk_quads, int form)
    are transformed for each triangle at chunk_quads 16, 0.55 at 64.
 
    indices     [terrimp_pattern_index_count] out
-   Errors      E_NULL; E_RANGE; E_CAPACITY
    Source      de Boer 2000, section 2.3.2 (borders); Wagner 2003 (strips with degenerate joins) */
 TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, uint16_t *indices,
                                                 size_t capacity);
@@ -563,7 +551,7 @@ typedef struct terrimp_geomip_node {
     float rms;       /* [wu] root of the mean square of that distance, for pattern 0 */
 } terrimp_geomip_node;
 
-/* The box of a node. Errors: E_NULL; E_RANGE. */
+/* The box of a node. */
 TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint32_t node,
                                               terrimp_box *box);
 
@@ -622,8 +610,8 @@ typedef struct terrimp_geomip_view {
    level, those outside of the camera's view are left out.
 
    view       in: settings and arrays; out: draws, draw_count, triangle_count
-   Errors     E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve: the draws of the frame
-              before stay. E_CAPACITY: draw_count is 0, draws_needed says how many there are
+   Errors     E_CAPACITY: draw_count is 0, draws_needed says how many there are. After others the
+              draws of the frame before stay
    Cost       O(nodes split + nodes drawn); 0.02 to 0.1 ms for 4097 x 4097 samples in chunks of 64
    Source     de Boer 2000, sections 2.2 and 2.3.1, equations 1 to 2 */
 TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
@@ -655,13 +643,12 @@ typedef struct terrimp_geomip_weights {
 /* Fills the vertices of a node of any level, row by row.
 
    xyz        [(chunk_quads + 1)^2][3] out: unmorphed positions [wu]; NULL: not wanted
-   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted
-   Errors     E_NULL (also when both are NULL); E_RANGE */
+   vertices   [(chunk_quads + 1)^2] out; NULL: not wanted */
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices);
 
-/* Fills the weights of a node's vertices, for all nodes the same. Errors: E_NULL; E_RANGE.
+/* Fills the weights of a node's vertices, for all nodes the same.
 
    weights    [(chunk_quads + 1)^2] out */
 TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
@@ -674,7 +661,6 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_weights(uint32_t chunk_quads,
    vertices   [(chunk_quads + 1)^2] of that node
    heights    out: the height of vertex k at heights[k * stride] [wu]
    stride     [Limits: >= 1] 3 to write into xyz + 1
-   Errors     E_NULL; E_RANGE
    Source     de Boer 2000, equations 3 and 4; Wagner 2003: five tweening factors, and
               tweeningA = (1 - tweeningL) * tweeningI beside a border. Here factors run the other
               way, 1 being the coarse shape, so that this product reads side_coarse * morph. */
@@ -699,7 +685,6 @@ typedef struct terrimp_rect {
    size             [2] out, width and height; rounded up
    scale            out, 1, or the factor by which the picture was reduced to keep to `largest`;
                     may be NULL
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equations 3.3 and 3.4 */
 TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture, float pixel_factor,
                                                  float texels_per_px, uint32_t smallest,
@@ -709,8 +694,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
    at its rim then stay inside the slot.
 
    capture    in and out
-   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin]
-   Errors     E_NULL; E_RANGE */
+   slot       [2] width and height of the whole slot, margins included [Limits: > 2 * margin] */
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
@@ -720,7 +704,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
-   Errors          E_NULL; E_RANGE when the slot is empty or leaves the atlas
+   Errors          E_RANGE when the slot is empty or leaves the atlas
    Source          Hess 2010, section 3.4, made projective: interpolating s and t themselves would
                    bend the picture inside large triangles */
 TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
@@ -728,14 +712,13 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. Errors: E_NULL. */
+   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
                                                        size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
    angle_rad    out, 0..pi
-   Errors       E_NULL; E_NOT_FINITE
    Source       Hess 2010, section 3.5: all corners, since an eye can approach the centre of a large
                 impostor without turning around it */
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
@@ -750,7 +733,7 @@ TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const floa
                   pass the vertical one: with meshes that stand proud the bound then held for every
                   sample that a capture saw, but at grazing angles (measured: up to 1.1 times it)
    error_px       out; +infinity when the eye is within `error` of the box and has moved
-   Errors         E_NULL; E_NOT_FINITE; E_RANGE when error < 0 or pixel_factor <= 0
+   Errors         E_RANGE when error < 0 or pixel_factor <= 0
    Source         own derivation, in the implementation; DESIGN: err * sin(theta) * K / d, with the
                   sine bounded over the whole box, not sampled at its corners */
 TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float error,
@@ -763,7 +746,6 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
    max_angle_rad    [Limits: 0..pi]; from pi/2 on the angle needs a path of `distance`
    speed            [wu/s] of the eye [Limits: > 0]
    seconds          out
-   Errors           E_NULL; E_NOT_FINITE; E_RANGE
    Source           Hess 2010, equation 3.6: t = D sin(alpha) / S */
 TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_angle_rad,
                                                      float speed, float *seconds);
@@ -788,9 +770,8 @@ typedef struct terrimp_split {
               [Limits: > 0]
    overlap    [wu] by which each part goes beyond the place of the split, since the mesh is not the
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also for an index beyond the vertices or a count not of
-              triangles
-   Cost       O(triangles^2): 0.1 to 0.4 ms for 85 triangles
+   Errors     E_RANGE, also for an index beyond the vertices or a count not of triangles
+   Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
                                                  uint32_t vertex_count, const uint16_t *indices,
@@ -827,7 +808,7 @@ typedef struct terrimp_shelves {
 } terrimp_shelves;
 
 /* Empties an atlas. The array stays the caller's and outlives the shelves.
-   Errors: E_NULL; E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
+   Errors: E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
 TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
                                                 uint32_t height, uint32_t padding,
                                                 terrimp_shelf *items, uint32_t capacity);
@@ -835,7 +816,7 @@ TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32
 /* First fit: puts a rectangle on the lowest shelf with room for it, or on a new shelf.
 
    rect       in: width and height [Limits: > 0]; out: x and y
-   Errors     E_NULL; E_RANGE; E_CAPACITY when it fits nowhere: nothing is changed
+   Errors     E_CAPACITY when it fits nowhere: nothing is changed
    Cost       O(shelves) */
 TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect);
 
@@ -844,8 +825,8 @@ TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terr
    items      [count] in and out; the order is kept
    order      [count] out: the order of insertion, from the tallest
    placed     out, how many were placed; may be NULL
-   Errors     E_NULL; E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all
-              fit: those that did are flagged PLACED
+   Errors     E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all fit:
+              those that did are flagged PLACED
    Cost       O(n^1.5 + n * shelves), no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
@@ -883,7 +864,7 @@ TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t 
               out: rectangles
    order      [count] scratch
    scale      out, factor by which all sides were reduced, 1 when they fitted; may be NULL
-   Errors     E_NULL; E_CAPACITY when even one texel each does not fit: slots are left unassigned */
+   Errors     E_CAPACITY when even one texel each does not fit: slots are left unassigned */
 TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
                                                terrimp_pack_item *items, uint32_t count,
                                                uint32_t *order, float *scale);
@@ -894,7 +875,7 @@ TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp
                                                uint32_t width, uint32_t height);
 
 /* Notes that the picture has been rendered into the slot of the newest atlas: it has moved.
-   Errors: E_NULL; E_STATE when the slot has no rectangle there. */
+   Errors: E_STATE when the slot has no rectangle there. */
 TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
                                              terrimp_pair_slot *slot);
 
@@ -936,26 +917,25 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 
    memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
    bytes      at least terrimp_live_atlas_bytes(desc)
-   Errors     E_NULL; E_RANGE; E_OVERFLOW; E_ALIGN; E_MEMORY
    Cost       O(max_slots) */
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes);
 
-/* Frees all slots and sets the failures to 0. Errors: E_NULL; E_STATE before init. */
+/* Frees all slots and sets the failures to 0. */
 TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas);
 
 /* Finds room for a rectangle and keeps it.
 
    slot       out: its handle, < max_slots, until it is freed
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it fits
-              nowhere or all slots are in use: counted as a failure, nothing else changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it fits nowhere or all slots are in
+              use: counted as a failure, nothing else changes
    Cost       O(free rectangles), which are about twice as many as slots */
 TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, uint32_t *slot);
 
 /* Frees a slot: what borders on it grows together with it.
-   Errors: E_NULL; E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
+   Errors: E_STATE before init, and for a slot that is not in use; E_RANGE for no handle.
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
@@ -969,7 +949,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
    width, height  the size wanted [Limits: 1..65536]
    size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
               its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
-   Errors     E_NULL; E_STATE before init; E_RANGE
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
@@ -983,14 +962,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
    victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
               only handles were wanting. Scratch: it changes on E_CAPACITY too
    count      out: how many
-   Errors     E_NULL; E_STATE before init; E_RANGE for an empty rectangle; E_CAPACITY when it is
-              larger than the atlas or every such place holds a slot that stays: nothing changes
+   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it is larger than the atlas or every
+              such place holds a slot that stays: nothing changes
    Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
 TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
                                                     uint32_t height, const float *costs,
                                                     uint32_t *victims, uint32_t *count);
 
-/* What the atlas holds. Errors: E_NULL; E_STATE before init. Cost: O(free rectangles). */
+/* What the atlas holds. Cost: O(free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
                                                     terrimp_live_atlas_stats *stats);
 
@@ -1044,8 +1023,7 @@ typedef struct terrimp_terrain_info {
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
 
-/* Writes the effective descriptor, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; those of terrimp_heightfield_resolve. */
+/* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
 
@@ -1056,7 +1034,7 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
    morph      nonzero: also the nodes beside them whose morph data has changed
    nodes      [capacity] out, rising; NULL: only counted
    count      out: how many there are, also when they are more than capacity
-   Errors     E_NULL; E_RANGE; E_STATE; E_CAPACITY: nodes is untouched
+   Errors     E_CAPACITY: nodes is untouched
    Cost       O(count) */
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, int morph,
@@ -1068,11 +1046,11 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
                                                     terrimp_terrain_info *info);
 
 /* The box of everything that is drawn of a node and of all nodes below it: samples, coarse meshes,
-   skirts. Errors: E_NULL; E_RANGE; E_STATE. */
+   skirts. */
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
                                                    terrimp_box *box);
 
-/* The place and the quality of a node's coarse mesh. Errors: E_NULL; E_RANGE; E_STATE. */
+/* The place and the quality of a node's coarse mesh. */
 typedef struct terrimp_mesh_info {
     uint32_t base_vertex, vertex_count; /* in the vertices of terrimp_terrain_fill_meshes */
     uint32_t first_index, index_count;  /* in its indices */
@@ -1087,8 +1065,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
    terrimp_terrain_fill_ground. Triangle list, counter-clockwise from above. First stand the
    patterns of terrimp_pattern_fill with TERRIMP_FORM_LIST, then the strips that captures draw.
 
-   indices    [ground_index_count] out
-   Errors     E_NULL; E_CAPACITY; E_STATE */
+   indices    [ground_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *terrain,
                                                         uint16_t *indices, size_t capacity);
 
@@ -1097,8 +1074,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
 
    node        of any level [Limits: < node_count]
    xyz         [ground_vertex_count][3] out
-   capacity    floats
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity    floats */
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity);
 
@@ -1106,8 +1082,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
    say the weights that terrimp_geomip_fill_weights gives for chunk_quads and TERRIMP_FORM_LIST.
 
    vertices   [ground_vertex_count] out
-   capacity   of vertices
-   Errors     E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacity   of vertices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
                                                       uint32_t node,
                                                       terrimp_geomip_vertex *vertices,
@@ -1119,8 +1094,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
    node        [Limits: <= node_count] node_count: the floor, behind all others
    xyz         [mesh_vertex_stride][3] out; for the floor what is left of mesh_vertex_count
    indices     [mesh_index_stride] out; the same
-   capacities  floats, indices
-   Errors      E_NULL; E_RANGE; E_CAPACITY; E_STATE */
+   capacities  floats, indices */
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                      float *xyz, size_t xyz_capacity,
                                                      uint16_t *indices, size_t index_capacity);
@@ -1129,8 +1103,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
    count from the base vertex of each mesh.
 
    xyz         [mesh_vertex_count][3] out
-   indices     [mesh_index_count] out
-   Errors      E_NULL; E_CAPACITY; E_STATE */
+   indices     [mesh_index_count] out */
 TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *terrain, float *xyz,
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity);
@@ -1171,7 +1144,7 @@ typedef struct terrimp_bake_info {
 
    block      [bytes] aligned to 8 bytes
    info       out; NULL: not wanted
-   Errors     E_NULL; E_ALIGN; E_BAKE; E_ORDER when it has to be converted first
+   Errors     E_BAKE; E_ORDER when it has to be converted first
    Cost       O(nodes), about 1 us for each */
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
                                               terrimp_bake_info *info);
@@ -1181,7 +1154,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
 
    block      [bytes] aligned to 8 bytes
    out        [capacity] aligned to 8 bytes; may be block, else apart from it
-   Errors     E_NULL; E_ALIGN; E_CAPACITY; E_BAKE: out, if it is not block, may have changed */
+   Errors     E_BAKE: out, if it is not block, may have changed */
 TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
                                                 size_t capacity);
 
@@ -1204,7 +1177,7 @@ TERRIMP_API size_t terrimp_terrain_open_bytes(void);
    memory         [memory_bytes] aligned to 8 bytes, at least terrimp_terrain_open_bytes
    terrain        out: lies in memory
    Errors         those of check and of terrimp_heightfield_resolve; E_BAKE for a field of another
-                  size, format, scale or offset; E_MEMORY
+                  size, format, scale or offset
    Cost           that of check */
 TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field,
                                                 const void *block, size_t bytes, void *memory,
@@ -1382,8 +1355,7 @@ typedef struct terrimp_stats {
                                     enough, then draw with these; z_near is 0 within a box */
 } terrimp_stats;
 
-/* Writes the effective settings for a terrain, defaults filled in. out may be desc.
-   Errors: E_NULL; E_RANGE; E_NOT_FINITE; E_STATE when the terrain is not built. */
+/* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out);
@@ -1396,17 +1368,16 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 
    terrain    built; outlives the view
    memory     [bytes] aligned to 8 bytes
-   view       out: lies in memory
-   Errors     those of terrimp_view_desc_resolve; E_MEMORY; E_ALIGN */
+   view       out: lies in memory */
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
-   Errors     E_NULL; those of terrimp_camera_resolve; E_CAPACITY when more than max_ground chunks
-              are in sight in mode FULL or IMPOSTOR: the frame before stays. In GEOMIP and AUTO
-              E_CAPACITY when even ground at 1000 px needs more nodes: there is no frame then
+   Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR: the
+              frame before stays. In GEOMIP and AUTO E_CAPACITY when even ground at 1000 px needs
+              more nodes: there is no frame then
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
@@ -1419,7 +1390,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
-/* Errors: E_NULL; E_STATE before the first update. */
+/* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when the light has changed or textures were lost. */
@@ -1428,8 +1399,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
    x, z       column and row of the first sample [Limits: inside the field]
-   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut
-   Errors     E_NULL; E_RANGE */
+   cols, rows size in samples [Limits: >= 1]; what reaches over the last column and row is cut */
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows);
 
@@ -1519,7 +1489,6 @@ typedef struct terrimp_mesh {
                samples than that many points is kept whole, sample by sample
    points      [capacity] out; capacity of inner_limit + 2 (or count) is always enough
    point_count out: points written
-   Errors      NULL, RANGE, NOT_FINITE, CAPACITY; outputs untouched
    Cost        O(count^2), no allocation; about 20 us for 65 samples, 3 KB of stack
    Source      Hess 2010, section 3.1, fig. 3.2 */
 TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_t count,
@@ -1537,8 +1506,7 @@ TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
 
    triangle_budget   0 -> TERRIMP_TRIANGLE_BUDGET [Limits: ..TERRIMP_MAX_TRIANGLES]
    vertex_capacity   out
-   index_capacity    out
-   Errors            NULL, RANGE; outputs untouched */
+   index_capacity    out */
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                                                  uint32_t *vertex_capacity,
                                                  uint32_t *index_capacity);
@@ -1553,9 +1521,8 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
    scratch        [scratch_bytes] aligned for int64_t; contents need not outlive the call
    scratch_bytes  at least terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget)
    mesh           in: arrays and capacities; out: everything else
-   Errors         NULL; RANGE (sizes, budget too small for the borders, border positions that do
-                  not rise from 0 to the end, corners that disagree); NOT_FINITE; MEMORY; ALIGN;
-                  CAPACITY; the mesh is untouched then
+   Errors         E_RANGE also for a budget that is too small for the borders, border positions that
+                  do not rise from 0 to the end, corners that disagree
    Cost           O(cols rows + budget^2); about 0.65 ms for 65 x 65 at the default budget
    Source         Hess 2010, section 3.1; the fit of heights after Lindstrom and Turk's idea that
                   a moved vertex beats a chosen one, here along y alone */
@@ -1573,7 +1540,7 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
    upper   0: the lower skirt
    height  [wu] of the lower skirt, its bottom, as a rule the node's least height; a border vertex
            that lies lower gets a wall of no height. Of the upper one, its rise [Limits: >= 0]
-   Errors  NULL; NOT_FINITE; RANGE; STATE when the mesh has no surface yet; CAPACITY; mesh untouched
+   Errors  E_STATE when the mesh has no surface yet
    Source  Hess 2010, section 4.2 */
 TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
 
@@ -1596,7 +1563,7 @@ typedef struct terrimp_raise_desc {
    desc    how far
    mesh    in: a mesh of that tile without skirts; out: its heights
    work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
-   Errors  NULL; RANGE; NOT_FINITE; STATE when the mesh has no surface or has skirts; mesh untouched
+   Errors  E_STATE when the mesh has no surface or has skirts
    Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
    Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
 TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
@@ -1621,9 +1588,8 @@ TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, 
    scratch         aligned for float; NULL is E_NULL even if there is no void
    scratch_bytes   at least terrimp_heightfield_fill_voids_scratch_bytes(width, depth)
    filled_count    receives the number of filled samples, 0 without has_no_data; NULL: not wanted
-   Errors          those of resolve; E_NULL; E_RANGE  samples is not field->samples;
-                   E_ALIGN  scratch; E_MEMORY  scratch_bytes; E_VOID  no sample is valid;
-                   E_NOT_FINITE  a height is NaN or infinite. No sample changes on errors.
+   Errors          E_RANGE also when samples is not field->samples; E_VOID when no sample is valid;
+                   E_NOT_FINITE for such a height. No sample changes then
    Cost            O(width * depth); some 0.35 s for 3601 x 3601 samples of which half are void
    Source          Bornemann and Deuflhard 1996, The cascadic multigrid method: from coarse to fine,
                    with more relaxation the coarser the grid */
@@ -1638,15 +1604,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
    built at the same time by threads with scratch arrays of their own.
 
    scratch    [field.width + 2 * chunk_quads + 2]
-   Errors     E_NULL; E_RANGE; and at level 0 E_VOID, E_NOT_FINITE for such a sample
+   Errors     at level 0 E_VOID, E_NOT_FINITE for such a sample
    Cost       O(samples of the node) */
 TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                      float *scratch);
 
-/* Ends the building: parents hold what their children hold. Errors: E_NULL. */
+/* Ends the building: parents hold what their children hold. */
 TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
 
-/* Builds all nodes and finishes. Errors: those of build_node.
+/* Builds all nodes and finishes.
    Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
@@ -1660,8 +1626,7 @@ TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *des
 /* Lays a terrain out in the caller's block. No sample is read, nothing is built yet.
 
    memory     [bytes] aligned to 8 bytes; freed by the caller when the terrain is no longer used
-   terrain    out: lies in memory
-   Errors     those of terrimp_terrain_desc_resolve; E_MEMORY; E_ALIGN; E_OVERFLOW */
+   terrain    out: lies in memory */
 TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc, void *memory,
                                                 size_t bytes, terrimp_terrain **terrain);
 
@@ -1669,8 +1634,8 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
    can be built in any order and still meet. Looks at every sample, unless the descriptor names the
    range. To be called once, before any node is built.
 
-   Errors     E_NULL; E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or
-              the sum of its squares over all samples
+   Errors     E_VOID, E_NOT_FINITE for such a sample; E_RANGE when the range overflows, or the sum
+              of its squares over all samples
    Cost       O(width * depth), about 1.5 ns a sample; O(1) when the range is named */
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain);
 
@@ -1680,16 +1645,16 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 
    node       [Limits: < node_count]
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_RANGE, also for a sample outside of the named range; E_MEMORY; E_ALIGN;
-              E_STATE before build_begin; E_VOID, E_NOT_FINITE for such a sample
+   Errors     E_RANGE, also for a sample outside of the named range; E_VOID, E_NOT_FINITE for such a
+              sample
    Cost       1.4 ms for 64 x 64 quads at level 0; at every level that, and the visits to all of the
               node's samples, 25 ns for each
    Source     Hess 2010, section 6.5, asks for meshes of several chunks */
 TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, uint32_t node,
                                                       void *scratch, size_t bytes);
 
-/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_NULL;
-   E_STATE when a node has not been built. */
+/* Ends the building: boxes and errors of parents hold those of their children. Errors: E_STATE when
+   a node has not been built. */
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain);
 
 /* Begins, builds all nodes, one after the other, and finishes. Errors: those of the three above. */
@@ -1705,9 +1670,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
    samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
               it begins inside the field]; what reaches over the last column and row is cut
    scratch    [bytes] at least terrimp_terrain_scratch_bytes
-   Errors     E_NULL; E_MEMORY; E_ALIGN; E_RANGE for a rectangle outside of the limits or a height
-              outside of the range; E_VOID, E_NOT_FINITE for such a sample; E_STATE before
-              build_finish and for a terrain that uses a bake. Nothing has changed then
+   Errors     E_RANGE for a rectangle outside of the limits or a height outside of the range;
+              E_VOID, E_NOT_FINITE for such a sample; E_STATE before build_finish and for a terrain
+              that uses a bake. Nothing has changed then
    Cost       that of build_node for each such node: the root has every sample. A host that cannot
               wait calls build_node itself, a few nodes a frame, from the finest level up */
 TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
@@ -1735,7 +1700,6 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
-   Errors     E_NULL; E_STATE before build_finish; E_OVERFLOW; E_CAPACITY; E_ALIGN
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
@@ -3939,6 +3903,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
 /* Based on: Hess 2010, sections 3.3 to 3.5 and 6.2. */
 
 #define TERRIMPI_SPLITS 24u /* places of a split that are tried */
+#define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
 #define TERRIMPI_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
@@ -4160,74 +4125,79 @@ TERRIMP_API terrimp_result terrimp_impostor_lifetime(float distance, float max_a
     return TERRIMP_OK;
 }
 
-/* Where the way `to` from the origin passes through a triangle: the fraction of the way, or 1 when
-   it does not. */
-static float terrimpi_hidden_at(const float to[3], const float a[3], const float b[3],
-                                const float c[3])
-{
-    float ab[3], ac[3], p[3], q[3], det, u, v, t;
-    terrimpi_sub(b, a, ab);
-    terrimpi_sub(c, a, ac);
-    terrimpi_cross(to, ac, p);
-    det = terrimpi_dot(ab, p);
-    if (!(terrimpi_abs(det) > 0.0f))
-        return 1.0f;
-    u = -terrimpi_dot(a, p) / det;
-    if (!(u >= 0.0f && u <= 1.0f))
-        return 1.0f;
-    terrimpi_cross(a, ab, q); /* of the origin minus a, and ab, with the sign turned */
-    v = -terrimpi_dot(to, q) / det;
-    if (!(v >= 0.0f && u + v <= 1.0f))
-        return 1.0f;
-    t = -terrimpi_dot(ac, q) / det;
-    return t > 0.0f && t < 1.0f ? t : 1.0f;
-}
+/* A mesh as the eye of a capture sees it: for each of a few cells of the picture the closest
+   triangle that faces the eye, and 1 / depth there. A point is (across, up, 1 / depth), the first
+   two in cells: planes stay planes, and an eye that moves by r moves a point by r / depth. */
+typedef struct terrimpi_split_map {
+    const terrimp_capture *capture;
+    const float *xyz;
+    const uint16_t *indices;
+    float low[2], cells[2]; /* first edge of the cells; cells for one unit at depth 1 */
+    float closest[TERRIMPI_SPLIT_CELLS][TERRIMPI_SPLIT_CELLS]; /* 0: there is none */
+    uint16_t own[TERRIMPI_SPLIT_CELLS][TERRIMPI_SPLIT_CELLS];  /* first index of its triangle */
+} terrimpi_split_map;
 
-/* The fraction of the way from an eye to a point of triangle `own` at which another triangle first
-   hides it, or 1. */
-static float terrimpi_first_hit(const float eye[3], const float point[3], const float *xyz,
-                                const uint16_t *indices, uint32_t index_count, uint32_t own)
-{
-    float first = 1.0f, to[3], corner[3][3];
-    const uint16_t *t;
-    int k;
-    terrimpi_sub(point, eye, to);
-    for (t = indices; t < indices + index_count; t += 3) {
-        if (t == indices + own)
-            continue;
-        for (k = 0; k < 3; k++)
-            terrimpi_sub(xyz + t[k] * 3u, eye, corner[k]);
-        first = terrimpi_min(first, terrimpi_hidden_at(to, corner[0], corner[1], corner[2]));
-    }
-    return first;
-}
-
-/* How far a vertex lies in front of the eye of a capture. */
-static float terrimpi_depth(const terrimp_capture *capture, const float xyz[3])
+static void terrimpi_split_point(const terrimpi_split_map *m, const float xyz[3], float p[3])
 {
     float to[3];
-    terrimpi_sub(xyz, capture->eye, to);
-    return terrimpi_dot(to, capture->forward);
+    terrimpi_sub(xyz, m->capture->eye, to);
+    p[2] = 1.0f / terrimpi_max(terrimpi_dot(to, m->capture->forward), 1e-20f);
+    p[0] = (terrimpi_dot(to, m->capture->right) * p[2] - m->low[0]) * m->cells[0];
+    p[1] = (terrimpi_dot(to, m->capture->up) * p[2] - m->low[1]) * m->cells[1];
 }
 
-/* The middle of a triangle, and how large an eye sees it: 0 from behind. The solid angle, but for a
-   factor that all triangles share. */
-static float terrimpi_triangle_seen(const float eye[3], const float *xyz, const uint16_t *corners,
-                                    float middle[3])
+static void terrimpi_split_corners(const terrimpi_split_map *m, uint32_t first, float p[3][3])
 {
-    float ab[3], ac[3], to[3], normal[3], distance, facing;
-    int i;
-    for (i = 0; i < 3; i++) {
-        const float a = xyz[corners[0] * 3u + (uint32_t)i];
-        ab[i] = xyz[corners[1] * 3u + (uint32_t)i] - a;
-        ac[i] = xyz[corners[2] * 3u + (uint32_t)i] - a;
-        middle[i] = a + (ab[i] + ac[i]) * (1.0f / 3.0f);
-        to[i] = middle[i] - eye[i];
-    }
-    terrimpi_cross(ab, ac, normal);
-    distance = terrimpi_length(to);
-    facing = -terrimpi_dot(normal, to);
-    return facing > 0.0f && distance > 0.0f ? facing / (distance * distance * distance) : 0.0f;
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        terrimpi_split_point(m, m->xyz + m->indices[first + i] * 3u, p[i]);
+}
+
+/* Twice the area of a triangle of the picture, less than 0 when it is seen from behind, for an eye
+   that has moved by so many cells at depth 1. */
+static float terrimpi_split_area(float p[3][3], float move_x, float move_y)
+{
+    float w1 = p[1][2] - p[0][2], w2 = p[2][2] - p[0][2];
+    return (p[1][0] - p[0][0] - move_x * w1) * (p[2][1] - p[0][1] - move_y * w2) -
+           (p[2][0] - p[0][0] - move_x * w2) * (p[1][1] - p[0][1] - move_y * w1);
+}
+
+/* 1 / depth of a triangle's plane at a place of the picture; sets *inside to less than 0 where that
+   is not in the triangle. `area` is that of the triangle. */
+static float terrimpi_split_plane(float p[3][3], float area, float x, float y, float *inside)
+{
+    float a = (p[1][0] - x) * (p[2][1] - y) - (p[2][0] - x) * (p[1][1] - y);
+    float b = (p[2][0] - x) * (p[0][1] - y) - (p[0][0] - x) * (p[2][1] - y);
+    *inside = terrimpi_min(terrimpi_min(a, b), area - a - b);
+    return p[2][2] + (a * (p[0][2] - p[2][2]) + b * (p[1][2] - p[2][2])) / area;
+}
+
+/* The cells whose middles lie within low..high. */
+static void terrimpi_split_range(float a, float b, float c, int *low, int *high)
+{
+    const float last = (float)TERRIMPI_SPLIT_CELLS;
+    *low = (int)terrimpi_clamp(terrimpi_min(a, terrimpi_min(b, c)) + 0.5f, 0.0f, last);
+    *high = (int)terrimpi_clamp(terrimpi_max(a, terrimpi_max(b, c)) + 0.5f, 0.0f, last);
+}
+
+/* Enters a triangle into the cells that it is the closest in. */
+static void terrimpi_split_draw(terrimpi_split_map *m, uint32_t first, float p[3][3])
+{
+    float area = terrimpi_split_area(p, 0.0f, 0.0f);
+    int x, y, x0, x1, y0, y1;
+    if (!(area > 0.0f))
+        return;
+    terrimpi_split_range(p[0][0], p[1][0], p[2][0], &x0, &x1);
+    terrimpi_split_range(p[0][1], p[1][1], p[2][1], &y0, &y1);
+    for (y = y0; y < y1; y++)
+        for (x = x0; x < x1; x++) {
+            float inside, w;
+            w = terrimpi_split_plane(p, area, (float)x + 0.5f, (float)y + 0.5f, &inside);
+            if (inside >= 0.0f && w > m->closest[y][x]) {
+                m->closest[y][x] = w;
+                m->own[y][x] = (uint16_t)first;
+            }
+        }
 }
 
 /* Sums over a mesh as the moved eyes see it. */
@@ -4237,28 +4207,60 @@ typedef struct terrimpi_smear {
     float saved[TERRIMPI_SPLITS]; /* ... and that a split would spare */
 } terrimpi_smear;
 
-/* Adds the triangle whose indices begin at `own`. Places of a split: first + (k + 1) * step. */
-static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
-                               const uint16_t *indices, uint32_t index_count, uint32_t own,
-                               float reach, float overlap, float first, float step,
-                               terrimpi_smear *smear)
+/* Whether a point that is hidden at cell (x, y) still is after the eye has moved towards larger x
+   (or y, or smaller x), by `move` cells at depth 1. What hides it stretches up to a crest, some
+   cells in that direction, and moves by more than the point does. */
+static int terrimpi_split_still(const terrimpi_split_map *m, int x, int y, int step_x, int step_y,
+                                float move, float w)
 {
-    float middle[3], eye[3], size, hit = -1.0f, depth = 0.0f, weight;
-    uint32_t i, k, way;
-    for (way = 0; way < 3u; way++) {
-        const float *axis = way == 0 ? capture->up : capture->right;
-        for (i = 0; i < 3u; i++)
-            eye[i] = capture->eye[i] + axis[i] * (way == 2u ? -reach : reach);
-        size = terrimpi_triangle_seen(eye, xyz, indices + own, middle);
-        smear->seen += size;
-        if (!(size > 0.0f) || hit > TERRIMPI_IN_SIGHT)
+    float away = 0.5f;
+    while (x >= 0 && x < TERRIMPI_SPLIT_CELLS && y < TERRIMPI_SPLIT_CELLS &&
+           m->closest[y][x] * TERRIMPI_IN_SIGHT > w) {
+        if (away >= move * (m->closest[y][x] - w))
+            return 1;
+        away += 1.0f;
+        x += step_x;
+        y += step_y;
+    }
+    return 0;
+}
+
+/* The part of the way to a point of cell (x, y) after which something hides it, or 1. */
+static float terrimpi_split_hit(const terrimpi_split_map *m, int x, int y, const float point[3])
+{
+    float p[3][3], inside, w;
+    if (!(m->closest[y][x] * TERRIMPI_IN_SIGHT > point[2]))
+        return 1.0f;
+    terrimpi_split_corners(m, m->own[y][x], p);
+    w = terrimpi_split_plane(p, terrimpi_split_area(p, 0.0f, 0.0f), point[0], point[1], &inside);
+    return w > point[2] ? point[2] / w : 1.0f;
+}
+
+/* Adds a triangle, for eyes that have moved up, right and left. Places of a split: first + (k + 1)
+   * step. */
+static void terrimpi_split_add(const terrimpi_split_map *m, float p[3][3], float reach,
+                               float overlap, float first, float step, terrimpi_smear *smear)
+{
+    static const int ways[3][2] = { { 0, 1 }, { 1, 0 }, { -1, 0 } };
+    const float last = (float)(TERRIMPI_SPLIT_CELLS - 1);
+    float middle[3], hit, depth;
+    int x, y, way;
+    uint32_t k;
+    for (k = 0; k < 3u; k++)
+        middle[k] = (p[0][k] + p[1][k] + p[2][k]) * (1.0f / 3.0f);
+    x = (int)terrimpi_clamp(middle[0], 0.0f, last);
+    y = (int)terrimpi_clamp(middle[1], 0.0f, last);
+    hit = terrimpi_split_hit(m, x, y, middle);
+    depth = 1.0f / middle[2];
+    for (way = 0; way < 3; way++) {
+        int up = ways[way][1];
+        float size = terrimpi_split_area(p, (float)ways[way][0] * reach * m->cells[0],
+                                         (float)up * reach * m->cells[1]), weight;
+        if (!(size > 0.0f))
             continue;
-        if (hit < 0.0f) {
-            hit = terrimpi_first_hit(capture->eye, middle, xyz, indices, index_count, own);
-            depth = terrimpi_depth(capture, middle);
-        }
+        smear->seen += size;
         if (hit > TERRIMPI_IN_SIGHT ||
-            terrimpi_first_hit(eye, middle, xyz, indices, index_count, own) < TERRIMPI_IN_SIGHT)
+            terrimpi_split_still(m, x, y, ways[way][0], up, reach * m->cells[up], middle[2]))
             continue;
         weight = size * (1.0f - hit) * (1.0f - hit);
         smear->all += weight;
@@ -4270,25 +4272,55 @@ static void terrimpi_add_smear(const terrimp_capture *capture, const float *xyz,
     }
 }
 
+/* Sets the cells over all vertices; they lie between the depths 1 / *w_most and 1 / *w_least. */
+static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, float *w_least,
+                               float *w_most)
+{
+    float low[3], high[3], p[3];
+    uint32_t i, k;
+    memset(m->closest, 0, sizeof m->closest);
+    m->low[0] = m->low[1] = 0.0f;
+    m->cells[0] = m->cells[1] = 1.0f;
+    for (i = 0; i < vertex_count; i++) {
+        terrimpi_split_point(m, m->xyz + i * 3u, p);
+        for (k = 0; k < 3u; k++) {
+            low[k] = i == 0 ? p[k] : terrimpi_min(low[k], p[k]);
+            high[k] = i == 0 ? p[k] : terrimpi_max(high[k], p[k]);
+        }
+    }
+    for (k = 0; k < 2u; k++) {
+        m->low[k] = low[k];
+        m->cells[k] = (float)TERRIMPI_SPLIT_CELLS / terrimpi_max(high[k] - low[k], 1e-20f);
+    }
+    *w_least = low[2];
+    *w_most = high[2];
+}
+
 /* terrimp_capture_split of checked arguments. */
 static void terrimpi_capture_split(const terrimp_capture *capture, const float *xyz,
                                    uint32_t vertex_count, const uint16_t *indices,
                                    uint32_t index_count, float reach, float overlap,
                                    terrimp_split *split)
 {
-    float first = TERRIMPI_FLOAT_MAX, last = 0.0f, step;
+    float first, step, w_least, w_most, p[3][3];
     uint32_t i, k, best = 0;
+    terrimpi_split_map map;
     terrimpi_smear smear;
-    for (i = 0; i < vertex_count; i++) {
-        float depth = terrimpi_depth(capture, xyz + i * 3u);
-        first = terrimpi_min(first, depth);
-        last = terrimpi_max(last, depth);
+    map.capture = capture;
+    map.xyz = xyz;
+    map.indices = indices;
+    terrimpi_split_aim(&map, vertex_count, &w_least, &w_most);
+    first = 1.0f / w_most;
+    step = (1.0f / w_least - first) / (float)(TERRIMPI_SPLITS + 1u);
+    for (i = 0; i < index_count; i += 3u) {
+        terrimpi_split_corners(&map, i, p);
+        terrimpi_split_draw(&map, i, p);
     }
-    step = (last - first) / (float)(TERRIMPI_SPLITS + 1u);
     memset(&smear, 0, sizeof smear);
-    for (i = 0; i < index_count; i += 3u)
-        terrimpi_add_smear(capture, xyz, indices, index_count, i, reach, overlap, first, step,
-                           &smear);
+    for (i = 0; i < index_count; i += 3u) {
+        terrimpi_split_corners(&map, i, p);
+        terrimpi_split_add(&map, p, reach, overlap, first, step, &smear);
+    }
     for (k = 1; k < TERRIMPI_SPLITS; k++)
         if (smear.saved[k] > smear.saved[best])
             best = k;
@@ -6184,6 +6216,8 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 #endif
 #define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
 #define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
+#define TERRIMPI_SPLIT_OVERLAP 0.6f /* ... unless the parts overlap in so much of their depth: then
+                                       19 of 20 splits would spare too little (seven flights) */
 
 /* A slot of an atlas. */
 typedef struct terrimpi_seat {
@@ -7235,13 +7269,14 @@ static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const t
     uint32_t node = want->site.number;
     const terrimpi_mesh *mesh = &v->terrain->meshes[node];
     float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
+    float overlap = terrimpi_depth_error(v, node, capture, box);
     terrimp_split split;
     if (TERRIMPI_PARTS == 1u || v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
-        !(sine * want->closest > 0.0f))
+        !(sine * want->closest > 0.0f) ||
+        2.0f * overlap > TERRIMPI_SPLIT_OVERLAP * (capture->z_far - capture->z_near))
         return 0;
     terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
-                           3u * mesh->triangle_count, sine * want->closest,
-                           terrimpi_depth_error(v, node, capture, box), &split);
+                           3u * mesh->triangle_count, sine * want->closest, overlap, &split);
     *distance = split.distance;
     return split.gap * sine * v->pixel_factor >
                TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
@@ -9560,20 +9595,20 @@ static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
     return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
 }
 
-/* Passes one sample to the n corners round it, which have the weights w in it. Raising: each has to
-   rise by `wanted`. Lowering: each may lose its share of the surface's height over the sample. */
-static void terrimpi_rise_sample(const float *w, float *const *change, int n, float wanted,
-                                 float over, int lowering)
+/* A vertex of weight w in a sample rises by what that wants. */
+static void terrimpi_rise(float w, float wanted, float *change)
 {
-    int k;
-    for (k = 0; k < n; k++) {
-        if (!(w[k] > 1e-6f))
-            continue;
-        if (lowering)
-            *change[k] = terrimpi_min(*change[k], terrimpi_max(0.0f, over) / ((float)n * w[k]));
-        else
-            *change[k] = terrimpi_max(*change[k], wanted);
-    }
+    if (w > 1e-6f)
+        *change = terrimpi_max(*change, wanted);
+}
+
+/* A vertex of weight w in a sample, one of n round it, may lose its share of the surface's height
+   over the sample. That this is no less than it may lose by others, a product mostly tells without
+   a division. */
+static void terrimpi_lower(float w, float n, float over, float *change)
+{
+    if (w > 1e-6f && over < *change * (n * w) * 1.00001f)
+        *change = terrimpi_min(*change, over / (n * w));
 }
 
 static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
@@ -9598,13 +9633,18 @@ static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_
     is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
     for (k = 0; k <= count; k++, samples += stride) {
         float surface, wanted;
+        int i;
         w[1] = (float)k / (float)count;
         w[0] = 1.0f - w[1];
         surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
         wanted = terrimpi_wanted_raise(*samples - surface,
                                        *samples - (w[0] * p->height + w[1] * q->height),
                                        w[0] * is_free[0] + w[1] * is_free[1]);
-        terrimpi_rise_sample(w, to, 2, wanted, surface - *samples, lowering);
+        for (i = 0; i < 2; i++)
+            if (lowering)
+                terrimpi_lower(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
+            else
+                terrimpi_rise(w[i], wanted, to[i]);
     }
 }
 
@@ -9652,10 +9692,11 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
 {
     terrimp_mesh_vertex v[3];
     terrimpi_span span;
-    float slope_x[3], slope_z[3], gx, gz, *to[3];
+    float slope_x[3], slope_z[3], gx, gz, to[3];
+    float limit; /* from which on a sample takes nothing away, as no weight is above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
-        to[k] = change + t[k];
+        to[k] = change[t[k]];
         v[k] = mesh->vertices[t[k]];
         v[k].height = 0.0f;
     }
@@ -9668,19 +9709,32 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
     terrimpi_find_span(v, &span);
     terrimpi_find_plane(v, &gx, &gz);
+    limit = 3.001f * terrimpi_largest(to);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
-            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f;
-            float short_by = heights[z * cols + x] - (v[0].height + dx * gx + dz * gz), raised;
-            for (k = 0; k < 3; k++) {
+            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
+            float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
+            if (lowering && over >= limit)
+                continue;
+            for (k = 0; k < 3; k++)
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
-                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            if (lowering) {
+                over = terrimpi_max(over, 0.0f);
+                terrimpi_lower(w[0], 3.0f, over, &to[0]);
+                terrimpi_lower(w[1], 3.0f, over, &to[1]);
+                terrimpi_lower(w[2], 3.0f, over, &to[2]);
+                limit = 3.001f * terrimpi_largest(to);
+                continue;
             }
-            raised = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            terrimpi_rise_sample(w, to, 3,
-                                 terrimpi_wanted_raise(short_by, short_by + raised, hold),
-                                 -short_by, lowering);
+            for (k = 0; k < 3; k++)
+                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
+            wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
+            wanted = terrimpi_wanted_raise(-over, wanted - over, hold);
+            for (k = 0; k < 3; k++)
+                terrimpi_rise(w[k], wanted, &to[k]);
         }
+    for (k = 0; k < 3; k++)
+        change[t[k]] = to[k];
 }
 
 static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,

@@ -3,7 +3,7 @@
    that a render thread needs: here frame n + 1 is decided and recorded while frame n is drawn.
    Build:  make cpp_host
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
-           cpp_host.png. Exit code 1 when one has holes or is too far from the full mesh. */
+           build/cpp_host.png. Exit code 1 when one has holes or is too far from the full mesh. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 extern "C" {
@@ -343,7 +343,7 @@ struct Scene : scene {
     Scene &operator=(const Scene &) = delete;
 };
 
-bool fly()
+bool fly(const char *program)
 {
     Scene shown;
     const Terrain terrain = make_terrain(shown.desc);
@@ -362,17 +362,18 @@ bool fly()
         }
         frame = next.get();
     }
-    check(image_write_png("cpp_host.png", rgb.data(), width, height));
+    check(image_write_beside(program, "cpp_host.png", rgb.data(), width, height));
     check(glGetError() == GL_NO_ERROR ? nullptr : "OpenGL reports an error");
     return scene_accepts(&shown, 37.0);
 }
 
 } // namespace
 
-int main()
+int main(int argc, char **argv)
 {
+    (void)argc;
     try {
-        return fly() ? 0 : 1;
+        return fly(argv[0]) ? 0 : 1;
     } catch (const std::exception &trouble) {
         std::fprintf(stderr, "cpp_host: %s\n", trouble.what());
         return 2;

@@ -11,7 +11,8 @@
      captures are cleared to the mean colour of ground instead of black, for the filter to mix in.
    Build:  make fixed_function
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
-           fixed_function.png. Exit code 1 when one has holes or is too far from the full mesh. */
+           build/fixed_function.png. Exit code 1 when one has holes or is too far from the full
+           mesh. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/context.h"
@@ -301,7 +302,7 @@ static int draw_frame(host *h, terrimp_view *view, int i, const context *frame, 
     return 1;
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     static host h;
     static context frame;
@@ -312,6 +313,7 @@ int main(void)
     const char *trouble = context_open_old(&frame, WIDTH, HEIGHT);
     int i, ok = 1;
 
+    (void)argc;
     if (trouble)
         return fprintf(stderr, "%s\n", trouble), 2;
     settings.texels_per_px = 1.5f;
@@ -336,7 +338,7 @@ int main(void)
     if (h.slots_too_large)
         printf("%d captures were larger than the frame buffer\n", h.slots_too_large);
     ok = ok && scene_accepts(&s, 37.0) && !h.slots_too_large && glGetError() == GL_NO_ERROR
-         && !image_write_png("fixed_function.png", ours, WIDTH, HEIGHT);
+         && !image_write_beside(argv[0], "fixed_function.png", ours, WIDTH, HEIGHT);
     terrimp_view_destroy(full_view), terrimp_view_destroy(view), terrimp_terrain_destroy(terrain);
     free(h.indices), free(h.mesh_indices), free(h.mesh_xyz), scene_close(&s);
     context_close(&frame);

@@ -44,7 +44,9 @@ typedef struct flyover {
     gl_terrain gl;
     contender chosen, full;       /* full takes part with --compare only */
     FILE *table;
-    stats psnr, psnr_terrain;     /* of each compared frame [dB] */
+    stats psnr, psnr_terrain;     /* of each compared frame that shows terrain [dB] */
+    size_t empty;                 /* frames with nothing but sky */
+    int shows_terrain;            /* the newest does not */
     double captures, captured_texels, captured_triangles, triangles, draws;
     double texels_used;
     float worst_parallax_px;
@@ -89,6 +91,7 @@ static void load_samples(flyover *f)
     desc.size = o->terrain_size;
     desc.seed = o->seed;
     memcpy(desc.spacing, o->spacing, sizeof desc.spacing);
+    memcpy(desc.origin, o->origin, sizeof desc.origin);
     desc.height_scale = o->height_scale;
     desc.path = o->path;
     desc.frames = o->frames;
@@ -99,8 +102,13 @@ static void load_samples(flyover *f)
     desc.height = o->height;
     if (!tour_load(&f->tour, &desc))
         stop(f->tour.error);
+    options_print_ignored(o, f->tour.dem.is_raw, stderr);
+    if (f->tour.dem.remark)
+        fprintf(stderr, "flyover: %s: %s\n", o->dem, f->tour.dem.remark);
     if (o->dem)
-        printf("voids_filled %zu\n", f->tour.voids_filled);
+        printf("voids_filled %zu\nspacing %g,%g\nheight_scale %g\n", f->tour.voids_filled,
+               (double)f->tour.field.spacing_x, (double)f->tour.field.spacing_z,
+               (double)(f->tour.field.height_scale > 0.0f ? f->tour.field.height_scale : 1.0f));
 }
 
 static void build_terrain(flyover *f)
@@ -243,6 +251,10 @@ static void compare(flyover *f, size_t frame)
 {
     size_t pixels = (size_t)f->options.width * f->options.height;
     const uint8_t *a = f->chosen.picture, *b = f->full.picture;
+    f->shows_terrain = image_not_sky(a, pixels, f->options.sky)
+                       || image_not_sky(b, pixels, f->options.sky);
+    if (!f->shows_terrain)
+        return;
     stats_add(&f->psnr, image_psnr(image_mean_square(a, b, pixels, NULL)));
     stats_add(&f->psnr_terrain, image_psnr(image_mean_square(a, b, pixels, f->options.sky)));
     if (f->options.out && options_saves(&f->options, (uint32_t)frame)) {
@@ -270,6 +282,7 @@ static void open_table(flyover *f)
 static void note_frame(flyover *f, size_t frame, double ms, double full_ms)
 {
     const terrimp_stats *s = &f->chosen.now;
+    f->empty += !f->shows_terrain;
     f->captures += s->captures;
     f->captured_texels += s->captured_texels;
     f->captured_triangles += s->captured_triangles;
@@ -285,9 +298,11 @@ static void note_frame(flyover *f, size_t frame, double ms, double full_ms)
     fprintf(f->table, "\t%u\t%u\t%u\t%u\t%.3f\t%.3f\t%.1f", s->ground, s->impostors, s->waiting,
             s->captures_due, (double)s->shortfall, (double)s->worst_parallax_px,
             (double)s->reuse);
-    if (f->options.compare)
+    if (f->options.compare && f->shows_terrain)
         fprintf(f->table, "\t%.3f\t%.2f\t%.2f", full_ms, f->psnr.values[f->psnr.count - 1],
                 f->psnr_terrain.values[f->psnr_terrain.count - 1]);
+    else if (f->options.compare)
+        fprintf(f->table, "\t%.3f\tnan\tnan", full_ms);
     fprintf(f->table, "\n");
 }
 
@@ -312,13 +327,18 @@ static void print_summary(const flyover *f)
            (double)f->chosen.now.reuse, f->texels_used / frames, f->chosen.now.atlas_failures,
            f->chosen.now.evictions);
     printf("worst_parallax_px %.3f\n", (double)f->worst_parallax_px);
+    if (f->empty)
+        printf("frames_without_terrain %zu\n", f->empty);
     if (f->options.compare) {
         stats_summary full = stats_summarise(&f->full.ms);
         stats_summary psnr = stats_summarise(&f->psnr);
         stats_summary terrain = stats_summarise(&f->psnr_terrain);
         stats_print(stdout, "full_ms", full);
-        printf("psnr_mean %.2f\npsnr_worst %.2f\n", psnr.mean, psnr.least);
-        printf("psnr_terrain_mean %.2f\npsnr_terrain_worst %.2f\n", terrain.mean, terrain.least);
+        if (f->psnr.count) {
+            printf("psnr_mean %.2f\npsnr_worst %.2f\n", psnr.mean, psnr.least);
+            printf("psnr_terrain_mean %.2f\n", terrain.mean);
+            printf("psnr_terrain_worst %.2f\n", terrain.least);
+        }
         printf("speed_up %.2f\n", full.median / summary.median);
     }
 }
@@ -331,6 +351,7 @@ static void fly(flyover *f)
     for (frame = 0; frame < f->tour.flight.count; frame++) {
         terrimp_camera camera = tour_camera(&f->tour, &f->info.box, frame);
         double ms = run_contender(f, &f->chosen, &camera, frame), full_ms = 0.0;
+        f->shows_terrain = f->chosen.now.triangles > 0;
         if (f->options.compare) {
             full_ms = run_contender(f, &f->full, &camera, frame);
             compare(f, frame);
@@ -382,6 +403,8 @@ int main(int argc, char **argv)
     open_table(&f);
     fly(&f);
     print_summary(&f);
+    if (f.empty == f.tour.flight.count)
+        fprintf(stderr, "flyover: the terrain is in sight in no frame\n");
     close_all(&f);
     return 0;
 }

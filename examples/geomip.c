@@ -2,7 +2,7 @@
    selected for each frame, drawn with one index buffer that never changes.
    Build:  make geomip
    Expect: 8 frames of some 35 draws and 18,000 triangles, of the terrain's 524,288; the last
-           one in geomip.png, outlined in a colour for each level. */
+           one in build/geomip.png, outlined in a colour for each level. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/context.h"
@@ -85,7 +85,7 @@ static void draw_nodes(const terrimp_quadtree *tree, const terrimp_geomip_view *
     }
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     terrimp_heightfield field = {0};
     terrimp_quadtree tree;
@@ -97,6 +97,7 @@ int main(void)
     gl_program program;
     int i, saved;
 
+    (void)argc;
     field.samples = samples, field.width = field.depth = SIDE;
     field.format = TERRIMP_FORMAT_U16, field.height_scale = 0.25f * PROCEDURAL_HEIGHT_SCALE;
     if (!samples || terrimp_quadtree_init(&field, QUADS, &tree) != TERRIMP_OK ||
@@ -143,7 +144,7 @@ int main(void)
     glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
     draw_nodes(&tree, &view, program.tint, 0.6f);
     context_read(&frame, picture);
-    saved = image_write_png("geomip.png", picture, WIDTH, HEIGHT) == NULL;
+    saved = image_write_beside(argv[0], "geomip.png", picture, WIDTH, HEIGHT) == NULL;
     context_close(&frame); /* its buffers and textures go with it */
     free(lightmap), free(samples);
     return !saved;

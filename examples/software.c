@@ -3,7 +3,7 @@
    and the four callbacks; the lines after them make the terrain and check the pictures.
    Build:  make software
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
-           software.png. Exit code 1 when one has holes or is too far from the full mesh. */
+           build/software.png. Exit code 1 when one has holes or is too far from the full mesh. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/image.h"
@@ -167,7 +167,7 @@ static int draw_frame(host *h, terrimp_view *view, int frame, uint8_t *rgb)
     return 1;
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     static host h;
     scene s;
@@ -178,6 +178,7 @@ int main(void)
     clock_t clocks = 0, full_clocks = 0, first = 0;
     int i, ok = 1;
 
+    (void)argc;
     settings.texels_per_px = 1.0f; /* the nearest texel is taken: more would only flicker */
     settings.atlas_size = ATLAS;
     settings.max_impostors = 128;
@@ -207,7 +208,8 @@ int main(void)
            (double)first * 1000.0 / CLOCKS_PER_SEC,
            (double)(clocks - first) * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES - 1),
            (double)full_clocks * 1000.0 / CLOCKS_PER_SEC / (SCENE_FRAMES / 10));
-    ok = ok && scene_accepts(&s, 30.0) && !image_write_png("software.png", ours, WIDTH, HEIGHT);
+    ok = ok && scene_accepts(&s, 30.0)
+         && !image_write_beside(argv[0], "software.png", ours, WIDTH, HEIGHT);
     terrimp_view_destroy(full_view), terrimp_view_destroy(view), terrimp_terrain_destroy(terrain);
     free(h.indices), free(h.mesh_indices), free(h.mesh_xyz), scene_close(&s);
     return !ok;

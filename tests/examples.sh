@@ -91,15 +91,18 @@ bake_refuses()
 
 geomip_runs()
 {
-    (cd $work && ../../geomip) > $work/geomip.txt && [ -s $work/geomip.png ]
+    rm -f build/geomip.png
+    build/geomip > $work/geomip.txt && [ -s build/geomip.png ]
 }
 
 # ---- hosts of other kinds: each compares its pictures with its own full mesh
 
-# Runs in the work folder and leaves its picture there.
+# Leaves its picture beside itself, and nothing where it is called.
 host_runs() # name
 {
-    (cd $work && ../../$1) > $work/$1.txt && [ -s $work/$1.png ] || { cat $work/$1.txt; false; }
+    rm -f build/$1.png
+    build/$1 > $work/$1.txt && [ -s build/$1.png ] && [ ! -e $1.png ] ||
+        { cat $work/$1.txt; false; }
 }
 
 costs_are_above_0()
@@ -168,6 +171,22 @@ says_key_value_lines()
     grep -qE '^ms_median [0-9.]+' $work/out.txt || { cat $work/out.txt; false; }
 }
 
+# Options whose file is missing: they do nothing, and that is said in one line.
+says_what_is_ignored()
+{
+    fly --frames 1 --size 64x48 --terrain-size 129 --big-endian &&
+        [ "$(wc -l < $work/err.txt)" -eq 1 ] &&
+        grep -q -e "--big-endian is ignored" $work/err.txt
+}
+
+# An eye that looks away from the terrain: that is said, and nothing is compared.
+says_that_nothing_is_in_sight()
+{
+    echo "0 5000 0 0 9000 1" > $work/up.path
+    fly --size 64x48 --terrain-size 129 --compare --path $work/up.path &&
+        grep -q "in sight in no frame" $work/err.txt && ! grep -q psnr $work/out.txt
+}
+
 # Options that README.md speaks of and flyover does not know.
 unknown_options()
 {
@@ -207,6 +226,16 @@ if [ -x build/flyover ]; then
     head -c 100 Makefile > $work/short.hgt
     : > $work/empty.pgm
     check "README.md names options that flyover has" prints_nothing unknown_options
+    check "flyover says which options do nothing" says_what_is_ignored
+    check "flyover says when there is nothing to see" says_that_nothing_is_in_sight
+    printf 'ncols 2\nnrows 2\n1 2 3' > $work/short.asc
+    printf '\211PNG\r\n\032\nhello' > $work/bad.png
+    printf 'II*\000hello' > $work/bad.tif
+    printf 'abc' > $work/odd.r16
+    check "flyover refuses a grid that is cut short" refuses --dem $work/short.asc
+    check "flyover refuses a PNG that is none" refuses --dem $work/bad.png
+    check "flyover refuses a TIFF that is none" refuses --dem $work/bad.tif
+    check "flyover refuses raw samples of an odd length" refuses --dem $work/odd.r16
     check "flyover refuses an unknown option" refuses --no-such-option
     check "flyover refuses a missing file" refuses --dem $work/missing.hgt
     check "flyover refuses a .hgt of a wrong length" refuses --dem $work/short.hgt

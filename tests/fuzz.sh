@@ -30,9 +30,22 @@ has_fuzzer()
     clang -fsanitize=fuzzer $work/probe_fuzzer.c -o $work/probe_fuzzer > /dev/null 2>&1
 }
 
+has_header()
+{
+    $CC -E -include $1 -x c /dev/null > /dev/null 2>&1
+}
+
+# What a fuzzer uses beside libm, as far as it is here.
+libraries() # name
+{
+    [ $1 = dem ] || return
+    has_header png.h && echo -lpng || echo -DHOST_NO_PNG
+    has_header tiffio.h && echo -DHOST_TIFF -ltiff
+}
+
 replays() # name
 {
-    $CC -O0 $flags $sanitize tests/fuzz_$1.c -lm -o $work/replay_$1 &&
+    $CC -O0 $flags $sanitize tests/fuzz_$1.c $(libraries $1) -lm -o $work/replay_$1 &&
         $work/replay_$1 tests/corpus/$1/* > $work/replay_$1.txt 2>&1 && return
     # Once more, to say which file it was.
     FUZZ_VERBOSE=1 $work/replay_$1 tests/corpus/$1/* 2>&1 | tail -n 30
@@ -44,7 +57,7 @@ fuzz() # name
 {
     mkdir -p $work/$1
     clang -O2 $flags -DFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
-        tests/fuzz_$1.c -lm -o $work/fuzz_$1 || return
+        tests/fuzz_$1.c $(libraries $1) -lm -o $work/fuzz_$1 || return
     $work/fuzz_$1 -max_total_time=$seconds -max_len=2048 -len_control=20 -timeout=30 \
         -seed=${SEED:-1} -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=$work/$1. \
         $work/$1 tests/corpus/$1 > $work/fuzz_$1.txt 2>&1

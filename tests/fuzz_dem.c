@@ -1,11 +1,14 @@
-/* Fuzzes the elevation files of the examples: .hgt, PGM and raw. The first bytes choose the name,
-   the format and the crop, all others are the file. See tests/fuzz.h. */
+/* Fuzzes the elevation files of the examples. The first bytes choose the name, the format and the
+   crop, all others are the file. See tests/fuzz.h; libpng's and libtiff's own faults are theirs. */
 #include "fuzz.h"
 
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
 #include "examples/host/dem.c"
+#include "examples/host/dem_png.c"
+#include "examples/host/dem_text.c"
+#include "examples/host/dem_tiff.c"
 
 static void check_loaded(dem *d)
 {
@@ -25,7 +28,8 @@ static void check_loaded(dem *d)
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-    static const char *const names[] = { "N42E001.hgt", "s89w180.hgt", ".hgt", "a.pgm", "raw", "" };
+    static const char *const names[] = { "N42E001.hgt", "s89w180.hgt", ".hgt", "a.pgm", "raw", "",
+                                         "n42x25_w106x50.HGT", "a.raw", "a.r16", "a.f32" };
     const char *name;
     dem_desc desc;
     dem d;
@@ -47,6 +51,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
         desc.crop_width = fuzz_size(20);
         desc.crop_depth = fuzz_size(20);
     }
+    if (crop & 4u) {
+        desc.skip_bytes = fuzz_size(10);
+        desc.stride_bytes = fuzz_size(200);
+    }
+    desc.big_endian = (crop & 8u) != 0;
+    desc.has_no_data = (crop & 16u) != 0;
+    desc.no_data = desc.has_no_data ? fuzz_float(255.0f) : 0.0f;
     file = (uint8_t *)malloc(fuzz_left > 0 ? fuzz_left : 1); /* so that its end is guarded */
     if (file == NULL)
         return 0;

@@ -640,7 +640,8 @@ static void no_hole_in_rough_terrain(void)
 
 static void no_hole_in_a_real_tile(void)
 {
-    static const dem_desc part = { 0, 0, 0, 300, 300, 577, 577 };
+    static const dem_desc part = { .crop_x = 300, .crop_z = 300, .crop_width = 577,
+                                   .crop_depth = 577 };
     scene s;
     if (!open_tile(&s, "N42E001.hgt", &part)) {
         SKIP("there is no N42E001.hgt");
@@ -1128,7 +1129,8 @@ static void check_geomip_covers(scene *s, float reach, uint32_t chunk_quads, flo
 
 static void no_hole_between_mipmapped_nodes(void)
 {
-    static const dem_desc part = { 0, 0, 0, 300, 300, 577, 577 };
+    static const dem_desc part = { .crop_x = 300, .crop_z = 300, .crop_width = 577,
+                                   .crop_depth = 577 };
     scene s;
     open_hills(&s, 480, 384, 40.0f);
     check_geomip_covers(&s, 100.0f, 16, 1.0f, 1.0f);

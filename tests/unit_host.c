@@ -162,6 +162,8 @@ static void the_clock_goes_forward(void)
 
 /* ---- Elevation files ---------------------------------------------------- */
 
+static const dem_desc whole; /* all zero */
+
 /* Loads bytes under a name; what must hold of any result is checked here. */
 static int load(dem *d, const char *name, const void *bytes, size_t size, const dem_desc *desc)
 {
@@ -189,7 +191,7 @@ static void an_hgt_is_square_and_big_endian(void)
     static const uint8_t bytes[18] = { 0, 1, 1, 0, 0x80, 0, 0xff, 0xff, 0, 5,
                                        0, 6, 0, 7, 0, 8, 0, 9 };
     static const int16_t values[9] = { 1, 256, -32768, -1, 5, 6, 7, 8, 9 };
-    const dem_desc all = { 0, 0, 0, 0, 0, 0, 0 };
+    const dem_desc all = whole;
     terrimp_heightfield field;
     dem d;
     CHECK(load(&d, "tiles/N42E001.hgt", bytes, sizeof bytes, &all));
@@ -208,7 +210,7 @@ static void a_pgm_keeps_its_sample_size(void)
 {
     static const char eight[] = "P5 # a comment\n#another\n 3\t2\n255\nabcdef";
     static const char sixteen[] = "P5\n2 2 256\n\1\2\3\4\5\6\7\10";
-    const dem_desc all = { 0, 0, 0, 0, 0, 0, 0 };
+    const dem_desc all = whole;
     dem d;
     CHECK(load(&d, "a.pgm", eight, sizeof eight - 1, &all));
     CHECK(d.width == 3 && d.depth == 2 && d.format == TERRIMP_FORMAT_U8 && !d.has_voids);
@@ -225,10 +227,10 @@ static void a_malformed_pgm_is_refused(void)
         "P5", "P5 ", "P5 3", "P5 3 3", "P5 3 3 255", "P5 -3 3 255\n", "P5 3 3 0\n", "P5 x 3 255\n",
         "P5 3 3 65536\n", "P5 3 3 255#", "P5 1 9 255\nabcdefghi", "P5 4294967299 3 255\nabcdefghi",
         "P5 65538 2 255\nabc", "P5 99999999999999999999 3 255\n", "P5 3 3 255\nabcdefgh",
-        "P5 65537 65537 65535\nabcdefgh", "P2 3 3 255\n1 2 3 4 5 6 7 8 9", "P5 # no end",
-        "P6 3 3 1\n"
+        "P5 65537 65537 65535\nabcdefgh", "P2 3 3 255\n1 2 3 4 5 6 7 8", "P5 # no end",
+        "P6 3 3 1\n", "P2 2 2 255\n1 2 3 256", "P2 2 2 255\n1 2 3 x", "P2 9999 9999 255\n1 2 3 4"
     };
-    const dem_desc all = { 0, 0, 0, 0, 0, 0, 0 };
+    const dem_desc all = whole;
     size_t i;
     for (i = 0; i < sizeof headers / sizeof *headers; i++)
         CHECK(refused("a.pgm", headers[i], strlen(headers[i]), &all));
@@ -237,10 +239,12 @@ static void a_malformed_pgm_is_refused(void)
 static void raw_samples_are_little_endian_and_of_the_given_size(void)
 {
     const uint8_t bytes[16] = { 1, 2, 3, 4, 0, 0, 0x80, 0x3f, 0, 0, 0x20, 0xc1, 0, 0, 0xc0, 0x7f };
-    dem_desc desc = { TERRIMP_FORMAT_F32, 2, 2, 0, 0, 0, 0 };
+    dem_desc desc = whole;
     uint8_t infinite[16];
     const float *samples;
     dem d;
+    desc.raw_format = TERRIMP_FORMAT_F32;
+    desc.raw_width = desc.raw_depth = 2;
     CHECK(load(&d, "a.raw", bytes, 16, &desc));
     samples = d.samples;
     CHECK(samples[1] == 1.0f && samples[2] == -10.0f && d.has_voids); /* the last one is a NaN */
@@ -254,8 +258,6 @@ static void raw_samples_are_little_endian_and_of_the_given_size(void)
     CHECK(load(&d, "a.raw", bytes, 16, &desc));
     CHECK(((const uint16_t *)d.samples)[0] == 0x201);
     dem_free(&d);
-    desc.raw_width = 0;
-    CHECK(refused("a.raw", bytes, 16, &desc));
     desc.raw_width = desc.raw_depth = 0xffffffffu;
     CHECK(refused("a.raw", bytes, 16, &desc));
 }
@@ -265,7 +267,7 @@ static void a_crop_holds_the_samples_that_it_names(void)
     int round;
     for (round = 0; round < 200; round++) {
         uint32_t w = random_range(2, 40), h = random_range(2, 40), x, z;
-        dem_desc desc = { 0, 0, 0, 0, 0, 0, 0 };
+        dem_desc desc = whole;
         uint16_t values[40 * 40];
         uint8_t bytes[40 * 40 * 2];
         dem d;
@@ -304,7 +306,7 @@ static void hostile_bytes_do_no_harm(void)
     for (round = 0; round < 4000; round++) {
         uint8_t bytes[64];
         size_t size = random_range(0, sizeof bytes), i;
-        dem_desc desc = { 0, 0, 0, 0, 0, 0, 0 };
+        dem_desc desc = whole;
         dem d;
         random_bytes(bytes, sizeof bytes);
         if (round % 2) {
@@ -327,7 +329,7 @@ static void hostile_bytes_do_no_harm(void)
 
 static void a_missing_file_is_named(void)
 {
-    const dem_desc all = { 0, 0, 0, 0, 0, 0, 0 };
+    const dem_desc all = whole;
     dem d;
     CHECK(!dem_load(&d, "no/such/tile.hgt", &all));
     CHECK(strstr(d.error, "no/such/tile.hgt") && d.samples == NULL);
@@ -338,13 +340,15 @@ static void a_missing_file_is_named(void)
 static void a_file_loads_like_its_bytes(void)
 {
     static const char pgm[] = "P5 2 2 255\nabcd";
-    const dem_desc all = { 0, 0, 0, 0, 0, 0, 0 };
+    const dem_desc all = whole;
     dem d;
     write_scratch(pgm, sizeof pgm - 1);
     CHECK(dem_load(&d, scratch_file, &all));
     CHECK(d.samples && memcmp(d.samples, "abcd", 4) == 0);
     dem_free(&d);
 }
+
+#include "unit_host_files.h"
 
 /* ---- Flights and the command line --------------------------------------- */
 
@@ -428,6 +432,10 @@ static void options_reach_their_fields(void)
     CHECK(parse(&o, "--save-every 10 --wireframe --show-atlas --compare --dem x.hgt"));
     CHECK(options_saves(&o, 20) && !options_saves(&o, 5) && o.wireframe && o.show_atlas);
     CHECK(o.compare && strcmp(o.dem, "x.hgt") == 0);
+    CHECK(parse(&o, "--big-endian --skip 12 --stride 100 --no-data -9999 --origin -5,1e6"));
+    CHECK(o.file.big_endian && o.file.skip_bytes == 12 && o.file.stride_bytes == 100);
+    CHECK(o.file.has_no_data && o.file.no_data == -9999.0f);
+    CHECK(o.origin[0] == -5.0f && o.origin[1] == 1e6f);
 }
 
 static void wrong_options_are_refused(void)
@@ -437,7 +445,8 @@ static void wrong_options_are_refused(void)
         "--fov 180", "--fov -1", "--frames 0", "--frames -1", "--frames 1e3", "--fade 5,5",
         "--fade 5", "--speed inf", "--crop 1,2,3", "--crop 1,2,3x", "--format u32", "--mode fast",
         "--sky 12345", "--sky 12345g", "--spacing 0", "--spacing 1,-1", "--save-frames 1,,2",
-        "--save-frames 1,", "--save-frames x", "--terrain-size 1", "--atlas 99999999999", "--dem"
+        "--save-frames 1,", "--save-frames x", "--terrain-size 1", "--atlas 99999999999", "--dem",
+        "--skip -1", "--stride 0", "--no-data x", "--no-data", "--origin 5", "--origin a,b"
     };
     options o;
     size_t i;
@@ -445,6 +454,35 @@ static void wrong_options_are_refused(void)
         CHECK(!parse(&o, wrong[i]));
         CHECK(o.error[0] != 0);
     }
+}
+
+/* Lines of remarks about options that do nothing. */
+static int ignored(const char *line, int raw)
+{
+    FILE *file = tmpfile();
+    int lines = 0, byte;
+    options o;
+    CHECK(file && parse(&o, line));
+    if (!file)
+        return -1;
+    options_print_ignored(&o, raw, file);
+    rewind(file);
+    while ((byte = fgetc(file)) != EOF)
+        lines += byte == '\n';
+    fclose(file);
+    return lines;
+}
+
+static void options_without_their_file_are_said_to_be_ignored(void)
+{
+    CHECK(ignored("--frames 3 --mode full", 0) == 0);
+    CHECK(ignored("--dem a --no-data 0 --crop 0,0,9x9 --out b --save-every 1", 0) == 0);
+    CHECK(ignored("--dem a --format u8 --raw-size 9x9 --big-endian --skip 1 --stride 9", 1) == 0);
+    CHECK(ignored("--dem a --format u8 --raw-size 9x9 --big-endian --skip 1 --stride 9", 0) == 5);
+    CHECK(ignored("--format u8 --raw-size 9x9 --no-data 0 --crop 0,0,9x9", 0) == 4);
+    CHECK(ignored("--dem a --seed 3 --terrain-size 99", 0) == 2);
+    CHECK(ignored("--save-every 1 --save-frames 0 --wireframe --show-atlas", 0) == 4);
+    CHECK(ignored("--path a --speed 3 --fps 9", 0) == 2);
 }
 
 /* ---- Terrain and light -------------------------------------------------- */
@@ -763,11 +801,13 @@ int main(void)
     RUN(hostile_bytes_do_no_harm);
     RUN(a_missing_file_is_named);
     RUN(a_file_loads_like_its_bytes);
+    run_file_tests();
     RUN(a_path_reads_as_written);
     RUN(a_wrong_path_is_refused_with_its_line);
     RUN(a_circle_keeps_its_speed_and_stays_above_ground);
     RUN(options_reach_their_fields);
     RUN(wrong_options_are_refused);
+    RUN(options_without_their_file_are_said_to_be_ignored);
     RUN(procedural_terrain_repeats_itself_only_with_its_seed);
     RUN(procedural_terrain_has_peaks_and_valleys);
     RUN(a_wall_throws_its_shadow_away_from_the_sun);

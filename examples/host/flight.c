@@ -116,7 +116,7 @@ static int place_circle(circle *c, const terrimp_heightfield *field)
 {
     const float covered = 0.42f;   /* radius, as a part of the terrain's shorter side */
     const float clearance = 0.12f; /* over the ground, as a part of the terrain's height */
-    float width = (float)(field->width - 1) * field->spacing_x, low, high;
+    float width = (float)(field->width - 1) * field->spacing_x, low, high, over;
     float depth = (float)(field->depth - 1) * field->spacing_z;
     if (terrimp_heightfield_bounds(field, 0, 0, field->width, field->depth, &low, &high)
         != TERRIMP_OK)
@@ -125,8 +125,21 @@ static int place_circle(circle *c, const terrimp_heightfield *field)
     c->centre_z = field->origin_z + 0.5f * depth;
     c->radius = covered * (width < depth ? width : depth);
     c->altitude = 0.0f;
-    c->altitude = highest_ground(field, c) + clearance * (high - low) + 0.01f * c->radius;
+    over = clearance * (high - low);
+    if (over > 0.25f * c->radius) /* from higher up the eye, looking ahead, would miss it all */
+        over = 0.25f * c->radius;
+    c->altitude = highest_ground(field, c) + over + 0.01f * c->radius;
     return 1;
+}
+
+/* Where terrain is many times as high as wide, what lies ahead lies below all pictures: there the
+   eye looks down at it. */
+static void look_at_ground(const terrimp_heightfield *field, const circle *c, float target[3])
+{
+    float height;
+    if (terrimp_heightfield_height(field, target[0], target[2], &height) == TERRIMP_OK
+        && height < c->altitude - 1.5f * c->radius)
+        target[1] = height;
 }
 
 int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, float step)
@@ -148,6 +161,7 @@ int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, flo
         float angle = fmodf((float)i * (step / c.radius), TURN);
         on_circle(&c, angle, 0.0f, f->poses[i].eye);
         on_circle(&c, angle + ahead, 0.2f * c.radius, f->poses[i].target);
+        look_at_ground(&resolved, &c, f->poses[i].target);
     }
     return 1;
 }

@@ -29,6 +29,19 @@ const char *image_write_png(const char *path, const uint8_t *rgb, int width, int
     return NULL;
 }
 
+const char *image_write_beside(const char *program, const char *name, const uint8_t *rgb,
+                               int width, int height)
+{
+    char path[1024];
+    const char *slash = strrchr(program, '/');
+    size_t length = slash ? (size_t)(slash - program) + 1 : 0;
+    if (length + strlen(name) >= sizeof path)
+        return "the program's path is too long";
+    memcpy(path, program, length);
+    strcpy(path + length, name);
+    return image_write_png(path, rgb, width, height);
+}
+
 const char *image_read_png(const char *path, uint8_t **rgb, int *width, int *height)
 {
     png_image png;
@@ -71,6 +84,14 @@ double image_mean_square(const uint8_t *a, const uint8_t *b, size_t pixel_count,
         counted += 3;
     }
     return counted ? (double)sum / (double)counted : 0.0;
+}
+
+size_t image_not_sky(const uint8_t *rgb, size_t pixel_count, const uint8_t *sky)
+{
+    size_t count = 0, i;
+    for (i = 0; i < pixel_count; i++)
+        count += !is_colour(rgb + i * 3, sky);
+    return count;
 }
 
 double image_psnr(double mean_square)

@@ -72,6 +72,21 @@ static int take_spacing(const char *text, float spacing[2])
     return at_end(text) && spacing[0] > 0.0f && spacing[1] > 0.0f;
 }
 
+static int take_origin(const char *text, float origin[2])
+{
+    text = read_mark(read_float(text, &origin[0]), ',');
+    return at_end(read_float(text, &origin[1]));
+}
+
+/* Also nan and infinities, which some files mean by it. */
+static int take_no_data(const char *text, dem_desc *file)
+{
+    char *end;
+    file->has_no_data = 1;
+    file->no_data = strtof(text, &end);
+    return end != text && *end == 0;
+}
+
 static int take_fade(const char *text, float fade[2])
 {
     text = read_mark(read_float(text, &fade[0]), ',');
@@ -144,7 +159,8 @@ static int take_colour(const char *text, uint8_t colour[3])
 /* ---- The table ---------------------------------------------------------- */
 
 typedef enum option_id {
-    DEM, FORMAT, RAW_SIZE, CROP, TERRAIN_SIZE, SEED, SPACING, HEIGHT_SCALE, MODE, SIZE, FOV, SKY,
+    DEM, FORMAT, RAW_SIZE, BIG_ENDIAN, SKIP, STRIDE, NO_DATA, CROP, TERRAIN_SIZE, SEED, SPACING,
+    HEIGHT_SCALE, ORIGIN, MODE, SIZE, FOV, SKY,
     FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
     IMPOSTOR_PX, ATLAS, ATLAS_COUNT, MAX_CAPTURES, MAX_CAPTURE_TEXELS, MAX_CAPTURE_TRIANGLES,
     NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS,
@@ -157,14 +173,19 @@ typedef struct option {
 } option;
 
 static const option table[OPTION_COUNT] = {
-    { DEM, "--dem", "FILE", "elevation: .hgt, PGM, or raw with the two options below" },
-    { FORMAT, "--format", "u8|u16|s16|f32", "samples of a raw file, little-endian" },
-    { RAW_SIZE, "--raw-size", "WxD", "samples of a raw file along x and z" },
+    { DEM, "--dem", "FILE", "elevation: .hgt, PGM, PNG, GeoTIFF, ESRI grid, raw samples" },
+    { FORMAT, "--format", "u8|u16|s16|f32", "the file is raw, of such samples [by its name]" },
+    { RAW_SIZE, "--raw-size", "WxD", "samples of a raw file along x and z [a square]" },
+    { BIG_ENDIAN, "--big-endian", NULL, "samples of a raw file are" },
+    { SKIP, "--skip", "BYTES", "before the first sample of a raw file [0]" },
+    { STRIDE, "--stride", "BYTES", "from row to row of a raw file [no gaps]" },
+    { NO_DATA, "--no-data", "V", "samples of this value are voids [the file's own]" },
     { CROP, "--crop", "X,Z,WxD", "keep only these samples" },
     { TERRAIN_SIZE, "--terrain-size", "N", "without --dem: procedural terrain, N x N [2049]" },
     { SEED, "--seed", "N", "of the procedural terrain [1]" },
-    { SPACING, "--spacing", "X[,Z]", "units between samples [1; a .hgt: metres]" },
-    { HEIGHT_SCALE, "--height-scale", "S", "units for a step of a sample [1]" },
+    { SPACING, "--spacing", "X[,Z]", "units between samples [the file's, or 1]" },
+    { HEIGHT_SCALE, "--height-scale", "S", "units for a step of a sample [1; of a map: to fit]" },
+    { ORIGIN, "--origin", "X,Z", "of the first sample [0,0]" },
     { MODE, "--mode", "full|geomip|impostor|auto", "how to draw [auto]" },
     { SIZE, "--size", "WxH", "of the picture in pixels [1280x1024]" },
     { FOV, "--fov", "DEG", "vertical field of view [60]" },
@@ -227,12 +248,17 @@ static int take(options *o, option_id id, const char *text)
     case DEM: return take_text(text, &o->dem);
     case FORMAT: return take_format(text, &o->file.raw_format);
     case RAW_SIZE: return take_size(text, &o->file.raw_width, &o->file.raw_depth);
+    case BIG_ENDIAN: return take_flag(&o->file.big_endian);
+    case SKIP: return take_unsigned(text, &o->file.skip_bytes);
+    case STRIDE: return take_unsigned(text, &o->file.stride_bytes) && o->file.stride_bytes > 0;
+    case NO_DATA: return take_no_data(text, &o->file);
     case CROP: return take_crop(text, &o->file);
     case TERRAIN_SIZE: return take_unsigned(text, &o->terrain_size) && o->terrain_size >= 2
                               && o->terrain_size <= 32768;
     case SEED: return take_unsigned(text, &o->seed);
     case SPACING: return take_spacing(text, o->spacing);
     case HEIGHT_SCALE: return take_positive(text, &o->height_scale);
+    case ORIGIN: return take_origin(text, o->origin);
     case MODE: return take_mode(o, text);
     case SIZE: return take_size(text, &o->width, &o->height) && o->width <= 16384
                       && o->height <= 16384;
@@ -310,8 +336,41 @@ int options_parse(options *o, int argc, char **argv)
                      value);
             return 0;
         }
+        o->given |= (uint64_t)1 << found->id;
     }
     return 1;
+}
+
+static int is_given(const options *o, option_id id)
+{
+    return (int)(o->given >> id & 1u);
+}
+
+static void print_ignored(const options *o, option_id id, const char *why, FILE *file)
+{
+    if (is_given(o, id))
+        fprintf(file, "flyover: %s is ignored: %s\n", table[id].name, why);
+}
+
+void options_print_ignored(const options *o, int raw, FILE *file)
+{
+    static const option_id of_raw[] = { FORMAT, RAW_SIZE, BIG_ENDIAN, SKIP, STRIDE };
+    static const option_id of_file[] = { NO_DATA, CROP }, of_none[] = { TERRAIN_SIZE, SEED };
+    static const option_id of_out[] = { SAVE_EVERY, SAVE_FRAMES, WIREFRAME, SHOW_ATLAS };
+    size_t i;
+    for (i = 0; i < 5; i++)
+        if (!raw)
+            print_ignored(o, of_raw[i], o->dem ? "the file is not raw" : "there is no --dem", file);
+    for (i = 0; i < 2; i++)
+        print_ignored(o, o->dem ? of_none[i] : of_file[i],
+                      o->dem ? "the terrain is that of --dem" : "there is no --dem", file);
+    for (i = 0; i < 4; i++)
+        if (!o->out)
+            print_ignored(o, of_out[i], "there is no --out", file);
+    if (o->path) {
+        print_ignored(o, SPEED, "--path says where the eye is", file);
+        print_ignored(o, FPS, "--path says where the eye is", file);
+    }
 }
 
 void options_print_help(FILE *file)

@@ -38,6 +38,18 @@ static int make_up(tour *t)
     return 1;
 }
 
+/* Maps use the whole range of their samples, whatever heights they mean. */
+static float fitting_scale(const terrimp_heightfield *field)
+{
+    float width = (float)(field->width - 1) * field->spacing_x, low, high;
+    float depth = (float)(field->depth - 1) * field->spacing_z;
+    float side = width > depth ? width : depth;
+    if (terrimp_heightfield_bounds(field, 0, 0, field->width, field->depth, &low, &high)
+        != TERRIMP_OK || !(high - low > 0.5f * side))
+        return 1.0f;
+    return 0.125f * side / (high - low);
+}
+
 int tour_load(tour *t, const tour_desc *desc)
 {
     memset(t, 0, sizeof *t);
@@ -48,8 +60,12 @@ int tour_load(tour *t, const tour_desc *desc)
         t->field.spacing_x = desc->spacing[0];
         t->field.spacing_z = desc->spacing[1];
     }
+    t->field.origin_x = desc->origin[0];
+    t->field.origin_z = desc->origin[1];
     if (desc->height_scale > 0.0f)
         t->field.height_scale = desc->height_scale;
+    else if (desc->dem && !t->dem.has_units)
+        t->field.height_scale = fitting_scale(&t->field);
     return 1;
 }
 

@@ -11,7 +11,10 @@ typedef struct tour_desc {
     dem_desc file;            /* what to read of it */
     uint32_t size, seed;      /* of terrain that is made up: samples along a side */
     float spacing[2];         /* [wu] [Default 0 -> the file's; 1 where it is made up] */
-    float height_scale;       /* [wu] for one step of a sample [Default 0 -> likewise] */
+    float height_scale;       /* [wu] for one step of a sample [Default 0 -> 1; of a file without
+                                 units that is steeper than a map of anything: an eighth as high as
+                                 wide] */
+    float origin[2];          /* [wu] x, z of the first sample */
     const char *path;         /* a line a frame; null: the circle */
     size_t frames;            /* [Default 0 -> all of the path, 600 of the circle] */
     float speed;              /* round the circle [wu/s] [Default 0 -> 80 spacings a second] */

@@ -57,6 +57,18 @@ seed dem pgm-huge "${pgm}P5 4294967297 4294967297 255\\n$(noise 9 12)"
 seed dem pgm-zero "${pgm}P5 0 3 255\\n"
 seed dem pgm-depth "${pgm}P5 2 2 70000\\n$(noise 10 8)"
 seed dem pgm-cut "${pgm}P5 4"
+plain='\005\000\000\000\000'
+seed dem pgm-plain "${plain}P2 # c\n3 2 255\n1 2 3\n4 5 255\n"
+seed dem pgm-plain-16 "${plain}P2\n2 2\n65535\n1 65535 300 4"
+seed dem pgm-comment-end "${pgm}P5 2 2 255# c\nabcd"
+seed dem pgm-crlf "${pgm}P5\r\n2 2\r\n65535\r\nabcdefgh"
+seed dem esri "${plain}ncols 3\nnrows 2\nxllcorner 1\nyllcorner 42.0\ncellsize 0.01\n"\
+"NODATA_value -9999\n1 2.5 -9999\n4 5e1 6\n"
+seed dem png-8 "$plain\211PNG\r\n\032\n\000\000\000\015IHDR\000\000\000\003\000\000\000\002"\
+"\010\000\000\000\000$(noise 31 40)"
+seed dem tiff "${plain}II*\000\010\000\000\000\007\000$(noise 32 100)"
+seed dem raw-square "\010\000\000\000\000$(noise 33 32)"
+seed dem raw-stride "\004\002\014\014\014\012\022$(noise 34 40)"
 for format in 1 2 3 4; do
     seed dem raw-$format "\004\00$format\017\017\000$(noise $format 900)"
 done
