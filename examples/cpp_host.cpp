@@ -112,17 +112,17 @@ Frame record(terrimp_view *view, const terrimp_camera &camera)
 
 /* One program draws everything: ground wears the lightmap, impostors the atlas, both through a
    texture matrix. Pictures hold colours times alpha, hence the division; of a picture in two parts
-   each shows only what lies within its own depth. */
+   each shows only what lies within its own depth. What fades in shows on the pixels whose
+   threshold lies below its alpha. */
 const char vertex_source[] =
     "#version 330 core\n"
     "in vec3 position;\n"
     "uniform mat4 view, projection, texture_matrix;\n"
     "uniform vec3 eye;\n"
-    "uniform float scale;\n"
     "out vec4 strq;\n"
     "void main() {\n"
     "    strq = texture_matrix * vec4(position, 1.0);\n"
-    "    gl_Position = projection * vec4(mat3(view) * ((position - eye) * scale), 1.0);\n"
+    "    gl_Position = projection * vec4(mat3(view) * (position - eye), 1.0);\n"
     "}\n";
 const char fragment_source[] =
     "#version 330 core\n"
@@ -132,10 +132,12 @@ const char fragment_source[] =
     "in vec4 strq;\n"
     "out vec4 colour;\n"
     "void main() {\n"
+    "    float threshold = fract(dot(floor(gl_FragCoord.xy), vec2(0.754877666, 0.569840291)));\n"
+    "    if (threshold >= alpha) discard;\n"
     "    if (part && (strq.z < 0.0 || strq.z > strq.w)) discard;\n"
     "    vec4 c = textureProj(picture, strq);\n"
     "    if (c.a < 0.5) discard;\n"
-    "    colour = vec4(c.rgb / c.a, alpha);\n"
+    "    colour = vec4(c.rgb / c.a, 1.0);\n"
     "}\n";
 
 GLuint make_texture(uint32_t size, GLenum format, const uint8_t *texels, GLint smaller)
@@ -167,7 +169,7 @@ private:
     void turn_to_screen(const terrimp_camera &camera, float z_far);
     void begin_capture(const terrimp_capture_command &c);
     void draw_range(GLuint array, uint32_t base_vertex, uint32_t first_index, uint32_t index_count,
-                    GLuint texture, const float *texture_matrix, float depth_bias, float alpha);
+                    GLuint texture, const float *texture_matrix, float alpha);
     GLint uniform(const char *name) const { return glGetUniformLocation(program_, name); }
 
     const terrimp_terrain *terrain_;
@@ -235,7 +237,6 @@ Renderer::Renderer(const terrimp_terrain *terrain, const scene &shown)
     glEnable(GL_DEPTH_TEST);
     glEnable(GL_CULL_FACE);
     glEnable(GL_SCISSOR_TEST);
-    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
 }
 
 GLuint Renderer::vertices_of(uint32_t node)
@@ -269,7 +270,6 @@ void Renderer::begin_capture(const terrimp_capture_command &c)
     capturing_ = true;
 }
 
-/* The projection reaches as far as the depth bias moves things. */
 void Renderer::turn_to_screen(const terrimp_camera &camera, float z_far)
 {
     float view[16], projection[16];
@@ -289,19 +289,15 @@ void Renderer::turn_to_screen(const terrimp_camera &camera, float z_far)
 
 void Renderer::draw_range(GLuint array, uint32_t base_vertex, uint32_t first_index,
                           uint32_t index_count, GLuint texture, const float *texture_matrix,
-                          float depth_bias, float alpha)
+                          float alpha)
 {
     glBindVertexArray(array);
     glBindTexture(GL_TEXTURE_2D, texture);
     glUniformMatrix4fv(uniform("texture_matrix"), 1, GL_FALSE, texture_matrix);
-    glUniform1f(uniform("scale"), 1.0f + depth_bias);
     glUniform1f(uniform("alpha"), alpha);
-    if (alpha < 1.0f)
-        glEnable(GL_BLEND);
     glDrawElementsBaseVertex(GL_TRIANGLES, GLsizei(index_count), GL_UNSIGNED_SHORT,
                              reinterpret_cast<const void *>(size_t(first_index) * 2),
                              GLint(base_vertex));
-    glDisable(GL_BLEND);
 }
 
 std::vector<uint8_t> Renderer::draw(const Frame &frame)
@@ -321,13 +317,13 @@ std::vector<uint8_t> Renderer::draw(const Frame &frame)
         glUniform1i(uniform("part"), c.kind == Command::impostor && c.mesh.part_count > 1);
         if (c.kind == Command::impostor)
             draw_range(meshes_, c.mesh.base_vertex, c.mesh.first_index, c.mesh.index_count,
-                       atlas_, c.mesh.texture_matrix, c.mesh.depth_bias, 1.0f);
+                       atlas_, c.mesh.texture_matrix, c.mesh.alpha);
         else if (c.kind == Command::floor)
             draw_range(meshes_, c.below.base_vertex, c.below.first_index, c.below.index_count,
-                       lightmap_, lightmap_matrix_, c.below.depth_bias, 1.0f);
+                       lightmap_, lightmap_matrix_, 1.0f);
         else
             draw_range(vertices_of(c.node.node), 0, c.node.first_index, c.node.index_count,
-                       lightmap_, lightmap_matrix_, c.node.depth_bias, c.node.alpha);
+                       lightmap_, lightmap_matrix_, 1.0f);
     }
     turn_to_screen(frame.camera, frame.stats.z_far); // also when there is nothing to draw
     context_read(&context_, rgb.data());

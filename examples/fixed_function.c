@@ -5,7 +5,7 @@
      alpha: the frame buffer has alpha bits, is cleared to alpha 0, and ground writes alpha 1;
    - (s, t, q): the positions are the texture coordinates too, and the texture matrix makes the
      rest of them. A machine without texture matrices takes terrimp_texture_coordinates: drawn too;
-   - the depth bias is a scale about the eye, of vertices that are relative to the eye;
+   - an impostor that fades in is drawn on a share of the pixels by a polygon stipple;
    - a picture in two parts is cut to r / q within 0..1 by two clip planes, rows of its matrix;
    - "nothing where alpha is below 0.5" is the alpha test. The division by alpha is not to be had:
      captures are cleared to the mean colour of ground instead of black, for the filter to mix in.
@@ -119,12 +119,11 @@ static void turn_to_screen(host *h)
     set_camera(h, view, projection, h->camera.eye);
 }
 
-/* The world moves to the eye, and grows about it: the same picture, deeper. */
-static void push_world(const host *h, float depth_bias)
+/* The world moves to the eye. */
+static void push_world(const host *h)
 {
     glMatrixMode(GL_MODELVIEW);
     glPushMatrix();
-    glScalef(1.0f + depth_bias, 1.0f + depth_bias, 1.0f + depth_bias);
     glTranslatef(-h->eye[0], -h->eye[1], -h->eye[2]);
 }
 
@@ -144,8 +143,8 @@ static void make_texture_coordinates(host *h, const float matrix[16], const floa
     glTexCoordPointer(4, GL_FLOAT, 0, h->strq);
 }
 
-static void draw(host *h, GLuint texture, const float matrix[16], float depth_bias,
-                 const float *xyz, const uint16_t *indices, uint32_t index_count)
+static void draw(host *h, GLuint texture, const float matrix[16], const float *xyz,
+                 const uint16_t *indices, uint32_t index_count)
 {
     turn_to_screen(h);
     glBindTexture(GL_TEXTURE_2D, texture);
@@ -157,14 +156,14 @@ static void draw(host *h, GLuint texture, const float matrix[16], float depth_bi
         glLoadIdentity();
         make_texture_coordinates(h, matrix, xyz, indices, index_count);
     }
-    push_world(h, depth_bias);
+    push_world(h);
     glDrawElements(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT, indices);
     glPopMatrix();
 }
 
 /* Keeps to r / q within 0..1: r >= 0 and q - r >= 0 are planes in the world. OpenGL takes them
    through the modelview matrix of that moment. */
-static void clip_to_picture(const host *h, const float m[16], float depth_bias)
+static void clip_to_picture(const host *h, const float m[16])
 {
     GLdouble planes[2][4];
     int i;
@@ -172,7 +171,7 @@ static void clip_to_picture(const host *h, const float m[16], float depth_bias)
         planes[0][i] = (GLdouble)m[i * 4 + 2];
         planes[1][i] = (GLdouble)m[i * 4 + 3] - (GLdouble)m[i * 4 + 2];
     }
-    push_world(h, depth_bias);
+    push_world(h);
     for (i = 0; i < 2; i++) {
         glClipPlane(GL_CLIP_PLANE0 + (GLenum)i, planes[i]);
         glEnable(GL_CLIP_PLANE0 + (GLenum)i);
@@ -180,16 +179,33 @@ static void clip_to_picture(const host *h, const float m[16], float depth_bias)
     glPopMatrix();
 }
 
+/* Draws on a share of the pixels: those whose threshold lies below it, a fraction of 2^32 that is a
+   multiple of two numbers and so spreads evenly over the plane. */
+static void begin_share(float share)
+{
+    GLubyte pattern[32 * 4] = { 0 };
+    uint32_t x, y;
+    if (share >= 1.0f)
+        return;
+    for (y = 0; y < 32; y++)
+        for (x = 0; x < 32; x++)
+            if ((float)((x * 3242174889u + y * 2447445414u) >> 8) < share * 16777216.0f)
+                pattern[y * 4 + x / 8] |= (GLubyte)(0x80 >> x % 8);
+    glPolygonStipple(pattern);
+    glEnable(GL_POLYGON_STIPPLE);
+}
+
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     host *h = (host *)user;
     turn_to_screen(h);
     if (c->part_count > 1)
-        clip_to_picture(h, c->texture_matrix, c->depth_bias);
+        clip_to_picture(h, c->texture_matrix);
     glEnable(GL_ALPHA_TEST);
-    draw(h, h->atlas, c->texture_matrix, c->depth_bias,
-         h->mesh_xyz + (size_t)c->base_vertex * 3, h->mesh_indices + c->first_index,
-         c->index_count);
+    begin_share(c->alpha);
+    draw(h, h->atlas, c->texture_matrix, h->mesh_xyz + (size_t)c->base_vertex * 3,
+         h->mesh_indices + c->first_index, c->index_count);
+    glDisable(GL_POLYGON_STIPPLE);
     glDisable(GL_ALPHA_TEST);
     glDisable(GL_CLIP_PLANE0);
     glDisable(GL_CLIP_PLANE1);
@@ -198,9 +214,8 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
 static void draw_floor(void *user, const terrimp_floor_command *c)
 {
     host *h = (host *)user;
-    draw(h, h->lightmap, h->lightmap_matrix, c->depth_bias,
-         h->mesh_xyz + (size_t)c->base_vertex * 3, h->mesh_indices + c->first_index,
-         c->index_count);
+    draw(h, h->lightmap, h->lightmap_matrix, h->mesh_xyz + (size_t)c->base_vertex * 3,
+         h->mesh_indices + c->first_index, c->index_count);
 }
 
 /* A host with more memory would keep the vertices of the nodes that it drew lately. */
@@ -208,13 +223,8 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
 {
     host *h = (host *)user;
     terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3);
-    if (c->alpha < 1.0f)
-        glEnable(GL_BLEND);
-    glColor4f(1.0f, 1.0f, 1.0f, c->alpha);
-    draw(h, h->lightmap, h->lightmap_matrix, c->depth_bias, h->ground_xyz,
-         h->indices + c->first_index, c->index_count);
-    glColor4f(1.0f, 1.0f, 1.0f, 1.0f);
-    glDisable(GL_BLEND);
+    draw(h, h->lightmap, h->lightmap_matrix, h->ground_xyz, h->indices + c->first_index,
+         c->index_count);
 }
 
 /* ---- Textures and state ------------------------------------------------- */
@@ -273,7 +283,6 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s)
     glEnable(GL_SCISSOR_TEST);
     glEnableClientState(GL_VERTEX_ARRAY), glEnableClientState(GL_TEXTURE_COORD_ARRAY);
     glAlphaFunc(GL_GREATER, 0.5f);
-    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     return 1;
 }
@@ -294,7 +303,7 @@ static int draw_frame(host *h, terrimp_view *view, int i, const context *frame, 
     if (terrimp_view_update(view, &h->camera) != TERRIMP_OK
         || terrimp_view_get_stats(view, &h->stats) != TERRIMP_OK)
         return 0;
-    h->camera.z_far = h->stats.z_far; /* the depth bias moves impostors deeper */
+    h->camera.z_far = h->stats.z_far;
     if (terrimp_view_render(view, &callbacks) != TERRIMP_OK)
         return 0;
     turn_to_screen(h); /* also when there is nothing to draw */

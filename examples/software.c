@@ -83,8 +83,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     raster_style style = { 0 };
     style.texture = &h->atlas_texture;
     style.texture_matrix = c->texture_matrix;
-    style.depth_bias = c->depth_bias;
-    style.alpha = RASTER_OPAQUE;
+    style.share = (int)(c->alpha * RASTER_ALL + 0.5f);
     style.within_depth = c->part_count > 1;
     draw_mesh(h, c->node, &style, c->index_count);
 }
@@ -96,8 +95,7 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     raster_style style = { 0 };
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
-    style.depth_bias = c->depth_bias;
-    style.alpha = RASTER_OPAQUE;
+    style.share = RASTER_ALL;
     draw_mesh(h, h->node_count, &style, c->index_count);
 }
 
@@ -109,8 +107,7 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
         turn_to_screen(h);
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
-    style.depth_bias = c->depth_bias;
-    style.alpha = (int)(c->alpha * RASTER_OPAQUE + 0.5f);
+    style.share = RASTER_ALL;
     if (terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3) == TERRIMP_OK)
         raster_draw(&h->r, &style, h->ground_xyz, h->indices + c->first_index, c->index_count);
 }

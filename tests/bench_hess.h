@@ -12,6 +12,7 @@
 #ifndef BENCH_HESS_H
 #define BENCH_HESS_H
 
+#include "atlas_pair.h"
 #include "bench_scene.h"
 
 enum { HESS_MARGIN = 2, HESS_SMALLEST = 8 }; /* texels around a picture; of the least side */
@@ -31,14 +32,14 @@ typedef struct hess {
     uint32_t atlas_size;      /* of each of the two */
     hess_chunk *chunks;
     uint32_t *seen, seen_count; /* chunks in sight, from the closest on */
-    terrimp_atlas_pair pair;
-    terrimp_shelf *shelves;
-    terrimp_pair_slot *slots; /* [chunks], like the next two */
-    terrimp_pack_item *items;
-    uint32_t *order;
+    atlas_pair pair;
+    pair_shelf *shelves;
+    pair_slot *slots; /* [chunks], like the next two */
+    terrimp_rect *sizes;
+    uint32_t *order;          /* [2 * chunks] */
     float scale;              /* what the last packing made of the sizes that were wanted */
     terrimp_camera camera;
-    float pixel_factor, depth_bias;
+    float pixel_factor;
     terrimp_stats stats;
     double drawn, captured;   /* impostors so far */
     uint32_t early_packs;     /* before all pictures had moved: some were lost */
@@ -62,15 +63,15 @@ static void hess_open(hess *h, const terrimp_terrain *terrain, const terrimp_vie
     count = h->info.chunks_x * h->info.chunks_z;
     h->chunks = need_memory(count * sizeof *h->chunks);
     h->seen = need_memory(count * sizeof *h->seen);
-    h->order = need_memory(count * sizeof *h->order);
+    h->order = need_memory(2 * count * sizeof *h->order);
     h->slots = need_memory(count * sizeof *h->slots);
-    h->items = need_memory(count * sizeof *h->items);
+    h->sizes = need_memory(count * sizeof *h->sizes);
     h->shelves = need_memory(2 * count * sizeof *h->shelves);
     memset(h->chunks, 0, count * sizeof *h->chunks);
     memset(h->slots, 0, count * sizeof *h->slots);
     for (i = 0; i < count; i++)
         need(terrimp_terrain_get_box(terrain, i, &h->chunks[i].box));
-    need(terrimp_pair_init(&h->pair, h->atlas_size, h->atlas_size, h->shelves, count));
+    pair_init(&h->pair, h->atlas_size, h->atlas_size, h->shelves, count);
 }
 
 static void hess_close(hess *h)
@@ -79,7 +80,7 @@ static void hess_close(hess *h)
     free(h->seen);
     free(h->order);
     free(h->slots);
-    free(h->items);
+    free(h->sizes);
     free(h->shelves);
 }
 
@@ -128,7 +129,7 @@ static uint32_t hess_mark_due(hess *h, int *complete)
     *complete = 1;
     for (i = 0; i < h->seen_count; i++) {
         hess_chunk *c = &h->chunks[h->seen[i]];
-        int atlas = terrimp_pair_picture(&h->pair, &h->slots[h->seen[i]]);
+        int atlas = pair_picture(&h->pair, &h->slots[h->seen[i]]);
         float angle = 0.0f;
         c->due = 0;
         if (!hess_is_impostor(h, h->seen[i]))
@@ -146,15 +147,15 @@ static uint32_t hess_mark_due(hess *h, int *complete)
 static void hess_repack(hess *h)
 {
     uint32_t i, count = h->info.chunks_x * h->info.chunks_z;
-    memset(h->items, 0, count * sizeof *h->items);
+    memset(h->sizes, 0, count * sizeof *h->sizes);
     for (i = 0; i < h->seen_count; i++)
         if (hess_is_impostor(h, h->seen[i])) {
             uint32_t size[2];
             hess_size(h, h->seen[i], size);
-            h->items[h->seen[i]].rect.width = size[0];
-            h->items[h->seen[i]].rect.height = size[1];
+            h->sizes[h->seen[i]].width = size[0];
+            h->sizes[h->seen[i]].height = size[1];
         }
-    need(terrimp_pair_repack(&h->pair, h->slots, h->items, count, h->order, &h->scale));
+    (void)pair_repack(&h->pair, h->slots, h->sizes, count, h->order, &h->scale);
     h->least_scale = h->scale < h->least_scale ? h->scale : h->least_scale;
 }
 
@@ -164,12 +165,12 @@ static int hess_assign(hess *h)
 {
     uint32_t i, size[2];
     for (i = 0; i < h->seen_count; i++) {
-        terrimp_pair_slot *slot = &h->slots[h->seen[i]];
+        pair_slot *slot = &h->slots[h->seen[i]];
         if (!h->chunks[h->seen[i]].due || slot->assigned[h->pair.newest])
             continue;
         hess_size(h, h->seen[i], size);
-        if (terrimp_pair_assign(&h->pair, slot, (uint32_t)((float)size[0] * h->scale),
-                                (uint32_t)((float)size[1] * h->scale)) != TERRIMP_OK)
+        if (!pair_assign(&h->pair, slot, (uint32_t)((float)size[0] * h->scale),
+                         (uint32_t)((float)size[1] * h->scale)))
             return 0;
     }
     return 1;
@@ -179,7 +180,7 @@ static void hess_count(hess *h)
 {
     uint32_t i, quads = h->info.chunk_quads, impostors = 0;
     terrimp_stats *s = &h->stats;
-    float closest = 1e30f, up;
+    float up;
     float aspect = (float)h->camera.width_px / (float)h->camera.height_px;
     memset(s, 0, sizeof *s);
     for (i = 0; i < h->seen_count; i++) {
@@ -195,18 +196,15 @@ static void hess_count(hess *h)
         }
         if (!hess_is_impostor(h, h->seen[i]))
             continue;
-        closest = impostors++ == 0 ? c->closest : closest;
+        impostors++;
         s->triangles += mesh.index_count / 3;
         s->captures += (uint32_t)c->due;
         s->captured_texels += c->due ? slot->width * slot->height : 0;
     }
     s->impostors = impostors;
     s->draws = s->ground + impostors;
-    h->depth_bias = h->fade_end / fmaxf(closest, h->fade_end / 8.0f) - 1.0f;
-    h->depth_bias = fmaxf(h->depth_bias, 0.0f);
     for (i = 0; i < h->seen_count; i++)
-        s->z_far = fmaxf(s->z_far, terrimp_box_farthest(&h->chunks[h->seen[i]].box, h->camera.eye)
-                                       * (1.0f + h->depth_bias));
+        s->z_far = fmaxf(s->z_far, terrimp_box_farthest(&h->chunks[h->seen[i]].box, h->camera.eye));
     /* A point at that distance in the corner of the screen has the smallest depth. */
     up = tanf(0.5f * h->camera.fov_y_rad);
     s->z_near /= sqrtf(1.0f + up * up * (1.0f + aspect * aspect));
@@ -246,7 +244,6 @@ static void hess_draw_block(const hess *h, uint32_t chunk, const terrimp_callbac
     uint32_t quads = h->info.chunk_quads;
     terrimp_ground_command ground;
     memset(&ground, 0, sizeof ground);
-    ground.alpha = 1.0f;
     for (cell = 0; cell < 9; cell++) {
         uint32_t nx = x + cell % 3 - 1, nz = z + cell / 3 - 1; /* below 0 it wraps: too large */
         uint32_t which = cell == 4 ? 0 : terrimpi_strip_pattern(quads, 0, cell - (cell > 4));
@@ -264,7 +261,7 @@ static void hess_draw_block(const hess *h, uint32_t chunk, const terrimp_callbac
 static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callbacks)
 {
     hess_chunk *c = &h->chunks[chunk];
-    terrimp_pair_slot *slot = &h->slots[chunk];
+    pair_slot *slot = &h->slots[chunk];
     terrimp_capture capture;
     terrimp_capture_command command;
     uint32_t quads = h->info.chunk_quads, size[2], i;
@@ -290,7 +287,7 @@ static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callb
     callbacks->begin_capture(callbacks->user, &command);
     hess_draw_block(h, chunk, callbacks);
     callbacks->end_capture(callbacks->user, &command);
-    need(terrimp_pair_fill(&h->pair, slot));
+    pair_fill(&h->pair, slot);
     memcpy(c->eye, capture.eye, sizeof c->eye);
     need(terrimp_texture_matrix(&capture, &command.slot, h->atlas_size, h->atlas_size,
                                 c->texture_matrix));
@@ -304,17 +301,18 @@ static void hess_draw_impostor(const hess *h, uint32_t chunk, const terrimp_call
     need(terrimp_terrain_get_mesh(h->terrain, chunk, &mesh));
     command.node = chunk;
     command.part_count = 1;
-    command.atlas = (uint32_t)terrimp_pair_picture(&h->pair, &h->slots[chunk]);
+    command.atlas = (uint32_t)pair_picture(&h->pair, &h->slots[chunk]);
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
-    command.depth_bias = h->depth_bias;
+    /* Hess 4.4 blends ground over it; here it fades in over the ground. */
+    command.alpha = fminf(1.0f, (h->chunks[chunk].closest - h->fade_start)
+                                    / (h->fade_end - h->fade_start));
     memcpy(command.texture_matrix, h->chunks[chunk].texture_matrix, sizeof command.texture_matrix);
     callbacks->draw_impostor(callbacks->user, &command);
 }
 
-/* The ground that is opaque, or that which fades (Hess 4.4). */
-static void hess_draw_ground(const hess *h, int fading, const terrimp_callbacks *callbacks)
+static void hess_draw_ground(const hess *h, const terrimp_callbacks *callbacks)
 {
     terrimp_ground_command ground;
     terrimp_pattern whole;
@@ -324,11 +322,7 @@ static void hess_draw_ground(const hess *h, int fading, const terrimp_callbacks 
     ground.first_index = whole.first_index;
     ground.index_count = whole.index_count;
     for (i = 0; i < h->seen_count && h->chunks[h->seen[i]].closest < h->fade_end; i++) {
-        float alpha = (h->fade_end - h->chunks[h->seen[i]].closest) / (h->fade_end - h->fade_start);
-        if ((alpha < 1.0f) != fading)
-            continue;
         ground.node = h->seen[i];
-        ground.alpha = fminf(alpha, 1.0f);
         callbacks->draw_ground(callbacks->user, &ground);
     }
 }
@@ -339,11 +333,10 @@ static void hess_render(hess *h, const terrimp_callbacks *callbacks)
     for (i = 0; i < h->seen_count; i++)
         if (h->chunks[h->seen[i]].due)
             hess_capture(h, h->seen[i], callbacks);
-    hess_draw_ground(h, 0, callbacks);
+    hess_draw_ground(h, callbacks);
     for (i = 0; i < h->seen_count; i++)
         if (hess_is_impostor(h, h->seen[i]))
             hess_draw_impostor(h, h->seen[i], callbacks);
-    hess_draw_ground(h, 1, callbacks);
 }
 
 #endif

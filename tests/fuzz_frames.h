@@ -41,7 +41,6 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
     FUZZ_CHECK(user == &info && c->node < info.node_count);
     FUZZ_CHECK(c->index_count % 3u == 0 && c->first_index <= info.ground_index_count);
     FUZZ_CHECK(c->index_count <= info.ground_index_count - c->first_index);
-    FUZZ_CHECK(fuzz_finite(&c->depth_bias, 1) && c->depth_bias >= 0.0f);
 }
 
 /* A range of the coarse meshes' indices, and the vertices that it leads to. */
@@ -61,7 +60,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     impostors += c->part == 0; /* of a picture in two parts both are drawn */
     check_mesh_range(c->base_vertex, c->first_index, c->index_count);
     FUZZ_CHECK(fuzz_finite(c->texture_matrix, 16));
-    FUZZ_CHECK(fuzz_finite(&c->depth_bias, 1) && c->depth_bias >= 0.0f);
+    FUZZ_CHECK(c->alpha >= 0.0f && c->alpha <= 1.0f);
 }
 
 static void draw_floor(void *user, const terrimp_floor_command *c)

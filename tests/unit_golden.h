@@ -209,6 +209,7 @@ static void golden_impostor(void *user, const terrimp_impostor_command *command)
     golden_flight *f = (golden_flight *)user;
     f->hash = golden_words(f->hash ^ 2u, command, sizeof *command);
     f->impostors++;
+    f->faded += command->alpha < 1.0f;
 }
 
 static void golden_draw_ground(void *user, const terrimp_ground_command *command)
@@ -216,7 +217,6 @@ static void golden_draw_ground(void *user, const terrimp_ground_command *command
     golden_flight *f = (golden_flight *)user;
     f->hash = golden_words(f->hash ^ 3u, command, sizeof *command);
     f->ground++;
-    f->faded += command->alpha < 1.0f;
     f->morphed += command->morph > 0.0f && command->morph < 1.0f;
 }
 

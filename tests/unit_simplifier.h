@@ -48,8 +48,8 @@ enum { SIMP_KINDS = 7 };
 /* Sample i of a border, in the order of the polylines. */
 static float simp_border_sample(const simp_case *t, int border, uint32_t i)
 {
-    uint32_t x = border == TERRIMP_BORDER_X0 ? 0 : border == TERRIMP_BORDER_X1 ? t->cols - 1 : i;
-    uint32_t z = border == TERRIMP_BORDER_Z0 ? 0 : border == TERRIMP_BORDER_Z1 ? t->rows - 1 : i;
+    uint32_t x = border == TERRIMP_SIDE_X0 ? 0 : border == TERRIMP_SIDE_X1 ? t->cols - 1 : i;
+    uint32_t z = border == TERRIMP_SIDE_Z0 ? 0 : border == TERRIMP_SIDE_Z1 ? t->rows - 1 : i;
     return t->heights[z * t->cols + x];
 }
 
@@ -57,8 +57,8 @@ static void simp_make_borders(simp_case *t, uint32_t inner_limit)
 {
     float line[SIMP_MAX];
     int k;
-    for (k = 0; k < TERRIMP_BORDER_COUNT; k++) {
-        uint32_t i, n = k == TERRIMP_BORDER_Z0 || k == TERRIMP_BORDER_Z1 ? t->cols : t->rows;
+    for (k = 0; k < TERRIMP_SIDE_COUNT; k++) {
+        uint32_t i, n = k == TERRIMP_SIDE_Z0 || k == TERRIMP_SIDE_Z1 ? t->cols : t->rows;
         for (i = 0; i < n; i++)
             line[i] = simp_border_sample(t, k, i);
         CHECK(terrimp_border_simplify(line, n, inner_limit, t->points[k], SIMP_MAX,
@@ -330,8 +330,8 @@ static void neighbours_share_their_border_bit_for_bit(void)
                     shared += memcmp(&w->height, &v->height, sizeof v->height) == 0;
             }
         }
-        CHECK(shared == p->desc.borders[TERRIMP_BORDER_X1].point_count);
-        CHECK(shared == q->desc.borders[TERRIMP_BORDER_X0].point_count);
+        CHECK(shared == p->desc.borders[TERRIMP_SIDE_X1].point_count);
+        CHECK(shared == q->desc.borders[TERRIMP_SIDE_X0].point_count);
         simp_free(p);
         simp_free(q);
     }
@@ -518,7 +518,7 @@ static void raised_neighbours_still_meet(void)
                 if (v->z == 32 && w->z == 0 && v->x == w->x)
                     shared += memcmp(&v->height, &w->height, sizeof v->height) == 0;
             }
-        CHECK(shared == p->desc.borders[TERRIMP_BORDER_Z1].point_count);
+        CHECK(shared == p->desc.borders[TERRIMP_SIDE_Z1].point_count);
         simp_free(p);
         simp_free(q);
     }

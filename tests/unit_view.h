@@ -77,13 +77,11 @@ typedef struct flight_picture {
 } flight_picture;
 
 /* What a chunk is drawn as. */
-enum { COVER_GROUND = 1, COVER_OPAQUE = 2, COVER_IMPOSTOR = 4 };
+enum { COVER_GROUND = 1, COVER_IMPOSTOR = 2, COVER_FADING = 4 }; /* fading: not all pixels */
 
 typedef struct flight_item {
     uint32_t node;
     int is_impostor;
-    int is_distant; /* for sure: of the background */
-    int is_close;   /* for sure: not */
     terrimp_ground_command ground;
     terrimp_impostor_command impostor;
 } flight_item;
@@ -107,7 +105,7 @@ typedef struct flight {
     uint32_t capture_count, begun_count, captured_cells, captured_triangles, captured_texels;
     uint32_t triangles, part_count, wanted_parts;
     int in_capture, screen_started, floor_drawn;
-    int stage; /* of the screen: opaque ground, background, floor, fading ground */
+    int stage; /* of the screen: ground, impostors, floor */
     flight_picture *capturing; /* while in_capture */
     terrimp_rect *slots;                 /* [node_count][part] captured in this frame */
     uint32_t *slot_atlas;
@@ -318,7 +316,7 @@ static void capture_ground(flight *f, flight_picture *picture,
                            const terrimp_ground_command *command)
 {
     uint32_t i;
-    CHECK(command->alpha == 1.0f && command->depth_bias == 0.0f && command->morph == 0.0f);
+    CHECK(command->morph == 0.0f);
     CHECK(command->level <= picture->capture.level);
     CHECK(picture->cell_count < FLIGHT_CELLS);
     for (i = 0; i < picture->cell_count; i++) {
@@ -437,8 +435,6 @@ static void flight_draw_ground(void *user, const terrimp_ground_command *command
 {
     flight *f = (flight *)user;
     flight_item *item;
-    float closest;
-    int stage;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
     CHECK(command->node < f->l->info.node_count);
     CHECK(command->level == f->places[command->node].level);
@@ -447,25 +443,14 @@ static void flight_draw_ground(void *user, const terrimp_ground_command *command
         return;
     }
     f->screen_started = 1;
-    CHECK(command->alpha > 0.0f && command->alpha <= 1.0f && command->depth_bias >= 0.0f);
+    CHECK(f->stage == 0);
     CHECK(command->morph >= 0.0f && command->morph <= 1.0f);
-    closest = terrimp_box_distance(&f->places[command->node].box, f->camera.eye);
     item = add_item(f, command->node);
     item->ground = *command;
-    item->is_distant = command->depth_bias > 0.0f;
-    item->is_close = closest < f->desc.fade_end;
-    CHECK(command->alpha >= 1.0f || item->is_close);
-    stage = command->alpha < 1.0f ? 3 : item->is_distant || f->stage == 1 ? 1 : 0;
-    CHECK(stage >= f->stage && (stage != 1 || !item->is_close));
-    f->stage = stage;
-    CHECK(!item->is_distant || !item->is_close);
     /* Ground nodes do not overlap. */
-    CHECK(!(cover_chunks(f, command->node,
-                         command->alpha < 1.0f ? COVER_GROUND : COVER_GROUND | COVER_OPAQUE) &
-            COVER_GROUND));
+    CHECK(!(cover_chunks(f, command->node, COVER_GROUND) & COVER_GROUND));
     f->triangles += count_pattern(f, command->first_index, command->index_count);
     f->ground_count++;
-    f->total_fading += command->alpha < 1.0f;
 }
 
 /* The texture matrix leads the vertices of the mesh to where the capture put them, in its slot. The
@@ -521,7 +506,7 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     CHECK(command->base_vertex == mesh.base_vertex && command->first_index == mesh.first_index);
     CHECK(command->index_count == mesh.index_count);
-    CHECK(command->depth_bias >= 0.0f && command->depth_bias < 8.0f);
+    CHECK(command->alpha >= 0.0f && command->alpha <= 1.0f);
     CHECK(command->part < command->part_count && command->part_count <= FLIGHT_PARTS);
     CHECK(command->part_count == 1u + (uint32_t)parts[1].complete);
     f->triangles += command->index_count / 3u;
@@ -539,15 +524,16 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     for (i = 0; i < f->item_count; i++)
         CHECK(!f->items[i].is_impostor || f->items[i].node != command->node);
     item = add_item(f, command->node);
-    item->is_impostor = item->is_distant = 1;
+    item->is_impostor = 1;
     item->impostor = *command;
     f->wanted_parts += command->part_count;
-    cover_chunks(f, command->node, COVER_IMPOSTOR);
+    cover_chunks(f, command->node, command->alpha < 1.0f ? COVER_FADING : COVER_IMPOSTOR);
+    f->total_fading += command->alpha < 1.0f;
     f->impostor_count++;
     f->total_high += command->level > 0;
 }
 
-/* The floor comes once, after all that is distant and before what fades. */
+/* The floor comes once, after all else. */
 static void flight_draw_floor(void *user, const terrimp_floor_command *command)
 {
     flight *f = (flight *)user;
@@ -558,7 +544,6 @@ static void flight_draw_floor(void *user, const terrimp_floor_command *command)
     CHECK(command->base_vertex == f->l->info.node_count * f->l->info.mesh_vertex_stride);
     CHECK(command->first_index == f->l->info.node_count * f->l->info.mesh_index_stride);
     CHECK(command->first_index + command->index_count == f->l->info.mesh_index_count);
-    CHECK(command->depth_bias >= 0.0f);
     f->floor_drawn = 1;
     f->triangles += command->index_count / 3u;
 }
@@ -612,14 +597,14 @@ static void check_sample(const flight *f, uint32_t x, uint32_t z, double distanc
             if (cx >= f->l->info.chunks_x || cz >= f->l->info.chunks_z)
                 continue;
             cover = f->cover[cz * f->l->info.chunks_x + cx];
-            CHECK(cover & (COVER_OPAQUE | COVER_IMPOSTOR));
-            CHECK((cover & COVER_OPAQUE) || distance > (double)f->desc.fade_start * (1.0 - 1e-5));
-            CHECK(has_impostors(f) || (cover & COVER_OPAQUE));
+            CHECK(cover & (COVER_GROUND | COVER_IMPOSTOR));
+            CHECK((cover & COVER_GROUND) || distance > (double)f->desc.fade_start * (1.0 - 1e-5));
+            CHECK(has_impostors(f) || (cover & COVER_GROUND));
         }
 }
 
-/* Every sample in sight is drawn, by ground that is opaque or by an impostor; up to fade_start by
-   opaque ground; and the clip distances cut none. */
+/* Every sample in sight is drawn, by ground or by an impostor that has all pixels; up to
+   fade_start by ground; and the clip distances cut none. */
 static void check_nothing_in_sight_is_missing(const flight *f, uint32_t step)
 {
     terrimp_frustum frustum;
@@ -645,40 +630,31 @@ static void check_nothing_in_sight_is_missing(const flight *f, uint32_t step)
         }
 }
 
-/* Ground fades with the distance of its unit, which is no farther away than the node itself, and is
-   the node in mode IMPOSTOR. */
-static void check_alpha(const flight *f, const flight_item *item, float closest)
+/* Whether one node is the other, or a part of it, or holds it. */
+static int shares_ground(const flight_place *a, const flight_place *b)
 {
-    float wanted = (f->desc.fade_end - closest) / (f->desc.fade_end - f->desc.fade_start);
-    CHECK(item->ground.alpha >= wanted - 1e-4f);
-    CHECK(f->desc.mode != TERRIMP_MODE_IMPOSTOR || item->ground.alpha <= wanted + 1e-4f);
+    return a->chunk[0] < b->beyond[0] && b->chunk[0] < a->beyond[0] &&
+           a->chunk[1] < b->beyond[1] && b->chunk[1] < a->beyond[1];
 }
 
-/* Impostors are nowhere closer than fade_start, and all that is distant lies behind the fade band,
-   or eight times as deep; ground fades only within the band. */
+/* Impostors are nowhere closer than fade_start. They fade in with the distance of their unit, which
+   is no farther away than the node and is the node in mode IMPOSTOR. */
 static void check_fades(const flight *f)
 {
+    float band = f->desc.fade_end - f->desc.fade_start;
     uint32_t i;
-    float bias = -1.0f;
     for (i = 0; i < f->item_count; i++) {
         const flight_item *item = &f->items[i];
-        const terrimp_box *box = &f->places[item->node].box;
-        float closest = terrimp_box_distance(box, f->camera.eye), own;
-        CHECK(has_impostors(f) || (!item->is_impostor && item->ground.alpha == 1.0f));
-        if (item->is_impostor) {
-            CHECK(closest >= f->desc.fade_start * 0.9999f);
-            own = item->impostor.depth_bias;
-            CHECK(closest * (1.0f + own) >= f->desc.fade_end * 0.9999f || own > 6.99f);
-            CHECK(bias < 0.0f || own == bias); /* what is distant keeps its order */
-            bias = own;
-            CHECK(terrimp_box_farthest(box, f->camera.eye) > 0.0f);
-        } else if (item->ground.alpha < 1.0f) {
-            CHECK(closest >= f->desc.fade_start * 0.9999f);
-            check_alpha(f, item, closest);
-        } else if (item->ground.depth_bias > 0.0f) {
-            CHECK(bias < 0.0f || item->ground.depth_bias == bias);
-            bias = item->ground.depth_bias;
-        }
+        const flight_place *place = &f->places[item->node];
+        float closest = terrimp_box_distance(&place->box, f->camera.eye), wanted;
+        if (!item->is_impostor)
+            continue;
+        wanted = (closest - f->desc.fade_start) / band;
+        CHECK(has_impostors(f) && closest >= f->desc.fade_start * 0.9999f);
+        CHECK(item->impostor.alpha <= 1.0f && (f->stats.waiting > 0 ||
+                                               item->impostor.alpha <= wanted + 1e-4f));
+        CHECK(f->desc.mode != TERRIMP_MODE_IMPOSTOR || wanted > 1.0f ||
+              item->impostor.alpha >= wanted - 1e-4f);
     }
 }
 
@@ -690,43 +666,26 @@ static void check_nothing_is_drawn_twice(const flight *f)
     if (f->stats.waiting > 0)
         return;
     for (chunk = 0; chunk < f->l->info.chunks_x * f->l->info.chunks_z; chunk++)
-        CHECK((f->cover[chunk] & (COVER_OPAQUE | COVER_IMPOSTOR)) !=
-              (COVER_OPAQUE | COVER_IMPOSTOR));
+        CHECK((f->cover[chunk] & (COVER_GROUND | COVER_IMPOSTOR)) !=
+              (COVER_GROUND | COVER_IMPOSTOR));
     for (i = 0; i < f->item_count; i++)
         for (k = i + 1u; k < f->item_count; k++) {
             const flight_place *a = &f->places[f->items[i].node];
             const flight_place *b = &f->places[f->items[k].node];
             if (f->items[i].is_impostor && f->items[k].is_impostor)
-                CHECK(a->chunk[0] >= b->beyond[0] || b->chunk[0] >= a->beyond[0] ||
-                      a->chunk[1] >= b->beyond[1] || b->chunk[1] >= a->beyond[1]);
+                CHECK(!shares_ground(a, b));
         }
 }
 
-/* Opaque ground, the background and fading ground each come from front to back: before the fading
-   ground there is a place where the order may be broken. */
+/* Ground comes from front to back, and so do impostors. */
 static void check_front_to_back(const flight *f)
 {
-    uint32_t first = 0, last = 0, opaque = 0, i, k; /* where the background can begin */
-    while (opaque < f->item_count &&
-           (f->items[opaque].is_impostor || f->items[opaque].ground.alpha >= 1.0f))
-        opaque++;
-    last = opaque;
-    for (i = 0; i < opaque; i++) {
-        if (f->items[i].is_close)
-            first = i + 1u;
-        if (f->items[i].is_distant)
-            last = smaller_u32(last, i);
-    }
+    uint32_t i, k;
     for (i = 0; i < f->item_count; i++)
         for (k = i + 1u; k < f->item_count; k++)
-            if ((i < opaque) == (k < opaque) &&
-                stands_in_front(&f->places[f->items[k].node].box,
-                                &f->places[f->items[i].node].box, f->camera.eye)) {
-                CHECK(i < opaque);
-                first = first > i ? first : i + 1u;
-                last = smaller_u32(last, k);
-            }
-    CHECK(first <= last);
+            CHECK(f->items[i].is_impostor != f->items[k].is_impostor ||
+                  !stands_in_front(&f->places[f->items[k].node].box,
+                                   &f->places[f->items[i].node].box, f->camera.eye));
 }
 
 /* The angle and the parallax of a picture from the present eye, over their limits. */
@@ -835,7 +794,7 @@ static void check_stats(flight *f)
     CHECK(s->shortfall >= 0.0f && s->shortfall <= 1.0f && s->reuse >= 0.0f);
     CHECK(s->waiting == 0 || has_impostors(f));
     CHECK((double)s->texels_used >= slots);
-    CHECK((double)s->texels_used + (double)s->texels_free <= all * (double)f->desc.atlas_count);
+    CHECK((double)s->texels_used + (double)s->texels_free == all * (double)f->desc.atlas_count);
     CHECK(s->z_near >= 0.0f && s->z_near <= s->z_far);
     CHECK(has_impostors(f) || (s->captures == 0 && s->captures_due == 0 && s->texels_used == 0));
     f->total_captures += f->begun_count;
@@ -1592,7 +1551,7 @@ static void cheap_impostors_are_drawn_wherever_they_may_be(void)
         CHECK(rest(f, &camera) < REST_FRAMES);
         for (node = 0; node < land_chunks(&l); node++)
             CHECK(terrimp_box_distance(&f->places[node].box, f->camera.eye) < f->desc.fade_end ||
-                  (f->cover[node] & ~COVER_GROUND) != COVER_OPAQUE);
+                  f->cover[node] != COVER_GROUND);
         CHECK(f->impostor_count > 3 && f->total_high > 3);
         flight_close(f);
     }
@@ -2054,6 +2013,33 @@ static void create_survives_every_failed_allocation(void)
     land_free(&l);
 }
 
+/* Up to 16 atlases of 2^30 texels each. */
+static void texels_of_the_largest_atlases_are_counted(void)
+{
+    land l;
+    uint32_t count;
+    make_hills(&l);
+    if (!land_build(&l))
+        return;
+    for (count = 1; count <= 16u; count += 5u) {
+        terrimp_view_desc d;
+        flight *f = &flight_room;
+        pilot p;
+        memset(&d, 0, sizeof d);
+        memset(&p, 0, sizeof p);
+        d.mode = TERRIMP_MODE_IMPOSTOR;
+        d.atlas_size = 32768;
+        d.atlas_count = count;
+        if (!flight_open(f, &l, &d))
+            break;
+        flight_update(f, pilot_next(&p, &l));
+        CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+        CHECK(f->stats.texels_used + f->stats.texels_free == (uint64_t)count << 30);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
 static void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
@@ -2083,6 +2069,7 @@ static void view_tests(void)
     RUN(two_views_give_the_same_commands);
     RUN(views_keep_to_their_blocks_and_apart);
     RUN(create_survives_every_failed_allocation);
+    RUN(texels_of_the_largest_atlases_are_counted);
 }
 
 #endif

@@ -34,11 +34,10 @@ static const char vertex[] =
     "#version 330 core\n"
     "in vec3 position;\n"
     "uniform mat4 matrix, texture_matrix;\n"
-    "uniform float scale;\n"
     "out vec3 stq;\n"
     "void main() {\n"
     "    stq = (texture_matrix * vec4(position, 1.0)).xyw;\n"
-    "    gl_Position = matrix * vec4(position.xy * scale, position.z, 1.0);\n"
+    "    gl_Position = matrix * vec4(position, 1.0);\n"
     "}\n";
 static const char ground_fragment[] =
     "#version 330 core\n"
@@ -57,12 +56,21 @@ static const char impostor_fragment[] =
     "    colour = vec4(c.rgb / c.a, 1.0);\n"
     "}\n";
 
-static const float identity[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
 /* From -1..1 to 0..1, a little projective, as pictures are. */
 static const float projective[16] = { 0.5f, 0, 0, 0.05f, 0, 0.5f, 0, 0.05f, 0, 0, 1, 0,
                                       0.5f, 0.5f, 0, 1 };
 
 /* ---- One run ------------------------------------------------------------ */
+
+/* Takes a program whose grid covers a part of the target's width and height. */
+static void use(const gl_program *p, float scale)
+{
+    float matrix[16] = { 0 };
+    matrix[0] = matrix[5] = scale;
+    matrix[10] = matrix[15] = 1.0f;
+    glUseProgram(p->id);
+    glUniformMatrix4fv(p->matrix, 1, GL_FALSE, matrix);
+}
 
 static void capture(const bench *b)
 {
@@ -72,8 +80,7 @@ static void capture(const bench *b)
     glScissor(0, 0, SLOT, SLOT);
     glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    glUseProgram(b->ground.id);
-    glUniform1f(b->ground.scale, 0.1f);
+    use(&b->ground, 0.1f);
     glDrawElements(GL_TRIANGLES, 6, GL_UNSIGNED_SHORT, NULL);
     glDisable(GL_SCISSOR_TEST);
 }
@@ -86,8 +93,7 @@ static void draw(const bench *b, const gl_program *p, GLuint texture, const load
     int first = l->first_triangle + (l->triangles == 2 && l->first_triangle == 0 ? i * 2 : 0);
     memcpy(matrix, projective, sizeof matrix);
     matrix[12] += (float)i * 1e-4f;
-    glUseProgram(p->id);
-    glUniform1f(p->scale, l->scale);
+    use(p, l->scale);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, matrix);
     glBindTexture(GL_TEXTURE_2D, texture);
     glBindVertexArray(b->array);
@@ -220,10 +226,6 @@ static const char *open_bench(bench *b)
     b->impostor = gl_program_make(vertex, impostor_fragment);
     if (!b->ground.id || !b->impostor.id)
         return "a shader does not compile";
-    glUseProgram(b->ground.id);
-    glUniformMatrix4fv(b->ground.matrix, 1, GL_FALSE, identity);
-    glUseProgram(b->impostor.id);
-    glUniformMatrix4fv(b->impostor.matrix, 1, GL_FALSE, identity);
     make_grid(b);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LEQUAL);

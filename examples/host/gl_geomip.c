@@ -252,7 +252,6 @@ static terrimp_result draw_all(gl_geomip *g, const gl_program *p)
     glUseProgram(p->id);
     glUniformMatrix4fv(p->matrix, 1, GL_FALSE, g->gl->camera_matrix);
     glUniform3fv(p->eye, 1, g->gl->camera_eye);
-    glUniform1f(p->scale, 1.0f);
     glUniform4fv(p->field, 1, g->gl->field);
     glBindTexture(GL_TEXTURE_2D, g->gl->lightmap);
     for (i = 0; i < g->view.draw_count && result == TERRIMP_OK; i++) {

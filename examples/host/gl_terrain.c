@@ -15,14 +15,13 @@
 #define VERTEX_MAIN                                               \
     "uniform mat4 matrix;\n"                                      \
     "uniform vec3 eye;\n"                                         \
-    "uniform float scale;\n"                                      \
     "uniform vec4 field;\n"                                       \
     "out vec2 uv;\n"                                              \
     "out vec3 place;\n"                                           \
     "void main() {\n"                                             \
     "    place = vec3(position.x, height(), position.z);\n"       \
     "    uv = position.xz * field.xy + field.zw;\n"               \
-    "    gl_Position = matrix * vec4((place - eye) * scale, 1.0);\n" \
+    "    gl_Position = matrix * vec4(place - eye, 1.0);\n"        \
     "}\n"
 
 const char gl_ground_vertex[] = VERTEX_HEAD
@@ -70,17 +69,11 @@ static const char fragment_head[] = FRAGMENT_HEAD, lightmap_alone[] = LIGHTMAP_A
 
 const char gl_ground_fragment[] = FRAGMENT_HEAD LIGHTMAP_ALONE GROUND_MAIN;
 
-/* It is never part of a picture. */
-static const char fading_main[] =
-    "uniform float alpha;\n"
-    "void main() { colour = vec4(shadow(shade(uv, place), place), alpha); }\n";
-
 static const char impostor_vertex[] =
     "#version 330 core\n"
     "in vec3 position;\n"
     "uniform mat4 matrix, texture_matrix;\n"
     "uniform vec3 eye;\n"
-    "uniform float scale;\n"
     "out vec2 uv;\n"
     "out vec3 place;\n"
     "out vec4 strq;\n"
@@ -88,15 +81,17 @@ static const char impostor_vertex[] =
     "    uv = vec2(0.0);\n"
     "    place = position;\n"
     "    strq = texture_matrix * vec4(position, 1.0);\n"
-    "    gl_Position = matrix * vec4((position - eye) * scale, 1.0);\n"
+    "    gl_Position = matrix * vec4(position - eye, 1.0);\n"
     "}\n";
 
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
    them; the division brings them back. Of a picture in two parts each keeps to its own depths. */
 static const char impostor_main[] =
     "uniform sampler2D atlas;\n"
-    "in vec4 strq;\n"
+    "uniform float alpha;\n"
+    "in vec4 strq;\n" GL_THRESHOLD
     "void main() {\n"
+    "    if (alpha < 1.0 && threshold() >= alpha) discard;\n"
     "    vec4 c = textureProj(atlas, strq.xyw);\n"
     "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
     "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
@@ -144,7 +139,6 @@ static gl_program make_program(const char *vertex_source, const char *const *par
     }
     p.matrix = glGetUniformLocation(p.id, "matrix");
     p.eye = glGetUniformLocation(p.id, "eye");
-    p.scale = glGetUniformLocation(p.id, "scale");
     p.field = glGetUniformLocation(p.id, "field");
     p.alpha = glGetUniformLocation(p.id, "alpha");
     p.morph = glGetUniformLocation(p.id, "morph");
@@ -504,10 +498,9 @@ static const char *fill(gl_terrain *g, const gl_terrain_desc *desc,
     if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
     g->ground = make_shaded(g, gl_ground_vertex, ground_main);
-    g->fading = make_shaded(g, gl_ground_vertex, fading_main);
     g->impostor = make_shaded(g, impostor_vertex, impostor_main);
     g->line = gl_program_make(gl_ground_vertex, gl_line_fragment);
-    if (!g->ground.id || !g->fading.id || !g->impostor.id || !g->line.id)
+    if (!g->ground.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
     return glGetError() == GL_NO_ERROR ? NULL : "OpenGL has no memory for the terrain";
 }
@@ -545,7 +538,6 @@ void gl_terrain_close(gl_terrain *g)
     free(g->indices);
     free(g->morph);
     glDeleteProgram(g->ground.id);
-    glDeleteProgram(g->fading.id);
     glDeleteProgram(g->impostor.id);
     glDeleteProgram(g->line.id);
     memset(g, 0, sizeof *g);
@@ -579,7 +571,6 @@ void gl_program_use(const gl_program *p, const float matrix[16], const float eye
     glUseProgram(p->id);
     glUniformMatrix4fv(p->matrix, 1, GL_FALSE, matrix);
     glUniform3fv(p->eye, 1, eye);
-    glUniform1f(p->scale, 1.0f);
     glUniform1f(p->on_screen, (float)on_screen);
 }
 
@@ -587,23 +578,15 @@ void gl_program_use(const gl_program *p, const float matrix[16], const float eye
 static void flush(gl_terrain *g)
 {
     gl_batch *b = &g->batch;
-    const gl_program *p = b->alpha < 1.0f ? &g->fading : &g->ground;
+    const gl_program *p = g->lines ? &g->line : &g->ground;
     if (!b->count)
         return;
-    if (g->lines)
-        p = &g->line;
     glUseProgram(p->id);
     glBindVertexArray(g->ground_pool.array);
     glBindTexture(GL_TEXTURE_2D, g->lightmap);
-    glUniform1f(p->scale, 1.0f + b->depth_bias);
     glUniform3f(p->tint, 0.05f, 0.10f, 0.25f);
-    if (p == &g->fading) {
-        glUniform1f(p->alpha, b->alpha);
-        glEnable(GL_BLEND);
-    }
     glMultiDrawElementsBaseVertex(GL_TRIANGLES, b->counts, GL_UNSIGNED_SHORT, b->offsets,
                                   b->count, b->base_vertices);
-    glDisable(GL_BLEND);
     b->count = 0;
 }
 
@@ -625,7 +608,6 @@ void gl_terrain_turn_to_frame(gl_terrain *g)
     if (g->morphing.id)
         gl_program_use(&g->morphing, g->camera_matrix, g->camera_eye, 1);
     gl_program_use(&g->impostor, g->camera_matrix, g->camera_eye, 1);
-    gl_program_use(&g->fading, g->camera_matrix, g->camera_eye, 1);
     gl_program_use(&g->ground, g->camera_matrix, g->camera_eye, 1);
 }
 
@@ -675,13 +657,11 @@ static const void *index_offset(uint32_t first_index)
 }
 
 /* Draws a slot of the coarse meshes; the program has its own uniforms already. */
-static void draw_mesh(gl_terrain *g, const gl_program *p, GLuint texture, uint32_t slot,
-                      uint32_t index_count, float depth_bias)
+static void draw_mesh(gl_terrain *g, GLuint texture, uint32_t slot, uint32_t index_count)
 {
     const gl_pool *meshes = &g->mesh_pool;
     glBindVertexArray(meshes->array);
     glBindTexture(GL_TEXTURE_2D, texture);
-    glUniform1f(p->scale, 1.0f + depth_bias);
     glDrawElementsBaseVertex(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT,
                              index_offset(slot * meshes->node_indices),
                              (GLint)(slot * meshes->node_vertices));
@@ -695,9 +675,9 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     flush(g);
     glUseProgram(p->id);
     glUniform3f(p->tint, 0.85f, 0.10f, 0.05f);
+    glUniform1f(p->alpha, c->alpha);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
-    draw_mesh(g, p, g->atlas[c->atlas], slot_of(g, &g->mesh_pool, c->node), c->index_count,
-              c->depth_bias);
+    draw_mesh(g, g->atlas[c->atlas], slot_of(g, &g->mesh_pool, c->node), c->index_count);
 }
 
 /* The floor only fills what would else be holes: its outlines would hide those that matter. */
@@ -709,7 +689,7 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     gl_terrain_turn_to_frame(g);
     flush(g);
     glUseProgram(g->ground.id);
-    draw_mesh(g, &g->ground, g->lightmap, g->mesh_pool.slot_count, c->index_count, c->depth_bias);
+    draw_mesh(g, g->lightmap, g->mesh_pool.slot_count, c->index_count);
 }
 
 /* A morphing node is a draw of its own: its factors are uniforms. */
@@ -720,7 +700,6 @@ static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32
     flush(g);
     glUseProgram(g->morphing.id);
     glBindTexture(GL_TEXTURE_2D, g->lightmap);
-    glUniform1f(g->morphing.scale, 1.0f + c->depth_bias);
     glUniform1f(g->morphing.morph, c->morph);
     glUniform4fv(g->morphing.side, 1, c->side);
     glUniform4fv(g->morphing.side_coarse, 1, c->side_coarse);
@@ -745,15 +724,12 @@ static void draw_ground(void *user, const terrimp_ground_command *command)
     if (!g->capturing)
         gl_terrain_turn_to_frame(g);
     slot = slot_of(g, &g->ground_pool, command->node);
-    if (g->morphing.id && !g->capturing && !g->lines && command->alpha >= 1.0f) {
+    if (g->morphing.id && !g->capturing && !g->lines) {
         draw_morphing(g, command, slot);
         return;
     }
-    if (b->count == GL_BATCH || b->alpha != command->alpha
-        || b->depth_bias != command->depth_bias)
+    if (b->count == GL_BATCH)
         flush(g);
-    b->alpha = command->alpha;
-    b->depth_bias = command->depth_bias;
     i = b->count++;
     b->counts[i] = (GLsizei)command->index_count;
     b->offsets[i] = index_offset(command->first_index);
@@ -793,7 +769,6 @@ terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LEQUAL);
     glEnable(GL_CULL_FACE);
-    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
     return TERRIMP_OK;
 }
 

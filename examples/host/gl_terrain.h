@@ -8,9 +8,9 @@
 /* A shader program with the places of its uniforms; -1 where it lacks one. */
 typedef struct gl_program {
     GLuint id;
-    GLint matrix, eye, scale;        /* all: vertices are drawn at eye + (p - eye) * scale */
+    GLint matrix, eye;               /* all: positions are taken relative to the eye */
     GLint field;                     /* ground: world x, z to lightmap coordinates */
-    GLint alpha;                     /* fading ground */
+    GLint alpha;                     /* impostors: the share of the pixels */
     GLint morph, side, side_coarse;  /* morphing ground */
     GLint texture_matrix;            /* impostors */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
@@ -20,13 +20,21 @@ typedef struct gl_program {
 /* Vertices of ground as they are, and morphing ones by the formula of terrimp_geomip_weights. */
 extern const char gl_ground_vertex[], gl_morphing_vertex[];
 
+/* A pixel's threshold, 0..1, for what shows on a share of the pixels. Multiples of the inverse of
+   1.3247, the root of x^3 = x + 1, and of its square: they spread evenly over any small part of
+   the plane. */
+#define GL_THRESHOLD                                                                       \
+    "float threshold() {\n"                                                                \
+    "    return fract(dot(floor(gl_FragCoord.xy), vec2(0.754877666, 0.569840291)));\n"      \
+    "}\n"
+
 /* Opaque ground with no shading but the lightmap at `uv`; and outlines. */
 extern const char gl_ground_fragment[], gl_line_fragment[];
 
 /* Makes a program whose input `position` is at location 0; the id is 0 when it does not compile. */
 gl_program gl_program_make(const char *vertex_source, const char *fragment_source);
 
-/* Uses a program with a matrix for positions relative to the eye, at scale 1. */
+/* Uses a program with a matrix for positions relative to the eye. */
 void gl_program_use(const gl_program *p, const float matrix[16], const float eye[3], int on_screen);
 
 /* That matrix, column-major: of the view only the turn is left. */
@@ -44,7 +52,6 @@ typedef struct gl_batch {
     const void *offsets[GL_BATCH];
     GLint base_vertices[GL_BATCH];
     GLsizei count;
-    float alpha, depth_bias;
 } gl_batch;
 
 struct gl_terrain;
@@ -97,7 +104,7 @@ typedef struct gl_terrain {
     GLsizei atlas_size;
     GLuint atlas[GL_ATLASES], atlas_frame[GL_ATLASES]; /* made when they are first used */
     GLuint atlas_depth;              /* one depth buffer serves all */
-    gl_program ground, fading, morphing, impostor, line;
+    gl_program ground, morphing, impostor, line;
     float camera_matrix[16], camera_eye[3];
     float field[4];                  /* x, z scale and offset of the lightmap coordinates */
     gl_batch batch;

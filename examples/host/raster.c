@@ -73,16 +73,6 @@ static int32_t to_texels(const sampler *from, float coordinate)
     return (int32_t)((texel < from->largest ? texel : from->largest) * 65536.0f);
 }
 
-/* Five bits of alpha are enough for five bits of colour: all three channels in one multiplication,
-   green moved to the upper half. */
-static uint16_t blend(uint16_t below, uint16_t above, uint32_t alpha)
-{
-    uint32_t a = (above | (uint32_t)above << 16) & 0x07e0f81fu;
-    uint32_t b = (below | (uint32_t)below << 16) & 0x07e0f81fu;
-    uint32_t mixed = ((a * alpha + b * (RASTER_OPAQUE - alpha)) >> 5) & 0x07e0f81fu;
-    return (uint16_t)(mixed | mixed >> 16);
-}
-
 static int32_t to_depth(float depth)
 {
     return depth > 0.0f ? depth < (float)DEPTH_LARGEST ? (int32_t)depth : DEPTH_LARGEST : 0;
@@ -94,15 +84,18 @@ typedef struct run {
     int32_t depth, step; /* of 1 / w */
 } run;
 
+/* The thresholds of its pixels start with `at`, a fraction of 2^32, and are so far apart that any
+   few neighbours are spread over the whole range: multiples of the inverse of 1.3247, the root of
+   x^3 = x + 1, along the rows, and of its square along the columns. */
 static void fill_run(const sampler *from, run k, uint16_t *pixel, uint16_t *depth, int count,
-                     int alpha)
+                     int share, uint32_t at)
 {
-    for (; count > 0; count--, pixel++, depth++) {
+    for (; count > 0; count--, pixel++, depth++, at += 3242174889u) {
         uint16_t closeness = (uint16_t)(k.depth >> DEPTH_SHIFT);
-        if (closeness > *depth) {
+        if (closeness > *depth && (int)(at >> 27) < share) {
             uint16_t texel = from->texels[(k.v >> 16 << from->log2_side) + (k.u >> 16)];
             if (texel != RASTER_KEY) {
-                *pixel = alpha < RASTER_OPAQUE ? blend(*pixel, texel, (uint32_t)alpha) : texel;
+                *pixel = texel;
                 *depth = closeness;
             }
         }
@@ -112,7 +105,7 @@ static void fill_run(const sampler *from, run k, uint16_t *pixel, uint16_t *dept
 
 /* Divides at every 16th pixel and at the last one; between them the texture goes straight. */
 static void fill_span(const raster *r, const sampler *from, gradient at, const gradient *dx,
-                      int x, int end, int y, int alpha)
+                      int x, int end, int y, int share)
 {
     int32_t u = to_texels(from, at.s / at.q), v = to_texels(from, at.t / at.q);
     int32_t depth = to_depth(at.depth);
@@ -130,7 +123,8 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
             depth = to_depth(at.depth);
             k.du = (u - k.u) / steps, k.dv = (v - k.v) / steps, k.step = (depth - k.depth) / steps;
         }
-        fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count, alpha);
+        fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count, share,
+                 (uint32_t)x * 3242174889u + (uint32_t)y * 2447445414u);
         x += count;
     }
 }
@@ -217,19 +211,19 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
         at.s = a->s + across * dx.s + down * dy.s;
         at.t = a->t + across * dx.t + down * dy.t;
         at.q = a->q + across * dx.q + down * dy.q;
-        fill_span(r, &from, at, &dx, x, x_end, y, style->alpha);
+        fill_span(r, &from, at, &dx, x, x_end, y, style->share);
     }
 }
 
 /* ---- Vertices ----------------------------------------------------------- */
 
-static raster_corner project(const raster *r, const raster_point *p, float depth_bias)
+static raster_corner project(const raster *r, const raster_point *p)
 {
     float over = 1.0f / p->w, y = p->y * over;
     raster_corner c;
     c.x = (p->x * over * 0.5f + 0.5f) * (float)r->width;
     c.y = ((r->row_0_is_top ? -y : y) * 0.5f + 0.5f) * (float)r->height;
-    c.depth = r->depth_scale * over / (1.0f + depth_bias);
+    c.depth = r->depth_scale * over;
     c.s = p->s * over;
     c.t = p->t * over;
     c.q = p->q * over;
@@ -291,7 +285,7 @@ static void fill_clipped_triangle(const raster *r, const raster_style *style,
         memcpy(polygon, clipped, sizeof polygon);
     }
     for (i = 0; i < count; i++)
-        fan[i] = project(r, &polygon[i], style->depth_bias);
+        fan[i] = project(r, &polygon[i]);
     for (i = 2; i < count; i++)
         fill_triangle(r, style, &fan[0], &fan[i - 1], &fan[i]);
 }
@@ -331,7 +325,7 @@ void raster_draw(raster *r, const raster_style *style, const float *xyz, const u
         r->points[i] = transform(r, style->texture_matrix, xyz + i * 3);
         r->sides[i] = (uint8_t)find_sides(r, style, &r->points[i]);
         if (!r->sides[i])
-            r->corners[i] = project(r, &r->points[i], style->depth_bias);
+            r->corners[i] = project(r, &r->points[i]);
     }
     for (i = 0; i + 2 < index_count; i += 3) {
         const uint16_t *k = indices + i;

@@ -10,7 +10,7 @@
 
 enum {
     RASTER_KEY = 0xf81f,   /* the colour that stands for "nothing here" in textures */
-    RASTER_OPAQUE = 32,    /* alpha is 0..32 */
+    RASTER_ALL = 32,       /* thresholds of the dither pattern are 0..31 */
     RASTER_LEVELS = 12,
     RASTER_VERTICES = 4225 /* of one draw at most: 65 x 65 */
 };
@@ -51,8 +51,8 @@ typedef struct raster_style {
     const raster_texture *texture;
     const float *texture_matrix; /* [16] world (x, y, z, 1) to (s, t, r, q): the texel at
                                     (s / q, t / q) in 0..1 */
-    float depth_bias;            /* deeper: as if drawn at eye + (p - eye) * (1 + depth_bias) */
-    int alpha;                   /* 0..RASTER_OPAQUE */
+    int share;                   /* of RASTER_ALL: only pixels whose threshold of a dither pattern
+                                    lies below it */
     int within_depth;            /* nonzero: only what lies where r / q is within 0..1 */
 } raster_style;
 

@@ -35,10 +35,9 @@ static const char tree_vertex[] =
 
 static const char tree_fragment[] =
     "#version 330 core\n"
-    "uniform float alpha;\n"
     "in vec3 shade;\n"
     "out vec4 colour;\n"
-    "void main() { colour = vec4(shade, alpha); }\n";
+    "void main() { colour = vec4(shade, 1.0); }\n";
 
 /* ---- Planting ----------------------------------------------------------- */
 
@@ -185,7 +184,6 @@ static void use(const trees *t, const float matrix[16], const float eye[3])
 {
     gl_program_use(&t->program, matrix, eye, 1);
     glBindVertexArray(t->array);
-    glUniform1f(t->program.alpha, 1.0f);
     glUniform4f(t->clip, -1e30f, -1e30f, 1e30f, 1e30f);
 }
 
@@ -264,7 +262,6 @@ static void draw_ground(void *user, const terrimp_ground_command *command)
         trees_draw *draw = &t->draws[t->draw_count++];
         draw->node = command->node;
         draw->level = command->level;
-        draw->alpha = command->alpha;
     }
 }
 
@@ -298,10 +295,6 @@ void trees_end(trees *t)
     use(t, t->gl->camera_matrix, t->gl->camera_eye);
     for (i = 0; i < t->draw_count; i++) {
         const trees_draw *draw = &t->draws[i];
-        glUniform1f(t->program.alpha, draw->alpha);
-        if (draw->alpha < 1.0f)
-            glEnable(GL_BLEND);
         draw_node(t, draw->node, draw->level, 0);
-        glDisable(GL_BLEND);
     }
 }

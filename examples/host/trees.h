@@ -9,7 +9,6 @@
 /* Ground on the screen, as its command said. */
 typedef struct trees_draw {
     uint32_t node, level;
-    float alpha;
 } trees_draw;
 
 typedef struct trees {
