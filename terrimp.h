@@ -48,12 +48,14 @@
        >>atlas        first-fit decreasing height packing; an atlas whose slots come and go
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
+       >>visibility   the horizon: which nodes are hidden behind others
        >>view         the per-frame decision, the schedule, the draw commands
        >>sorted       terrain in exact painter's order, for machines without a depth buffer
        >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>visible-sets what a horizon is made of
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
        >>placement    which pictures to prepare so that no view costs too much
    The implementation has the same sections in the same order, tagged impl-. Each uses only
@@ -1083,6 +1085,102 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
                                                 const void *block, size_t bytes, void *memory,
                                                 size_t memory_bytes, terrimp_terrain **terrain);
 
+/* ==== Visibility ========================================================= >>visibility */
+
+/* What lies behind a ridge need be neither drawn nor captured. A horizon says which nodes do, from
+   bounds of the heights within each node, the walls: bytes that are built with the terrain (room
+   Visible sets) and lie beside it. It says so only of nodes of which nothing can be seen.
+
+   How to use it: begin with the camera, then ask for nodes, closest first for speed; or cull the
+   draws of terrimp_geomip_select. */
+
+/* Bytes of the walls of a tree: 0.18 a sample with chunks of 64 quads, 0.2 with 32, 0.3 with 16.
+   0 when tree is NULL. */
+TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree);
+
+enum {
+    TERRIMP_HORIZON_BINS = 64,   /* directions in each of four quarters of the circle */
+    TERRIMP_HORIZON_STEPS = 288, /* distances at which walls are looked at */
+    TERRIMP_HORIZON_KEPT = 4     /* heights of the horizon that a bin remembers */
+};
+
+/* Private: a column or row of samples that sight lines cross. */
+typedef struct terrimp_horizon_step {
+    float distance, inverse; /* [quads] from the eye, along the axis */
+    uint32_t line;           /* its column or row */
+    uint16_t node;           /* the same among the nodes of the walls' level */
+    uint8_t row;             /* among the walls of the node */
+    uint8_t level;           /* 0: the samples themselves; else 1 + the level of the walls */
+} terrimp_horizon_step;
+
+/* Private: the horizon in one direction, as far as it was needed. */
+typedef struct terrimp_horizon_bin {
+    float distance[TERRIMP_HORIZON_KEPT]; /* where it rises, the latest at `top` */
+    float slope[TERRIMP_HORIZON_KEPT];    /* to what */
+    uint16_t reached, top;                /* steps that were looked at */
+} terrimp_horizon_bin;
+
+/* The horizon of one eye, about 28 KiB. Begin fills it in; it holds for the life of the tree. */
+typedef struct terrimp_horizon {
+    const terrimp_quadtree *tree;
+    const unsigned char *walls;
+    uint32_t quads, cells, stride; /* private, all: how the walls are kept */
+    int blind;         /* nothing can be said to be hidden */
+    float eye;         /* [wu] its height */
+    uint32_t quad[2];  /* that it is over */
+    float within[2];   /* its place in that, 0..1 */
+    float error, low;  /* by which walls may lie below what is kept: per distance, [wu] */
+    float spread;      /* [wu] longest horizontal distance of a point at distance 1 on an axis */
+    float rounding;    /* [quads] of places */
+    float clipped[2];  /* [quads] to where z_near may clip ground */
+    float steepest;    /* slope of sight lines under which ground is clipped away */
+    float inverse[TERRIMP_HORIZON_BINS + 1];
+    uint32_t step_count[4];
+    terrimp_horizon_step steps[4][TERRIMP_HORIZON_STEPS]; /* towards +x, -x, +z, -z */
+    terrimp_horizon_bin bins[4][TERRIMP_HORIZON_BINS];
+} terrimp_horizon;
+
+/* Begins the horizon of a camera. Ground that z_near clips hides nothing. An eye below the ground
+   or beside the terrain has no horizon: nothing is hidden from it, and that is no error.
+
+   tree     built
+   walls    [terrimp_walls_bytes] built, aligned to 4
+   error    how far below its samples the ground in front may be drawn, over the distance to it:
+            0 for full resolution; a picture that is up to n pixels off its place: n / K
+            [Limits: 0..0.5]
+   low      [wu] the same whatever the distance [Limits: >= 0]
+   Errors   E_NULL; E_ALIGN; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
+   Cost     about 3 us */
+TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
+                                                 const terrimp_quadtree *tree, const void *walls,
+                                                 const terrimp_camera *camera, float error,
+                                                 float low);
+
+/* Whether all of a node lies below the horizon, as far as it lies between the left and the right
+   side of the camera's view. Sure when it says so; what it does not find is up to a tenth of what
+   is hidden in mountains, most of it in hills seen from above.
+
+   horizon    begun; it goes on to be filled in
+   node       [Limits: < node_count]
+   raised     [wu] how far above its samples the node is drawn
+   returns    nonzero: hidden; 0 also for bad arguments
+   Cost       0.5 to 2 us, the first ones more
+   Source     Lloyd and Egbert 2002, Horizon occlusion culling for real-time rendering of
+              hierarchical terrain: the idea; bounds, walls and their proof are our own */
+TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, float raised);
+
+/* Takes the draws out of a selection that lie below the horizon; what is left keeps its order.
+   Begins the horizon by itself, with the error of these draws.
+
+   view       from terrimp_geomip_select with the same camera: draws, draw_count and triangle_count
+              are changed
+   Errors     those of begin: the draws are unchanged
+   Cost       25 to 60 us in mountains */
+TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls,
+                                                const terrimp_camera *camera,
+                                                terrimp_geomip_view *view);
+
 /* ==== View =============================================================== >>view */
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
@@ -1479,6 +1577,32 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
 
+/* The max_triangles of the next frame from what this one took, for a host that measures: at most a
+   twentieth less or a fiftieth more, nothing within 3 % of the target. Where time rises with
+   triangles, and no faster than they do, it comes to rest without swinging; a pause of the machine
+   costs one step. No clock inside.
+
+   triangles   of this frame
+   ms          that the frame took; target_ms  that it should take */
+TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms);
+
+/* Makes the next coarser level of a map or of a page of it: every second texel, mixed with those
+   around it, 1 2 1 along each axis. Texels on the border are mixed along the border alone and so
+   need no neighbouring page: pages whose borders are the same texels keep that. Filter the whole
+   map and cut it then, which is better still, or filter its pages one by one; not a page together
+   with a border of its own invention.
+
+   texels      [height][width][channels]
+   width, height  [Limits: odd, 3..65537]
+   channels    [Limits: 1..4]
+   wrap        nonzero: the map repeats, its last column and row being the first ones
+   out         [height / 2 + 1][width / 2 + 1][channels]; must not overlap texels
+   Cost        O(width * height)
+   Source      Finch and Bishop 1998, section 4.8, asks for equal edges */
+TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
+                                                uint32_t height, uint32_t channels, int wrap,
+                                                uint8_t *out);
+
 /* The world position of a vertex [wu]. No pointer may be null. */
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
                                          const terrimp_sorted_vertex *vertex, float position[3]);
@@ -1816,6 +1940,27 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
+
+/* ==== Visible sets ======================================================= >>visible-sets */
+
+/* --- walls: what a horizon is made of --- */
+
+/* Finds the walls of one node, from the samples at level 0, else from its children's: those have to
+   be built before. Different nodes of a level may be built at the same time by several threads.
+
+   walls      [terrimp_walls_bytes] out: the part of this node; aligned to 4
+   Errors     E_NULL; E_ALIGN; E_RANGE
+   Cost       about 20 us at level 0 with chunks of 64 quads, 3 us above */
+TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree, uint32_t node,
+                                                    void *walls);
+
+/* Finds those of all nodes that a rectangle of samples belongs to, after an edit or at first.
+
+   samples    NULL: all
+   Errors     E_NULL; E_ALIGN; E_RANGE for a rectangle that is empty or outside
+   Cost       that of build_node for each: 0.05 ms for a chunk and all nodes above it */
+TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
+                                               const terrimp_rect *samples, void *walls);
 
 /* ==== Layer builder ====================================================== >>layer-builder */
 
@@ -6348,6 +6493,617 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
     return TERRIMP_OK;
 }
 
+/* ==== Visibility ========================================================= >>impl-visibility */
+/* Based on: Lloyd and Egbert 2002, the horizon of a hierarchical terrain; the rest is our own.
+
+   Sight lines are told by the axis that they follow most, so that their direction is t = -1..1, how
+   far they go to the side with each quad that they go ahead, and distances count along that axis,
+   in quads. Then a column x = i is crossed at one distance f by all sight lines of a quarter, and
+   the slope (h - eye) / f of what stands there is linear in its height: over the directions of a
+   bin [t1, t2] the ground is nowhere lower than the lowest of its heights at both ends and of the
+   samples between them. So what a bin sees of a column is exact, and the horizon is raised by no
+   more than is really there. Farther away the heights of 2^k samples of every 2^k-th column are
+   kept by their minimum: the walls.
+
+   A point is hidden when the slope of its sight line is below that of a wall before it: the line
+   starts above the ground, is below it at the wall, and so has gone through it. What it went
+   through is drawn, or is hidden itself by what it went through first. That takes three things: the
+   eye is above the ground; nothing of this is clipped by z_near (walls within its reach do not
+   count, and no line counts that is below the ground where it becomes visible); and walls hold for
+   what is drawn. Drawn triangles of a coarser level run along the edges of finer ones, so above a
+   quad they are between the lowest and the highest of its four samples, give or take their
+   error. */
+
+#define TERRIMPI_WALL_TOPS 4u      /* along a node's side: squares of which the height is kept */
+#define TERRIMPI_WALL_FINE 20.0f   /* quads of distance for each quad between walls */
+#define TERRIMPI_HORIZON_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
+#define TERRIMPI_HORIZON_NONE -1e30f
+#define TERRIMPI_HORIZON_ALL 1e30f
+#define TERRIMPI_HORIZON_CLOSEST 0.25f /* [quads] of a wall: closer by, places are too rough */
+
+/* How the walls of a node are kept: the height of code 0 and the step of the codes, as floats;
+   [2 axes][cells lines][cells] codes of lowest heights, rounded down; and those of the highest of
+   each of 4 x 4 squares, rounded up. */
+typedef struct terrimpi_wall_form {
+    uint32_t quads, cells; /* of a cell at level 0, a power of two; along a side of a node */
+    uint32_t stride;       /* [bytes] from node to node */
+} terrimpi_wall_form;
+
+static terrimpi_wall_form terrimpi_wall_form_of(const terrimp_quadtree *tree)
+{
+    terrimpi_wall_form form;
+    form.quads = tree->chunk_quads % 4u == 0 ? 4u : 2u;
+    form.cells = tree->chunk_quads / form.quads;
+    form.stride = 2u * (uint32_t)sizeof(float) + 2u * form.cells * form.cells +
+                  TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS;
+    form.stride = (form.stride + 3u) / 4u * 4u;
+    return form;
+}
+
+TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
+{
+    size_t bytes;
+    int ok = 1;
+    if (!tree)
+        return 0;
+    bytes = terrimpi_mul(tree->node_count, terrimpi_wall_form_of(tree).stride, &ok);
+    return ok ? bytes : 0;
+}
+
+static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const void *walls)
+{
+    TERRIMPI_REFUSE(!tree || !walls || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
+    return TERRIMP_OK;
+}
+
+/* The codes of a node's walls and the two floats before them. */
+static const unsigned char *terrimpi_wall_codes(const unsigned char *walls, uint32_t stride,
+                                                uint32_t node, float scale[2])
+{
+    const unsigned char *at = walls + (size_t)node * stride;
+    memcpy(scale, at, 2u * sizeof(float));
+    return at + 2u * sizeof(float);
+}
+
+/* ---- walls as an eye sees them ---- */
+
+/* The last column, or row. */
+static uint32_t terrimpi_horizon_last(const terrimp_quadtree *tree, uint32_t axis)
+{
+    return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
+}
+
+/* The sample where line `line` of an axis crosses line `other` of the other one. */
+static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
+                                     uint32_t other)
+{
+    return axis == 0 ? terrimpi_sample(&h->tree->field, line, other)
+                     : terrimpi_sample(&h->tree->field, other, line);
+}
+
+/* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
+static float terrimpi_horizon_ground(const terrimp_horizon *h, uint32_t axis, uint32_t line,
+                                     uint32_t i, float from, uint32_t j, float to)
+{
+    float a = terrimpi_horizon_sample(h, axis, line, i);
+    float b = terrimpi_horizon_sample(h, axis, line, i + 1u);
+    float lowest = a + (b - a) * from;
+    for (; i < j; i++) {
+        lowest = terrimpi_min(lowest, b);
+        a = b;
+        b = terrimpi_horizon_sample(h, axis, line, i + 2u);
+    }
+    return terrimpi_min(lowest, a + (b - a) * to);
+}
+
+/* The same from walls, of the cells that quads i to j are in. */
+static float terrimpi_horizon_walls(const terrimp_horizon *h, uint32_t axis,
+                                    const terrimp_horizon_step *step, uint32_t i, uint32_t j)
+{
+    uint32_t level = step->level - 1u, shift = level + h->quads / 2u; /* quads are 2 or 4 */
+    uint32_t cell = i >> shift, last = j >> shift, node = cell / h->cells;
+    uint32_t row = (axis * h->cells + step->row) * h->cells;
+    float lowest = TERRIMPI_HORIZON_ALL, scale[2];
+    while (cell <= last) {
+        uint32_t end = terrimpi_min_u32(last + 1u, (node + 1u) * h->cells), lowest_code = 255u;
+        const unsigned char *codes = terrimpi_wall_codes(
+            h->walls, h->stride,
+            h->tree->level_first[level] +
+                (axis == 0 ? node * h->tree->level_x[level] + step->node
+                           : step->node * h->tree->level_x[level] + node), scale);
+        for (; cell < end; cell++)
+            lowest_code = terrimpi_min_u32(lowest_code, codes[row + cell - node * h->cells]);
+        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)lowest_code);
+        node++;
+    }
+    return lowest;
+}
+
+/* What integer a float is at or above. */
+static int32_t terrimpi_horizon_floor(float value)
+{
+    int32_t whole = (int32_t)value;
+    return (float)whole > value ? whole - 1 : whole;
+}
+
+/* The least slope of what stands at a step, over the directions of a bin; NONE when a part of them
+   has left the terrain. */
+static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, uint32_t bin,
+                                    const terrimp_horizon_step *step)
+{
+    const float width = 2.0f / (float)TERRIMP_HORIZON_BINS;
+    uint32_t axis = quarter / 2u, other = 1u - axis, i, j;
+    uint32_t quads = terrimpi_horizon_last(h->tree, other);
+    float t = (float)bin * width - 1.0f, lowest, slope;
+    float from = h->within[other] + t * step->distance - h->rounding;
+    float to = h->within[other] + (t + width) * step->distance + h->rounding;
+    int32_t first = terrimpi_horizon_floor(from), last = terrimpi_horizon_floor(to);
+    i = h->quad[other] + (uint32_t)first; /* below 0 it becomes large */
+    j = h->quad[other] + (uint32_t)last;
+    if (i >= quads || j >= quads)
+        return TERRIMPI_HORIZON_NONE;
+    lowest = step->level == 0 ? terrimpi_horizon_ground(h, axis, step->line, i, from - (float)first,
+                                                        j, to - (float)last)
+                              : terrimpi_horizon_walls(h, axis, step, i, j);
+    slope = (lowest - h->low - h->eye) * step->inverse;
+    return slope - h->error * (h->spread + terrimpi_abs(slope)) -
+           h->rounding * step->inverse * terrimpi_abs(slope);
+}
+
+/* Whether the horizon of a bin, made of what stands before a distance, is above what has a height
+   ([wu] over the eye) at that distance or another one. It is looked for step by step and no farther
+   than it takes. */
+static int terrimpi_horizon_above(terrimp_horizon *h, uint32_t quarter, uint32_t bin,
+                                  float distance, float height, float at)
+{
+    terrimp_horizon_bin *b = &h->bins[quarter][bin];
+    uint32_t k;
+    for (k = 0; k < TERRIMP_HORIZON_KEPT; k++) {
+        uint32_t entry = (b->top - k) % TERRIMP_HORIZON_KEPT; /* a power of two */
+        if (b->distance[entry] < distance) {
+            if (b->slope[entry] * at > height)
+                return 1;
+            break;
+        }
+    }
+    while (b->reached < h->step_count[quarter] &&
+           h->steps[quarter][b->reached].distance < distance) {
+        const terrimp_horizon_step *step = &h->steps[quarter][b->reached++];
+        float slope = terrimpi_horizon_slope(h, quarter, bin, step);
+        if (slope == TERRIMPI_HORIZON_NONE)
+            b->reached = (uint16_t)h->step_count[quarter]; /* it does not come back */
+        if (slope <= b->slope[b->top])
+            continue;
+        b->top = (uint16_t)((b->top + 1u) % TERRIMP_HORIZON_KEPT);
+        b->slope[b->top] = slope;
+        b->distance[b->top] = step->distance;
+        if (slope * at > height)
+            return 1;
+    }
+    return 0;
+}
+
+/* ---- what is below it ---- */
+
+/* A box as a quarter sees it: [quads] ahead of the eye, [quads] to the side, [wu] above it. */
+typedef struct terrimpi_horizon_box {
+    float ahead[2], beside[2];
+    float height;
+} terrimpi_horizon_box;
+
+/* The distances at which the directions of a bin may enter and leave a box. */
+static void terrimpi_horizon_span(const terrimp_horizon *h, const terrimpi_horizon_box *box,
+                                  uint32_t bin, float *enter, float *leave)
+{
+    const float *inverse = &h->inverse[bin];
+    const int right = bin >= TERRIMP_HORIZON_BINS / 2; /* of the middle: t >= 0 */
+    *enter = box->ahead[0];
+    *leave = box->ahead[1];
+    if (box->beside[0] > 0.0f)
+        *enter = terrimpi_max(*enter, box->beside[0] * inverse[1]);
+    if (box->beside[1] < 0.0f)
+        *enter = terrimpi_max(*enter, box->beside[1] * inverse[0]);
+    if (right && box->beside[1] > 0.0f)
+        *leave = terrimpi_min(*leave, box->beside[1] * inverse[0]);
+    if (!right && box->beside[0] < 0.0f)
+        *leave = terrimpi_min(*leave, box->beside[0] * inverse[1]);
+    *enter = terrimpi_max(*enter - 2.0f * h->rounding, 0.0f);
+    *leave = terrimpi_max(*leave + 2.0f * h->rounding, *enter);
+}
+
+/* Whether the part of a box that one quarter sees is hidden. */
+static int terrimpi_horizon_hides_quarter(terrimp_horizon *h, uint32_t quarter,
+                                          const terrimpi_horizon_box *box)
+{
+    const float half = (float)TERRIMP_HORIZON_BINS * 0.5f;
+    float a0 = box->ahead[0], a1 = box->ahead[1], o0 = box->beside[0], o1 = box->beside[1];
+    float t0, t1, enter, leave, at;
+    uint32_t bin, last;
+    if (a1 <= 0.0f || o0 > a1 || o1 < -a1)
+        return 1;
+    t0 = o0 >= 0.0f ? o0 / a1 : a0 > 0.0f ? o0 / a0 : -1.0f;
+    t1 = o1 <= 0.0f ? o1 / a1 : a0 > 0.0f ? o1 / a0 : 1.0f;
+    if (t0 > 1.0f || t1 < -1.0f)
+        return 1;
+    bin = (uint32_t)terrimpi_clamp((t0 + 1.0f) * half - 0.01f, 0.0f, 2.0f * half - 1.0f);
+    last = (uint32_t)terrimpi_clamp((t1 + 1.0f) * half + 0.01f, 0.0f, 2.0f * half - 1.0f);
+    for (; bin <= last; bin++) {
+        terrimpi_horizon_span(h, box, bin, &enter, &leave);
+        at = box->height > 0.0f ? enter : leave; /* where its slope is largest */
+        if (!(enter > 0.0f) || !terrimpi_horizon_above(h, quarter, bin, enter, box->height, at))
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether all four quarters hide a box: from corner (x, z), with sides of `size` [quads], up to a
+   height [wu] over the eye. */
+static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, float size,
+                                      float height)
+{
+    terrimpi_horizon_box box;
+    float low[2], high[2];
+    uint32_t quarter;
+    low[0] = x;
+    low[1] = z;
+    high[0] = x + size;
+    high[1] = z + size;
+    box.height = height;
+    if (low[0] <= 0.0f && high[0] >= 0.0f && low[1] <= 0.0f && high[1] >= 0.0f)
+        return 0;
+    for (quarter = 0; quarter < 4u; quarter++) {
+        uint32_t axis = quarter / 2u, other = 1u - axis;
+        int back = quarter & 1;
+        box.ahead[0] = terrimpi_max(back ? -high[axis] : low[axis], 0.0f);
+        box.ahead[1] = back ? -low[axis] : high[axis];
+        box.beside[0] = low[other];
+        box.beside[1] = high[other];
+        if (!terrimpi_horizon_hides_quarter(h, quarter, &box))
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether sight lines to a node whose lowest height is given could run below the ground where
+   z_near lets them begin. */
+static int terrimpi_horizon_under(const terrimp_horizon *h, float x, float z, float size, float low)
+{
+    float beside_x = terrimpi_max(terrimpi_max(x, -x - size), 0.0f);
+    float beside_z = terrimpi_max(terrimpi_max(z, -z - size), 0.0f);
+    return low - h->eye <= h->steepest * terrimpi_max(beside_x, beside_z);
+}
+
+/* First the node as a whole; then, since its summit is seldom at its border, its squares, from the
+   one that is closest to the eye. */
+static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
+{
+    const terrimp_geomip_node *heights = &h->tree->nodes[node->number];
+    uint32_t quads = h->tree->chunk_quads << node->level, k, first;
+    float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
+    float x = (float)((int32_t)(node->x * quads) - (int32_t)h->quad[0]) - h->within[0];
+    float z = (float)((int32_t)(node->z * quads) - (int32_t)h->quad[1]) - h->within[1];
+    const unsigned char *tops;
+    if (h->blind || terrimpi_horizon_under(h, x, z, size, heights->low - raised))
+        return 0;
+    if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->eye))
+        return 1;
+    tops = terrimpi_wall_codes(h->walls, h->stride, node->number, scale) +
+           2u * h->cells * h->cells;
+    first = (x + 0.5f * size < 0.0f ? 3u : 0u) | (z + 0.5f * size < 0.0f ? 12u : 0u);
+    for (k = 0; k < TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
+        uint32_t i = k ^ first;
+        float top = scale[0] + scale[1] * (float)tops[i] + raised + h->low;
+        if (!terrimpi_horizon_hides_box(h, x + part * (float)(i % TERRIMPI_WALL_TOPS),
+                                        z + part * (float)(i / TERRIMPI_WALL_TOPS), part,
+                                        terrimpi_min(top, heights->high) - h->eye))
+            return 0;
+    }
+    return 1;
+}
+
+TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, float raised)
+{
+    terrimp_node n;
+    if (!horizon || !horizon->tree || node >= horizon->tree->node_count || !(raised >= 0.0f))
+        return 0;
+    n = terrimpi_tree_node(horizon->tree, node);
+    return terrimpi_horizon_hides_node(horizon, &n, raised);
+}
+
+/* ---- the beginning of a frame ---- */
+
+/* Lays out the steps of a quarter: every column at first, then every 2^k-th, as far apart as the
+   distance allows. */
+static void terrimpi_horizon_lay_steps(terrimp_horizon *h, uint32_t quarter)
+{
+    uint32_t axis = quarter / 2u, back = quarter & 1u, count = 0, apart = 1, level = 0;
+    uint32_t end = terrimpi_horizon_last(h->tree, axis); /* behind the last one there is nothing */
+    uint32_t line = h->quad[axis] + (back ? 0u : 1u);
+    while (line < end && count < TERRIMP_HORIZON_STEPS) {
+        terrimp_horizon_step *step = &h->steps[quarter][count];
+        float ahead = (float)(back ? h->quad[axis] - line : line - h->quad[axis]);
+        step->distance = back ? ahead + h->within[axis] : ahead - h->within[axis];
+        step->line = line;
+        step->level = (uint8_t)level;
+        if (level > 0) {
+            uint32_t row = line / apart;
+            step->node = (uint16_t)(row / h->cells);
+            step->row = (uint8_t)(row % h->cells);
+        }
+        if (step->distance >= TERRIMPI_HORIZON_CLOSEST && step->distance >= h->clipped[axis]) {
+            step->inverse = 1.0f / step->distance;
+            count++;
+        }
+        while ((float)(2u * apart) * TERRIMPI_WALL_FINE <= step->distance &&
+               line % (2u * apart) == 0 && level < h->tree->level_count) {
+            apart *= 2u;
+            level += apart >= h->quads ? 1u : 0u;
+        }
+        line = back ? line - apart : line + apart; /* from 0 it becomes large */
+    }
+    h->step_count[quarter] = count;
+}
+
+/* On which side of what the camera sees a direction is: bits for behind, left and right. */
+static int terrimpi_horizon_beside(const float to[2], const float ahead[2], const float cone[2])
+{
+    float forward = to[0] * ahead[0] + to[1] * ahead[1];
+    float side = to[1] * ahead[0] - to[0] * ahead[1];
+    if (forward <= 0.0f)
+        return 1;
+    return (side < cone[0] * forward ? 2 : 0) | (side > cone[1] * forward ? 4 : 0);
+}
+
+/* Empties the bins of a quarter. Those that the camera does not see hide everything. */
+static void terrimpi_horizon_empty(terrimp_horizon *h, uint32_t quarter, const float ahead[2],
+                                   const float cone[2])
+{
+    uint32_t axis = quarter / 2u, bin, k, seen = 0;
+    int before = 0, behind;
+    for (bin = 0; bin <= TERRIMP_HORIZON_BINS; bin++, before = behind) {
+        terrimp_horizon_bin *b = &h->bins[quarter][bin == 0 ? 0 : bin - 1u];
+        float to[2];
+        to[axis] = quarter & 1u ? -1.0f : 1.0f;
+        to[1u - axis] = (float)bin * (2.0f / (float)TERRIMP_HORIZON_BINS) - 1.0f;
+        behind = cone[0] < cone[1] ? terrimpi_horizon_beside(to, ahead, cone) : 0;
+        if (bin == 0)
+            continue;
+        memset(b, 0, sizeof *b);
+        for (k = 0; k < TERRIMP_HORIZON_KEPT; k++)
+            b->slope[k] = before & behind ? TERRIMPI_HORIZON_ALL : TERRIMPI_HORIZON_NONE;
+        seen |= !(before & behind);
+    }
+    h->step_count[quarter] = 0;
+    if (seen)
+        terrimpi_horizon_lay_steps(h, quarter);
+}
+
+/* The directions between which a camera sees ground, as tangents to the side of `ahead`; none
+   (cone[0] = cone[1]) when it sees round about. */
+static void terrimpi_horizon_cone(const terrimp_horizon *h, const terrimp_capture *c,
+                                  float ahead[2], float cone[2])
+{
+    const terrimp_heightfield *field = &h->tree->field;
+    uint32_t i;
+    ahead[0] = c->forward[0] / field->spacing_x;
+    ahead[1] = c->forward[2] / field->spacing_z;
+    cone[0] = 1e9f;
+    cone[1] = -1e9f;
+    for (i = 0; i < 4u; i++) {
+        float x = i & 1u ? c->tan_right : c->tan_left, y = i & 2u ? c->tan_up : c->tan_down;
+        float to_x = (c->forward[0] + x * c->right[0] + y * c->up[0]) / field->spacing_x;
+        float to_z = (c->forward[2] + x * c->right[2] + y * c->up[2]) / field->spacing_z;
+        float forward = to_x * ahead[0] + to_z * ahead[1];
+        float side = to_z * ahead[0] - to_x * ahead[1];
+        if (forward <= 1e-3f * terrimpi_abs(side) || !(forward > 0.0f)) {
+            cone[0] = cone[1] = 0.0f;
+            return;
+        }
+        cone[0] = terrimpi_min(cone[0], side / forward);
+        cone[1] = terrimpi_max(cone[1], side / forward);
+    }
+    cone[0] -= 1e-4f * (1.0f + terrimpi_abs(cone[0]));
+    cone[1] += 1e-4f * (1.0f + terrimpi_abs(cone[1]));
+}
+
+/* The highest that the ground can be within so many quads of the eye: of each quad the highest
+   corner or, if that is less, how far its triangles rise there. */
+static float terrimpi_horizon_ground_top(const terrimp_horizon *h, const float reach[2])
+{
+    uint32_t from[2], to[2], k, i, j;
+    float top = TERRIMPI_HORIZON_NONE;
+    for (k = 0; k < 2u; k++) {
+        uint32_t last = terrimpi_horizon_last(h->tree, k) - 1u;
+        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + h->rounding, 1e6f));
+        if (wide > TERRIMPI_HORIZON_CLIPPED)
+            return TERRIMPI_HORIZON_ALL;
+        from[k] = h->quad[k] - terrimpi_min_u32(wide, h->quad[k]);
+        to[k] = terrimpi_min_u32(h->quad[k] + wide, last);
+    }
+    for (j = from[1]; j <= to[1]; j++)
+        for (i = from[0]; i <= to[0]; i++) {
+            float a = terrimpi_sample(&h->tree->field, i, j), u, v, low, high;
+            float b = terrimpi_sample(&h->tree->field, i + 1u, j);
+            float c = terrimpi_sample(&h->tree->field, i, j + 1u);
+            float d = terrimpi_sample(&h->tree->field, i + 1u, j + 1u);
+            u = (float)((int32_t)h->quad[0] - (int32_t)i) + h->within[0];
+            v = (float)((int32_t)h->quad[1] - (int32_t)j) + h->within[1];
+            low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
+                  terrimpi_abs(d - b) * reach[1];
+            high = a + (d - c) * u + (c - a) * v + terrimpi_abs(d - c) * reach[0] +
+                   terrimpi_abs(c - a) * reach[1];
+            high = terrimpi_min(terrimpi_max(low, high),
+                                terrimpi_max(terrimpi_max(a, b), terrimpi_max(c, d)));
+            top = terrimpi_max(top, high);
+        }
+    return top;
+}
+
+/* Finds which sight lines may begin below the ground, for what is closer than z_near is not drawn.
+   Returns 0 when they all may. */
+static int terrimpi_horizon_clip(terrimp_horizon *h, const terrimp_capture *c)
+{
+    const terrimp_heightfield *field = &h->tree->field;
+    float x = terrimpi_max(c->tan_right, -c->tan_left), y = terrimpi_max(c->tan_up, -c->tan_down);
+    float reach = c->z_near * TERRIMP_SQRTF(1.0f + x * x + y * y), top = h->low, quads[2];
+    h->clipped[0] = quads[0] = reach / field->spacing_x;
+    h->clipped[1] = quads[1] = reach / field->spacing_z;
+    h->steepest = TERRIMPI_HORIZON_NONE;
+    if (h->tree->nodes[h->tree->node_count - 1u].high < h->eye - 2.0f * reach)
+        return 1;
+    top += terrimpi_horizon_ground_top(h, quads) + 2.0f * h->error * reach;
+    if (top >= h->eye)
+        return 0;
+    if (top > h->eye - reach)
+        h->steepest = (top - h->eye) * terrimpi_min(field->spacing_x, field->spacing_z) / reach;
+    return 1;
+}
+
+/* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
+static int terrimpi_horizon_stand(terrimp_horizon *h, const float eye[3])
+{
+    const terrimp_heightfield *field = &h->tree->field;
+    float x, z, right, down;
+    if (!terrimpi_locate(field, eye[0], eye[2], &h->quad[0], &h->quad[1]))
+        return 0;
+    x = terrimpi_line(field->origin_x, field->spacing_x, h->quad[0]);
+    z = terrimpi_line(field->origin_z, field->spacing_z, h->quad[1]);
+    right = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
+    down = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
+    h->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
+    h->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
+    x = terrimpi_max(terrimpi_abs(field->origin_x), terrimpi_abs(right)) / field->spacing_x;
+    z = terrimpi_max(terrimpi_abs(field->origin_z), terrimpi_abs(down)) / field->spacing_z;
+    h->rounding = 1e-6f + 1.2e-7f * terrimpi_max(x, z); /* two roundings of a float */
+    return 1;
+}
+
+static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *tree,
+                                   const void *walls, const terrimp_camera *camera, float error,
+                                   float low)
+{
+    const terrimpi_wall_form form = terrimpi_wall_form_of(tree);
+    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    terrimp_capture capture;
+    float ahead[2], cone[2], ground;
+    uint32_t i;
+    h->tree = tree;
+    h->walls = (const unsigned char *)walls;
+    h->quads = form.quads;
+    h->cells = form.cells;
+    h->stride = form.stride;
+    h->eye = camera->eye[1];
+    h->error = error;
+    h->low = low + 4e-7f * (terrimpi_abs(h->eye) +
+                            terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
+    h->spread = TERRIMP_SQRTF(tree->field.spacing_x * tree->field.spacing_x +
+                              tree->field.spacing_z * tree->field.spacing_z);
+    terrimpi_camera_capture(camera, &capture);
+    h->blind = !terrimpi_horizon_stand(h, camera->eye) ||
+               terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) !=
+                   TERRIMP_OK || h->eye <= ground + h->low || !terrimpi_horizon_clip(h, &capture);
+    if (h->blind)
+        return;
+    for (i = 0; i <= TERRIMP_HORIZON_BINS; i++)
+        h->inverse[i] = 1.0f / ((float)i * (2.0f / (float)TERRIMP_HORIZON_BINS) - 1.0f);
+    terrimpi_horizon_cone(h, &capture, ahead, cone);
+    for (i = 0; i < 4u; i++)
+        terrimpi_horizon_empty(h, i, ahead, cone);
+}
+
+TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
+                                                 const terrimp_quadtree *tree, const void *walls,
+                                                 const terrimp_camera *camera, float error,
+                                                 float low)
+{
+    terrimp_camera c;
+    TERRIMPI_REFUSE(!horizon, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_REFUSE(!terrimpi_finite2(error, low), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_within(error, 0.0f, 0.5f) || !(low >= 0.0f), TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    terrimpi_horizon_begin(horizon, tree, walls, &c, error, low);
+    return TERRIMP_OK;
+}
+
+/* ---- a selection without what is hidden ---- */
+
+/* How far a draw may be off its samples: it is drawn as its node, as the parent when it morphs, and
+   at coarse borders as those beside it. At the far edges drawn triangles may cross those of the
+   samples: there it can be anything between the heights of the node. */
+static float terrimpi_draw_error(const terrimp_quadtree *tree, const terrimp_geomip_draw *draw,
+                                 int morphs)
+{
+    terrimp_node n = draw->node, beyond;
+    const terrimp_geomip_node *nodes = tree->nodes;
+    uint32_t ends[2], part = (1u << n.level) - 1u;
+    float error = nodes[n.number].error;
+    int side;
+    ends[0] = (n.x + 1u) * (tree->chunk_quads << n.level) >= tree->field.width - 1u;
+    ends[1] = (n.z + 1u) * (tree->chunk_quads << n.level) >= tree->field.depth - 1u;
+    if ((ends[0] && ((tree->field.width - 1u) & part)) ||
+        (ends[1] && ((tree->field.depth - 1u) & part)))
+        return nodes[n.number].high - nodes[n.number].low;
+    if (morphs && n.level + 1u < tree->level_count)
+        error = terrimpi_max(error, nodes[terrimpi_tree_parent(tree, &n).number].error);
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        if (!(draw->pattern >> side & 1u) || !terrimpi_tree_beyond(tree, &n, side, &beyond))
+            continue;
+        beyond = terrimpi_tree_parent(tree, &beyond);
+        error = terrimpi_max(error, nodes[beyond.number].error);
+        if (morphs && beyond.level + 1u < tree->level_count)
+            error = terrimpi_max(error, nodes[terrimpi_tree_parent(tree, &beyond).number].error);
+    }
+    return error;
+}
+
+/* The two bounds that a horizon wants: close to the eye one of height, else one over distance. */
+static void terrimpi_draws_error(const terrimp_quadtree *tree, const terrimp_geomip_view *view,
+                                 const float eye[3], float *error, float *low)
+{
+    float side = (float)tree->chunk_quads *
+                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
+    uint32_t i;
+    *error = *low = 0.0f;
+    for (i = 0; i < view->draw_count; i++) {
+        float off = terrimpi_draw_error(tree, &view->draws[i], view->morph_ratio > 1.0f), distance;
+        terrimp_box box;
+        terrimpi_mip_box(tree, &view->draws[i].node, &box);
+        distance = terrimp_box_distance(&box, eye);
+        if (distance < side)
+            *low = terrimpi_max(*low, off);
+        else
+            *error = terrimpi_max(*error, off / distance);
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls,
+                                                const terrimp_camera *camera,
+                                                terrimp_geomip_view *view)
+{
+    terrimp_camera c;
+    float error, low;
+    uint32_t i, count = 0;
+    TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    terrimpi_draws_error(tree, view, c.eye, &error, &low);
+    terrimpi_horizon_begin(horizon, tree, walls, &c, terrimpi_min(error, 0.5f), low);
+    horizon->blind |= error > 0.5f;
+    for (i = 0; i < view->draw_count; i++) {
+        const terrimp_geomip_draw *draw = &view->draws[i];
+        float off = terrimpi_draw_error(tree, draw, view->morph_ratio > 1.0f);
+        if (terrimpi_horizon_hides_node(horizon, &draw->node, off))
+            view->triangle_count -= terrimpi_mip_triangles(tree->chunk_quads, draw->pattern);
+        else
+            view->draws[count++] = *draw;
+    }
+    view->draw_count = count;
+    return TERRIMP_OK;
+}
+
 /* ==== View =============================================================== >>impl-view */
 /* Based on: Hess 2010, chapters 3, 4 and 6; de Boer 2000, section 2.2; DESIGN of this header: one
    currency, pixels, and one cost model.
@@ -8966,6 +9722,56 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 #else
     position[1] = vertex->height;
 #endif
+}
+
+TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
+{
+    float ratio = target_ms / ms, next;
+    if (!terrimpi_finite2(ms, target_ms) || !(ms > 0.0f) || !(target_ms > 0.0f) ||
+        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+        return triangles;
+    next = (float)triangles * terrimpi_clamp(ratio, 0.95f, 1.02f);
+    if (next >= 4294967040.0f)
+        return triangles;
+    return ratio > 1.0f ? triangles + (uint32_t)(next - (float)triangles) + 1u : (uint32_t)next;
+}
+
+/* The three texels of a line that are mixed at one of them: before, itself, after. At an end where
+   nothing is repeated it is but itself. */
+static void terrimpi_sorted_taps(uint32_t at, uint32_t count, int wrap, uint32_t taps[3])
+{
+    int inside = at > 0 && at + 1u < count;
+    taps[0] = inside ? at - 1u : wrap ? count - 2u : at;
+    taps[1] = at;
+    taps[2] = inside ? at + 1u : wrap ? 1u : at;
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
+                                                uint32_t height, uint32_t channels, int wrap,
+                                                uint8_t *out)
+{
+    static const uint32_t weights[3] = { 1, 2, 1 };
+    uint32_t x, y, c, i, k, across[3], down[3];
+    TERRIMPI_REFUSE(!texels || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 3, TERRIMP_MAX_DIM) || width % 2u == 0 ||
+                    !terrimpi_within_u32(height, 3, TERRIMP_MAX_DIM) || height % 2u == 0 ||
+                    !terrimpi_within_u32(channels, 1, 4), TERRIMP_E_RANGE);
+    for (y = 0; y < height; y += 2u) {
+        terrimpi_sorted_taps(y, height, wrap, down);
+        for (x = 0; x < width; x += 2u) {
+            terrimpi_sorted_taps(x, width, wrap, across);
+            for (c = 0; c < channels; c++) {
+                uint32_t sum = 8;
+                for (i = 0; i < 9u; i++) {
+                    k = i / 3u;
+                    sum += weights[k] * weights[i % 3u] *
+                           texels[((size_t)down[k] * width + across[i % 3u]) * channels + c];
+                }
+                *out++ = (uint8_t)(sum / 16u);
+            }
+        }
+    }
+    return TERRIMP_OK;
 }
 
 /* ---- the frame ---- */
@@ -12271,6 +13077,192 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.checksum = terrimpi_bake_hash(&bake, terrain);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    return TERRIMP_OK;
+}
+
+/* ==== Visible sets ======================================================= >>impl-visible-sets */
+
+/* ---- walls ---- */
+
+/* A node whose walls are built. */
+typedef struct terrimpi_wall_site {
+    const terrimp_quadtree *tree;
+    const unsigned char *walls;
+    terrimpi_wall_form form;
+    terrimp_node node;
+} terrimpi_wall_site;
+
+/* The lowest sample of a cell of a line, at level 0. */
+static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
+                                  uint32_t cell)
+{
+    const terrimp_heightfield *field = &s->tree->field;
+    uint32_t quads = s->tree->chunk_quads, k;
+    uint32_t line = (axis == 0 ? s->node.x : s->node.z) * quads + row * s->form.quads;
+    uint32_t from = (axis == 0 ? s->node.z : s->node.x) * quads + cell * s->form.quads;
+    uint32_t last = (axis == 0 ? field->depth : field->width) - 1u;
+    float lowest = TERRIMPI_FLOAT_MAX;
+    line = terrimpi_min_u32(line, (axis == 0 ? field->width : field->depth) - 1u);
+    for (k = 0; k <= s->form.quads; k++) {
+        uint32_t at = terrimpi_min_u32(from + k, last);
+        lowest = terrimpi_min(lowest, axis == 0 ? terrimpi_sample(field, line, at)
+                                                : terrimpi_sample(field, at, line));
+    }
+    return lowest;
+}
+
+/* The lowest height of a cell: above level 0 of the two that its children have there; FLOAT_MAX
+   where there is no child. */
+static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
+                               uint32_t cell)
+{
+    const uint32_t cells = s->form.cells;
+    uint32_t line = 2u * row, k;
+    float lowest = TERRIMPI_FLOAT_MAX;
+    if (s->node.level == 0)
+        return terrimpi_wall_lowest(s, axis, row, cell);
+    for (k = 2u * cell; k <= 2u * cell + 1u; k++) {
+        uint32_t x = 2u * s->node.x + (axis == 0 ? line : k) / cells;
+        uint32_t z = 2u * s->node.z + (axis == 0 ? k : line) / cells;
+        const unsigned char *codes;
+        float scale[2];
+        if (!terrimpi_tree_has(s->tree, s->node.level - 1u, x, z))
+            continue;
+        codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
+                                        s->tree, s->node.level - 1u, x, z).number, scale);
+        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)codes[(axis * cells +
+                                              line % cells) * cells + k % cells]);
+    }
+    return lowest;
+}
+
+/* The highest sample of one of the 4 x 4 squares of a node at level 0. */
+static float terrimpi_wall_highest(const terrimpi_wall_site *s, uint32_t x, uint32_t z)
+{
+    const terrimp_heightfield *field = &s->tree->field;
+    uint32_t quads = s->tree->chunk_quads, i, j;
+    uint32_t i0 = s->node.x * quads + x * quads / TERRIMPI_WALL_TOPS;
+    uint32_t j0 = s->node.z * quads + z * quads / TERRIMPI_WALL_TOPS;
+    uint32_t size = (quads + TERRIMPI_WALL_TOPS - 1u) / TERRIMPI_WALL_TOPS + 1u;
+    float highest = -TERRIMPI_FLOAT_MAX;
+    for (j = j0; j < j0 + size; j++)
+        for (i = i0; i < i0 + size; i++)
+            highest = terrimpi_max(highest,
+                                   terrimpi_sample(field, terrimpi_min_u32(i, field->width - 1u),
+                                                   terrimpi_min_u32(j, field->depth - 1u)));
+    return highest;
+}
+
+/* The highest height of a square; -FLOAT_MAX where there is no child. */
+static float terrimpi_wall_top(const terrimpi_wall_site *s, uint32_t square)
+{
+    uint32_t x = square % TERRIMPI_WALL_TOPS, z = square / TERRIMPI_WALL_TOPS, k;
+    uint32_t child_x = 2u * s->node.x + x / 2u, child_z = 2u * s->node.z + z / 2u;
+    const unsigned char *codes;
+    float scale[2];
+    uint8_t highest = 0;
+    if (s->node.level == 0)
+        return terrimpi_wall_highest(s, x, z);
+    if (!terrimpi_tree_has(s->tree, s->node.level - 1u, child_x, child_z))
+        return -TERRIMPI_FLOAT_MAX;
+    codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
+                                    s->tree, s->node.level - 1u, child_x, child_z).number, scale) +
+            2u * s->form.cells * s->form.cells;
+    for (k = 0; k < 4u; k++) {
+        uint32_t i = (x % 2u) * 2u + k % 2u, j = (z % 2u) * 2u + k / 2u;
+        if (codes[j * TERRIMPI_WALL_TOPS + i] > highest)
+            highest = codes[j * TERRIMPI_WALL_TOPS + i];
+    }
+    return scale[0] + scale[1] * (float)highest;
+}
+
+/* Code k of a node as a height: first the walls, then the squares. */
+static float terrimpi_wall_value(const terrimpi_wall_site *s, uint32_t k)
+{
+    const uint32_t cells = s->form.cells;
+    if (k >= 2u * cells * cells)
+        return terrimpi_wall_top(s, k - 2u * cells * cells);
+    return terrimpi_wall_low(s, k / (cells * cells), k / cells % cells, k % cells);
+}
+
+/* The code of a height, rounded down for walls and up for squares. */
+static unsigned char terrimpi_wall_code(float value, const float scale[2], int up)
+{
+    float steps = scale[1] > 0.0f ? (value - scale[0]) / scale[1] : 0.0f;
+    uint32_t code = (uint32_t)terrimpi_clamp(steps, 0.0f, 255.0f);
+    while (!up && code > 0 && scale[0] + scale[1] * (float)code > value)
+        code--;
+    while (up && code < 255u && scale[0] + scale[1] * (float)code < value)
+        code++;
+    return (unsigned char)code;
+}
+
+static void terrimpi_wall_build(const terrimp_quadtree *tree, terrimp_node node,
+                                unsigned char *walls)
+{
+    terrimpi_wall_site s;
+    unsigned char *codes;
+    uint32_t k, count;
+    float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, scale[2];
+    s.tree = tree;
+    s.walls = walls;
+    s.form = terrimpi_wall_form_of(tree);
+    s.node = node;
+    codes = walls + (size_t)node.number * s.form.stride;
+    memset(codes, 0, s.form.stride);
+    count = 2u * s.form.cells * s.form.cells;
+    for (k = 0; k < count + TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
+        float value = terrimpi_wall_value(&s, k);
+        if (k < count)
+            low = terrimpi_min(low, value);
+        if (terrimpi_abs(value) < TERRIMPI_FLOAT_MAX)
+            high = terrimpi_max(high, value);
+    }
+    scale[0] = low;
+    scale[1] = high * (1.0f / 255.0f) - low * (1.0f / 255.0f);
+    memcpy(codes, scale, sizeof scale);
+    codes += sizeof scale;
+    for (k = 0; k < count + TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++)
+        codes[k] = terrimpi_wall_code(terrimpi_wall_value(&s, k), scale, k >= count);
+}
+
+TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree, uint32_t node,
+                                                    void *walls)
+{
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
+    terrimpi_wall_build(tree, terrimpi_tree_node(tree, node), (unsigned char *)walls);
+    return TERRIMP_OK;
+}
+
+/* The nodes of a level that samples from `at` on belong to: those at a border belong to both. */
+static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uint32_t nodes,
+                                uint32_t range[2])
+{
+    range[0] = terrimpi_min_u32((at > 0 ? at - 1u : 0u) / quads, nodes - 1u);
+    range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
+}
+
+TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
+                                               const terrimp_rect *samples, void *walls)
+{
+    terrimp_rect all;
+    uint32_t level, x[2], z[2], i, j;
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    all = samples ? *samples : terrimpi_rect(0, 0, tree->field.width, tree->field.depth);
+    TERRIMPI_REFUSE(all.width < 1u || all.height < 1u || all.x >= tree->field.width ||
+                    all.y >= tree->field.depth, TERRIMP_E_RANGE);
+    all.width = terrimpi_min_u32(all.width, tree->field.width - all.x);
+    all.height = terrimpi_min_u32(all.height, tree->field.depth - all.y);
+    for (level = 0; level < tree->level_count; level++) {
+        uint32_t quads = tree->chunk_quads << level;
+        terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
+        terrimpi_wall_range(all.y, all.height, quads, tree->level_z[level], z);
+        for (j = z[0]; j <= z[1]; j++)
+            for (i = x[0]; i <= x[1]; i++)
+                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
+                                    (unsigned char *)walls);
+    }
     return TERRIMP_OK;
 }
 

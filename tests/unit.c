@@ -26,6 +26,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_impostor.h"
 #include "unit_atlas.h"
 #include "unit_terrain.h"
+#include "unit_visibility.h"
 #include "unit_view.h"
 #include "unit_sorted.h"
 #include "unit_bake.h"
@@ -50,6 +51,7 @@ int main(int argc, char **argv)
     atlas_tests();
     terrain_tests();
     bake_tests();
+    visibility_tests();
     view_tests();
     sorted_tests();
     bad_input_tests();
