@@ -138,19 +138,10 @@
        Heightfields of 2 x 2 to 65537 x 65537 samples, any width and depth. No caves, no overhangs.
        A picture shows a hidden slope with the ridge before it smeared over it once the eye has
        moved; max_angle_rad bounds how far that goes, and pictures in two parts spare the worst.
-<<<<<<< HEAD
-       What moves on the terrain belongs into the host's own draws, not into captures. Ground fades
-       by blending, and only whole nodes are sorted: in the fade band a hidden slope can shine
-       faintly through the ridge of its own node. Ground and impostors of one place are alike to
-       within the tolerances, not to the bit: where a node changes from one to the other beyond the
-       fade band, that much can be seen to change. From beside and from under the terrain no floor
-       is drawn, since it would show where the sky is.
-=======
        What moves on the terrain belongs into the host's own draws, not into captures. Ground and
        impostors of one place are alike to within the tolerances, not to the bit: where a node
        changes from one to the other beyond the fade band, that much can be seen to change. From
-       beside the terrain no floor is drawn, since it would show below the border.
->>>>>>> main
+       beside and from under the terrain no floor is drawn, since it would show where the sky is.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -1300,18 +1291,11 @@ typedef struct terrimp_impostor_command {
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
-<<<<<<< HEAD
    below all of the terrain, with walls up to its outer border, without a gap. It comes after the
    impostors and shows only where none of them does: a slope that was hidden when its picture was
    made. Its pixels are terrain in truth too: no holes are left. (An eye beside the terrain, or
-   under the ground, could see it where the sky is: there it is not drawn.) Vertices, indices, depth
-   bias: as for impostors. */
-=======
-   below all of the terrain and has no gap. It comes after the impostors and shows only where none
-   of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
-   terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
-   border: there it is not drawn.) Vertices and indices as for impostors. */
->>>>>>> main
+   under the ground, could see it where the sky is: there it is not drawn.) Vertices and indices as
+   for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
@@ -12393,8 +12377,8 @@ static int terrimpi_segment_of(const terrimpi_patch *p, const terrimp_mesh *mesh
     to = along_x ? v[next].x : v[next].z;
     s->a = from < to ? i : next; /* the loop runs the other way on the far two sides */
     s->b = from < to ? next : i;
-    s->from = terrimpi_tile_place(terrimpi_min_u32(from, to), p->level, span);
-    s->to = terrimpi_tile_place(terrimpi_max_u32(from, to), p->level, span);
+    s->from = terrimpi_lattice(terrimpi_min_u32(from, to), p->level, span);
+    s->to = terrimpi_lattice(terrimpi_max_u32(from, to), p->level, span);
     return 1;
 }
 
@@ -12402,7 +12386,6 @@ static int terrimpi_segment_of(const terrimpi_patch *p, const terrimp_mesh *mesh
 static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
                                  float *line)
 {
-<<<<<<< HEAD
     uint32_t i, span = terrimpi_along_x(side) ? p->span_x : p->span_z;
     terrimpi_segment s;
     for (i = 0; i < mesh->border_vertex_count; i++) {
@@ -12410,25 +12393,6 @@ static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *me
         if (terrimpi_segment_of(p, mesh, side, i, &s))
             terrimpi_take_away(line, s.from, s.to + (s.to == span), (float)s.from, v[s.a].height,
                                (v[s.b].height - v[s.a].height) / (float)(s.to - s.from));
-=======
-    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
-    uint32_t i, n = mesh->border_vertex_count, span = along_x ? p->span_x : p->span_z;
-    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
-    for (i = 0; i < n; i++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = mesh->vertices + (i + 1u) % n;
-        uint32_t a_at = along_x ? a->x : a->z, b_at = along_x ? b->x : b->z, from, to;
-        if ((along_x ? a->z : a->x) != at || (along_x ? b->z : b->x) != at)
-            continue;
-        if (a_at > b_at) { /* the loop runs the other way on the far two sides */
-            const terrimp_mesh_vertex *swap = a;
-            a = b;
-            b = swap;
-        }
-        from = terrimpi_lattice(terrimpi_min_u32(a_at, b_at), p->level, span);
-        to = terrimpi_lattice(terrimpi_max_u32(a_at, b_at), p->level, span);
-        terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
-                           (b->height - a->height) / (float)(to - from));
->>>>>>> main
     }
 }
 
@@ -12697,7 +12661,7 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
         *height = terrimpi_min(*height, terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
         lift[i] = 0.0f;
     }
-    for (side = 0; side < (int)TERRIMP_BORDER_COUNT; side++) {
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t span = terrimpi_read_border(t, p, side, build->row);
         terrimpi_ground_tops(build, span, terrimpi_tops_level(t, p));
         terrimpi_take_border(p, mesh, side, build->tops);
