@@ -5926,12 +5926,12 @@ static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *
         indices[i] = (uint16_t)(indices[i] + ground);
 }
 
-/* Where a lower skirt ends that hangs from border vertex i: a quarter of the node's heights below it,
-   D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex beside it
-   would end below that. So the line of feet is below every sample, and no neighbour leaves a gap
-   under it: ground is drawn through samples, and no mesh's border is below them
+/* Where a lower skirt ends that hangs from border vertex i: a quarter of the node's heights below
+   it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
+   beside it would end below that. So the line of feet is below every sample, and no neighbour leaves
+   a gap under it: ground is drawn through samples, and no mesh's border is below them
    (terrimpi_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
-   there. When neither vertex is within D of L, both feet are at most D below their vertices, and
+   there. When neither vertex is within D of L or beside one, both feet hang by D, and
    their line <= s + e - D <= s - e; else both are at L <= s.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
@@ -12357,7 +12357,8 @@ static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x
         row[first + i] -= start + (float)i * slope;
 }
 
-/* A segment of the loop, in rising order, and the samples of the border that it begins and ends at. */
+/* A segment of the loop, in rising order, and the samples of the border that it begins and ends
+   at. */
 typedef struct terrimpi_segment {
     uint32_t a, b, from, to;
 } terrimpi_segment;
