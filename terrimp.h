@@ -1563,6 +1563,32 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
 
+/* The max_triangles of the next frame from what this one took, for a host that measures: at most a
+   twentieth less or a fiftieth more, nothing within 3 % of the target. Where time rises with
+   triangles, and no faster than they do, it comes to rest without swinging; a pause of the machine
+   costs one step. No clock inside.
+
+   triangles   of this frame
+   ms          that the frame took; target_ms  that it should take */
+TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms);
+
+/* Makes the next coarser level of a map or of a page of it: every second texel, mixed with those
+   around it, 1 2 1 along each axis. Texels on the border are mixed along the border alone and so
+   need no neighbouring page: pages whose borders are the same texels keep that. Filter the whole
+   map and cut it then, which is better still, or filter its pages one by one; not a page together
+   with a border of its own invention.
+
+   texels      [height][width][channels]
+   width, height  [Limits: odd, 3..65537]
+   channels    [Limits: 1..4]
+   wrap        nonzero: the map repeats, its last column and row being the first ones
+   out         [height / 2 + 1][width / 2 + 1][channels]; must not overlap texels
+   Cost        O(width * height)
+   Source      Finch and Bishop 1998, section 4.8, asks for equal edges */
+TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
+                                                uint32_t height, uint32_t channels, int wrap,
+                                                uint8_t *out);
+
 /* The world position of a vertex [wu]. No pointer may be null. */
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
                                          const terrimp_sorted_vertex *vertex, float position[3]);
@@ -9898,6 +9924,56 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 #else
     position[1] = vertex->height;
 #endif
+}
+
+TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
+{
+    float ratio = target_ms / ms, next;
+    if (!terrimpi_finite2(ms, target_ms) || !(ms > 0.0f) || !(target_ms > 0.0f) ||
+        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+        return triangles;
+    next = (float)triangles * terrimpi_clamp(ratio, 0.95f, 1.02f);
+    if (next >= 4294967040.0f)
+        return triangles;
+    return ratio > 1.0f ? triangles + (uint32_t)(next - (float)triangles) + 1u : (uint32_t)next;
+}
+
+/* The three texels of a line that are mixed at one of them: before, itself, after. At an end where
+   nothing is repeated it is but itself. */
+static void terrimpi_sorted_taps(uint32_t at, uint32_t count, int wrap, uint32_t taps[3])
+{
+    int inside = at > 0 && at + 1u < count;
+    taps[0] = inside ? at - 1u : wrap ? count - 2u : at;
+    taps[1] = at;
+    taps[2] = inside ? at + 1u : wrap ? 1u : at;
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
+                                                uint32_t height, uint32_t channels, int wrap,
+                                                uint8_t *out)
+{
+    static const uint32_t weights[3] = { 1, 2, 1 };
+    uint32_t x, y, c, i, k, across[3], down[3];
+    TERRIMPI_REFUSE(!texels || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 3, TERRIMP_MAX_DIM) || width % 2u == 0 ||
+                    !terrimpi_within_u32(height, 3, TERRIMP_MAX_DIM) || height % 2u == 0 ||
+                    !terrimpi_within_u32(channels, 1, 4), TERRIMP_E_RANGE);
+    for (y = 0; y < height; y += 2u) {
+        terrimpi_sorted_taps(y, height, wrap, down);
+        for (x = 0; x < width; x += 2u) {
+            terrimpi_sorted_taps(x, width, wrap, across);
+            for (c = 0; c < channels; c++) {
+                uint32_t sum = 8;
+                for (i = 0; i < 9u; i++) {
+                    k = i / 3u;
+                    sum += weights[k] * weights[i % 3u] *
+                           texels[((size_t)down[k] * width + across[i % 3u]) * channels + c];
+                }
+                *out++ = (uint8_t)(sum / 16u);
+            }
+        }
+    }
+    return TERRIMP_OK;
 }
 
 /* ---- the frame ---- */
