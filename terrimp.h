@@ -7013,6 +7013,8 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
     }
     view->draw_count = count;
     return TERRIMP_OK;
+}
+
 /* ==== Capture ============================================================ >>impl-capture */
 /* Based on: Hess 2010, sections 3.3, 3.4, 6.2 and 6.5.
 
