@@ -725,6 +725,18 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   const terrimp_rect *slot, uint32_t atlas_width,
                                                   uint32_t atlas_height, float matrix[16]);
 
+/* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of a
+   capture's picture, to the place that is seen there, relative to an eye, times a factor.
+
+   eye             [3] [wu] of the frame: results are exact close to it, wherever the origin is
+   matrix          [16] out, column-major
+   Errors          E_RANGE when the slot is empty or leaves the atlas
+   Source          Hess 2010, section 6.3 */
+TERRIMP_API terrimp_result terrimp_place_matrix(const terrimp_capture *capture,
+                                                const terrimp_rect *slot, uint32_t atlas_width,
+                                                uint32_t atlas_height, const float eye[3],
+                                                float matrix[16]);
+
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
    xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
@@ -1243,6 +1255,8 @@ typedef struct terrimp_view_desc {
                                would show a ridge smeared over the slope behind it is */
     int no_spreading;       /* nonzero: a picture is renewed when it is due; else some frames before
                                or after that, so that the load of frames is even */
+    int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
+                               can have the terrain's own depth instead of the coarse mesh's */
     terrimp_costs costs;
 } terrimp_view_desc;
 
@@ -1292,6 +1306,10 @@ typedef struct terrimp_impostor_command {
     float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
                              by a dither pattern: its ground shows on the others */
     float texture_matrix[16];
+    float place_matrix[16]; /* with exact_depth: takes (s / q, t / q, d, 1), d the depth that the
+                             picture has there, 0..1, to the place relative to the frame's eye,
+                             times a factor. For a host that keeps the depth of its atlases and
+                             writes that place's own: see terrimp_place_matrix. Else 0 */
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
@@ -4557,16 +4575,62 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     }
 }
 
+static int terrimpi_slot_in_atlas(const terrimp_rect *slot, uint32_t width, uint32_t height)
+{
+    return slot->width >= 1u && slot->height >= 1u && slot->x <= width &&
+           slot->width <= width - slot->x && slot->y <= height && slot->height <= height - slot->y;
+}
+
 TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture,
                                                   const terrimp_rect *slot, uint32_t atlas_width,
                                                   uint32_t atlas_height, float matrix[16])
 {
     TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(slot->width < 1u || slot->height < 1u || atlas_width < 1u ||
-                    atlas_height < 1u || slot->x > atlas_width ||
-                    slot->width > atlas_width - slot->x || slot->y > atlas_height ||
-                    slot->height > atlas_height - slot->y, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_slot_in_atlas(slot, atlas_width, atlas_height), TERRIMP_E_RANGE);
     terrimpi_texture_matrix(capture, slot, atlas_width, atlas_height, matrix);
+    return TERRIMP_OK;
+}
+
+/* A place at the distance z along forward is z (forward + x right + y up) from the capture's eye,
+   with tangents x and y that grow with s and t; and 1 / z grows with the depth, from 1 / z_near to
+   1 / z_far. So (place, 1) / z is linear in all three. */
+static void terrimpi_place_matrix(const terrimp_capture *c, const terrimp_rect *slot,
+                                  uint32_t atlas_width, uint32_t atlas_height, float matrix[16])
+{
+    float across = (c->tan_right - c->tan_left) / (float)slot->width;
+    float upward = (c->tan_up - c->tan_down) / (float)slot->height;
+    float x = c->tan_left - across * (float)slot->x, y = c->tan_down - upward * (float)slot->y;
+    int i;
+    for (i = 0; i < 3; i++) {
+        matrix[i] = c->right[i] * across * (float)atlas_width;
+        matrix[4 + i] = c->up[i] * upward * (float)atlas_height;
+        matrix[8 + i] = 0.0f;
+        matrix[12 + i] = c->forward[i] + c->right[i] * x + c->up[i] * y;
+    }
+    matrix[3] = matrix[7] = 0.0f;
+    matrix[11] = 1.0f / c->z_far - 1.0f / c->z_near;
+    matrix[15] = 1.0f / c->z_near;
+}
+
+/* From places relative to one eye to those relative to another. */
+static void terrimpi_place_from(float matrix[16], const float from[3], const float eye[3])
+{
+    int i, column;
+    for (column = 0; column < 16; column += 4)
+        for (i = 0; i < 3; i++)
+            matrix[column + i] += matrix[column + 3] * (from[i] - eye[i]);
+}
+
+TERRIMP_API terrimp_result terrimp_place_matrix(const terrimp_capture *capture,
+                                                const terrimp_rect *slot, uint32_t atlas_width,
+                                                uint32_t atlas_height, const float eye[3],
+                                                float matrix[16])
+{
+    TERRIMPI_REFUSE(!capture || !slot || !eye || !matrix, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_slot_in_atlas(slot, atlas_width, atlas_height), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    terrimpi_place_matrix(capture, slot, atlas_width, atlas_height, matrix);
+    terrimpi_place_from(matrix, capture->eye, eye);
     return TERRIMP_OK;
 }
 
@@ -7564,9 +7628,15 @@ typedef struct terrimpi_picture {
     float texture_matrix[TERRIMPI_CAPTURE_LAYERS][16];
 } terrimpi_picture;
 
+/* From the atlas to places relative to the eye of the capture, for exact depth. */
+typedef struct terrimpi_places {
+    float matrix[TERRIMPI_CAPTURE_LAYERS][16];
+} terrimpi_places;
+
 typedef struct terrimpi_cache {
     terrimp_live_atlas *atlases; /* [atlas_count] */
     terrimpi_picture *pictures;  /* [capacity] */
+    terrimpi_places *places;     /* [capacity] NULL: not wanted */
     uint16_t *of_node;           /* [node_count] */
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
@@ -8106,6 +8176,9 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     }
     c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
     c->pictures = (terrimpi_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
+    c->places = NULL;
+    if (v->desc.exact_depth)
+        c->places = (terrimpi_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
@@ -8564,6 +8637,11 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
         command.atlas = picture->slots[layer].atlas;
         memcpy(command.texture_matrix, picture->texture_matrix[layer],
                sizeof command.texture_matrix);
+        if (v->cache.places) {
+            memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
+                   sizeof command.place_matrix);
+            terrimpi_place_from(command.place_matrix, picture->eye, v->frame.camera.eye);
+        }
         callbacks->draw_impostor(callbacks->user, &command);
     }
 }
@@ -9078,6 +9156,9 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
         terrimpi_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                 p->texture_matrix[i]);
+        if (v->cache.places)
+            terrimpi_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                  v->cache.places[p - v->cache.pictures].matrix[i]);
     }
 }
 

@@ -139,6 +139,7 @@ static void open_graphics(flyover *f)
     desc.field = &f->tour.field;
     desc.lightmap = lightmap;
     desc.atlas_size = f->chosen.desc.atlas_size;
+    desc.exact_depth = f->chosen.desc.exact_depth;
     trouble = context_open(&f->context, (int)f->options.width, (int)f->options.height);
     if (!trouble)
         trouble = gl_terrain_open(&f->gl, &desc);
@@ -175,6 +176,7 @@ static void open_contender(flyover *f, contender *c, const char *name, int mode)
     desc.no_lookahead = o->no_lookahead;
     desc.no_splits = o->no_splits;
     desc.no_spreading = o->no_spreading;
+    desc.exact_depth = o->exact_depth;
     c->name = name;
     c->picture = allocate((size_t)o->width * o->height * 3);
     need(terrimp_view_desc_resolve(f->terrain, &desc, &c->desc));

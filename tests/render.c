@@ -65,6 +65,7 @@ typedef struct scene {
     int width, height;            /* of its pictures */
     size_t pixels;
     size_t vertex_bytes, mesh_bytes; /* of gl_terrain_desc */
+    int exact_depth;                 /* the same */
     uint8_t *lightmap;            /* made when OpenGL is first filled; edits leave it as it is */
     context context;
     gl_terrain gl;
@@ -102,6 +103,7 @@ static void scene_fill(scene *s, uint32_t atlas)
     desc.atlas_size = atlas;
     desc.vertex_bytes = s->vertex_bytes;
     desc.mesh_bytes = s->mesh_bytes;
+    desc.exact_depth = s->exact_depth;
     need(gl_terrain_open(&s->gl, &desc));
 }
 

@@ -538,6 +538,11 @@ static void impostor_functions_refuse(void)
     REFUSES(TERRIMP_E_NULL, matrix, terrimp_texture_matrix(&capture, NULL, 64, 64, matrix));
     GIVES(TERRIMP_E_NULL, terrimp_texture_matrix(&capture, &rect, 64, 64, NULL));
     REFUSES(TERRIMP_E_RANGE, matrix, terrimp_texture_matrix(&capture, &rect, 9, 64, matrix));
+    REFUSES(TERRIMP_E_NULL, matrix, terrimp_place_matrix(NULL, &rect, 64, 64, eye, matrix));
+    REFUSES(TERRIMP_E_NULL, matrix, terrimp_place_matrix(&capture, NULL, 64, 64, eye, matrix));
+    REFUSES(TERRIMP_E_NULL, matrix, terrimp_place_matrix(&capture, &rect, 64, 64, NULL, matrix));
+    GIVES(TERRIMP_E_NULL, terrimp_place_matrix(&capture, &rect, 64, 64, eye, NULL));
+    REFUSES(TERRIMP_E_RANGE, matrix, terrimp_place_matrix(&capture, &rect, 9, 64, eye, matrix));
     REFUSES(TERRIMP_E_RANGE, matrix, terrimp_texture_matrix(&capture, &rect, 64, 9, matrix));
     REFUSES(TERRIMP_E_RANGE, matrix, terrimp_texture_matrix(&capture, &rect, 0, 64, matrix));
     rect.x = 0xffffffffu;

@@ -158,6 +158,45 @@ static void texture_matrix_leads_to_the_projected_point(void)
     }
 }
 
+/* From the atlas, with the depth that is there, back to the place, relative to any eye. */
+static void place_matrix_leads_back(void)
+{
+    int i, n, k;
+    for (i = 0; i < 3000; i++) {
+        terrimp_box box;
+        terrimp_capture c;
+        terrimp_rect slot;
+        uint32_t atlas[2];
+        float matrix[16], eye[3];
+        if (!random_capture(i % 6, &box, &c))
+            continue;
+        random_slot(atlas, &slot);
+        random_vector(0.0f, c.z_far, eye);
+        for (k = 0; k < 3; k++)
+            eye[k] += c.eye[k];
+        CHECK(terrimp_place_matrix(&c, &slot, atlas[0], atlas[1], eye, matrix) == TERRIMP_OK);
+        for (n = 0; n < 8; n++) {
+            double p[3], at[3], place[3], out[4], from[3], z_near = (double)c.z_near;
+            double z_far = (double)c.z_far;
+            oracle_corner(&box, n, p);
+            capture_coordinates(&c, p, at);
+            place[0] = (at[0] - (double)c.tan_left) / ((double)c.tan_right - (double)c.tan_left);
+            place[1] = (at[1] - (double)c.tan_down) / ((double)c.tan_up - (double)c.tan_down);
+            place[0] = ((double)slot.x + place[0] * (double)slot.width) / (double)atlas[0];
+            place[1] = ((double)slot.y + place[1] * (double)slot.height) / (double)atlas[1];
+            place[2] = (1.0 / z_near - 1.0 / at[2]) / (1.0 / z_near - 1.0 / z_far);
+            if (!(z_far > z_near * 1.001) || !(c.tan_right - c.tan_left > 1e-3f) ||
+                !(c.tan_up - c.tan_down > 1e-3f))
+                continue; /* a sheet or a line: less than floats resolve */
+            oracle_transform(matrix, place, out);
+            oracle_widen(eye, from);
+            for (k = 0; k < 3; k++)
+                CHECK(fabs(out[k] / out[3] + from[k] - p[k]) <
+                      1e-4 * z_far * z_far / z_near + 1e-6 * fabs(p[k]));
+        }
+    }
+}
+
 /* The corners of the box stay inside the slot, however the atlas is cut. */
 static void texture_matrix_keeps_the_box_in_its_slot(void)
 {
@@ -486,6 +525,7 @@ static void impostor_tests(void)
     RUN(impostor_size_keeps_its_limits_and_says_the_scale);
     RUN(capture_pad_adds_whole_texels_around_the_picture);
     RUN(texture_matrix_leads_to_the_projected_point);
+    RUN(place_matrix_leads_back);
     RUN(texture_matrix_keeps_the_box_in_its_slot);
     RUN(texture_coordinates_agree_with_the_matrix);
     RUN(view_angle_is_the_worst_of_the_corners);

@@ -478,6 +478,16 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         y = out[1] / out[3] * size - (double)capture->slot.y;
         CHECK(fabs(x - (clip[0] / clip[3] * 0.5 + 0.5) * (double)capture->slot.width) < rim);
         CHECK(fabs(y - (clip[1] / clip[3] * 0.5 + 0.5) * (double)capture->slot.height) < rim);
+        if (f->desc.exact_depth) { /* and back */
+            double in_atlas[3], place[4];
+            int k;
+            for (k = 0; k < 3; k++)
+                in_atlas[k] = out[k] / out[3];
+            oracle_transform(command->place_matrix, in_atlas, place);
+            for (k = 0; k < 3; k++)
+                CHECK(fabs(place[k] / place[3] + (double)f->camera.eye[k] - p[k]) <
+                      2e-3 * out[3] + 1e-4);
+        }
         CHECK(x > -rim && x < (double)capture->slot.width + rim);
         CHECK(y > -rim && y < (double)capture->slot.height + rim);
         for (part = 0; part < command->part_count; part++) {
@@ -1048,6 +1058,7 @@ static terrimp_view_desc random_settings(int mode)
     d.no_lookahead = (int)random_range(0, 1);
     d.no_splits = (int)random_range(0, 1);
     d.no_spreading = (int)random_range(0, 1);
+    d.exact_depth = d.no_spreading;
     d.costs.capture = random_magnitude(0.1f, 1e4f);
     d.costs.draw = maybe(1.0f, 1000.0f);
     d.costs.triangle = maybe(0.5f, 20.0f);

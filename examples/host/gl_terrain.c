@@ -95,6 +95,22 @@ static const char impostor_main[] =
     "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
     "}\n";
 
+/* The same with the depth of what the picture shows, which its capture left in the atlas. */
+static const char exact_main[] =
+    "uniform sampler2D atlas, atlas_depth;\n"
+    "uniform float alpha;\n"
+    "uniform mat4 depth_matrix;\n"
+    "in vec4 strq;\n" GL_THRESHOLD
+    "void main() {\n"
+    "    if (alpha < 1.0 && threshold() >= alpha) discard;\n"
+    "    vec2 st = strq.xy / strq.w;\n"
+    "    vec4 c = texture(atlas, st);\n"
+    "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
+    "    vec4 at = depth_matrix * vec4(st, texture(atlas_depth, st).r, 1.0);\n"
+    "    gl_FragDepth = 0.5 * at.z / at.w + 0.5;\n"
+    "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
+    "}\n";
+
 const char gl_line_fragment[] = GL_SHADER_HEAD
     "uniform vec3 tint;\n"
     "out vec4 colour;\n"
@@ -142,6 +158,7 @@ static gl_program make_program(const char *vertex_source, const char *const *par
     p.side = glGetUniformLocation(p.id, "side");
     p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
+    p.depth_matrix = glGetUniformLocation(p.id, "depth_matrix");
     p.tint = glGetUniformLocation(p.id, "tint");
     p.on_screen = glGetUniformLocation(p.id, "on_screen");
     return p;
@@ -464,21 +481,35 @@ static int make_lightmap(gl_terrain *g, const terrimp_heightfield *field, const 
     return 1;
 }
 
-static int make_atlas(gl_terrain *g, uint32_t i)
+/* Depth of captures: one buffer serves all atlases, unless it is to be read when they are drawn. */
+static void make_atlas_depth(gl_terrain *g, uint32_t i)
 {
-    if (!g->atlas_depth) {
+    if (g->exact_depth) {
+        g->atlas_depths[i] = make_texture(GL_LINEAR, GL_LINEAR);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT24, g->atlas_size, g->atlas_size, 0,
+                     GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, NULL);
+    } else if (!g->atlas_depth) {
         glGenRenderbuffers(1, &g->atlas_depth);
         glBindRenderbuffer(GL_RENDERBUFFER, g->atlas_depth);
         glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, g->atlas_size, g->atlas_size);
     }
+}
+
+static int make_atlas(gl_terrain *g, uint32_t i)
+{
+    make_atlas_depth(g, i);
     g->atlas[i] = make_texture(GL_LINEAR, GL_LINEAR);
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, g->atlas_size, g->atlas_size, 0, GL_RGBA,
                  GL_UNSIGNED_BYTE, NULL);
     glGenFramebuffers(1, &g->atlas_frame[i]);
     glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[i]);
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, g->atlas[i], 0);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
-                              g->atlas_depth);
+    if (g->exact_depth)
+        glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D,
+                               g->atlas_depths[i], 0);
+    else
+        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
+                                  g->atlas_depth);
     glDisable(GL_SCISSOR_TEST);
     glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -510,7 +541,8 @@ static const char *fill(gl_terrain *g, const gl_terrain_desc *desc,
     if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
     g->ground = make_shaded(g, gl_ground_vertex, ground_main);
-    g->impostor = make_shaded(g, impostor_vertex, impostor_main);
+    g->impostor = make_shaded(g, impostor_vertex, g->exact_depth ? exact_main : impostor_main);
+    glUniform1i(glGetUniformLocation(g->impostor.id, "atlas_depth"), GL_DEPTH_UNIT);
     g->line = gl_program_make(gl_ground_vertex, gl_line_fragment);
     if (!g->ground.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
@@ -524,6 +556,7 @@ const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc)
     memset(g, 0, sizeof *g);
     g->frame = desc->frame;
     g->terrain = desc->terrain;
+    g->exact_depth = desc->exact_depth;
     g->shading = desc->shading ? desc->shading : lightmap_alone;
     g->target = GL_TO_NOTHING;
     if (terrimp_heightfield_resolve(desc->field, &resolved) != TERRIMP_OK)
@@ -547,6 +580,7 @@ void gl_terrain_close(gl_terrain *g)
     glDeleteTextures(GL_ATLASES, g->atlas);
     glDeleteFramebuffers(GL_ATLASES, g->atlas_frame);
     glDeleteRenderbuffers(1, &g->atlas_depth);
+    glDeleteTextures(GL_ATLASES, g->atlas_depths);
     glDeleteProgram(g->morphing.id);
     free(g->xyz);
     free(g->indices);
@@ -681,7 +715,10 @@ static void begin_capture(void *user, const terrimp_capture_command *command)
     turn_to_atlas(g, (int)command->atlas);
     glViewport((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
     glScissor((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
-    glClear((command->clear ? GL_COLOR_BUFFER_BIT : 0u) | GL_DEPTH_BUFFER_BIT);
+    if (command->clear)
+        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    else if (!g->exact_depth) /* the depth of the pieces before is that of other pictures now */
+        glClear(GL_DEPTH_BUFFER_BIT);
     gl_relative_matrix(command->view, command->projection, matrix);
     gl_program_use(&g->ground, matrix, command->eye, 0);
 }
@@ -720,6 +757,14 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     glUseProgram(p->id);
     glUniform1f(p->alpha, c->alpha);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
+    if (g->exact_depth) {
+        float matrix[16];
+        multiply(g->camera_matrix, c->place_matrix, matrix);
+        glUniformMatrix4fv(p->depth_matrix, 1, GL_FALSE, matrix);
+        glActiveTexture(GL_TEXTURE0 + GL_DEPTH_UNIT);
+        glBindTexture(GL_TEXTURE_2D, g->atlas_depths[c->atlas]);
+        glActiveTexture(GL_TEXTURE0);
+    }
     draw_mesh(g, g->atlas[c->atlas], slot, c->index_count);
 }
 

@@ -13,6 +13,7 @@ typedef struct gl_program {
     GLint alpha;                     /* impostors: the share of the pixels */
     GLint morph, side, side_coarse;  /* morphing ground */
     GLint texture_matrix;            /* impostors */
+    GLint depth_matrix;              /* impostors with exact depth */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
     GLint on_screen;                 /* terrain: 0 in a capture, 1 on the screen */
 } gl_program;
@@ -42,6 +43,8 @@ void gl_relative_matrix(const float view[16], const float projection[16], float 
 
 /* Enables an attribute of the bound vertex array and points it into the bound buffer. */
 void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset);
+
+enum { GL_DEPTH_UNIT = 8 }; /* the texture unit of the depth of atlases */
 
 enum { GL_TO_FRAME = -1, GL_TO_NOTHING = -2 };
 
@@ -88,6 +91,7 @@ typedef struct gl_terrain_desc {
     uint32_t atlas_size;
     size_t vertex_bytes;              /* of graphics memory, for ground [Default 0 -> 400 MiB] */
     size_t mesh_bytes;                /* and for coarse meshes [Default 0 -> 16 MiB] */
+    int exact_depth;                  /* as in the settings of the view */
     const char *shading;              /* GLSL that defines, beside `uniform sampler2D lightmap`:
                                          vec3 shade(vec2 uv, vec3 position)
                                            the colour of the ground, which pictures keep
@@ -111,7 +115,9 @@ typedef struct gl_terrain {
     GLuint lightmap;
     GLsizei atlas_size;
     GLuint atlas[GL_ATLASES], atlas_frame[GL_ATLASES]; /* made when they are first used */
-    GLuint atlas_depth;              /* one depth buffer serves all */
+    GLuint atlas_depth;              /* one depth buffer serves all; or, for exact depth, */
+    GLuint atlas_depths[GL_ATLASES]; /* ... each has a texture of its own */
+    int exact_depth;
     gl_program ground, morphing, impostor, line;
     float camera_matrix[16], camera_eye[3];
     float field[4];                  /* x, z scale and offset of the lightmap coordinates */

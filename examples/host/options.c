@@ -163,7 +163,7 @@ typedef enum option_id {
     HEIGHT_SCALE, ORIGIN, MODE, SIZE, FOV, SKY,
     FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
     IMPOSTOR_PX, ATLAS, ATLAS_COUNT, MAX_CAPTURES, MAX_CAPTURE_TEXELS, MAX_CAPTURE_TRIANGLES,
-    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS,
+    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, EXACT_DEPTH, RULE, MORPH, OUT, SAVE_EVERY, SAVE_FRAMES, STATS,
     WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
 } option_id;
 
@@ -209,6 +209,7 @@ static const option table[OPTION_COUNT] = {
     { NO_LOOKAHEAD, "--no-lookahead", NULL, "pictures are made from where the eye is" },
     { NO_SPLITS, "--no-splits", NULL, "no picture in two parts" },
     { NO_SPREADING, "--no-spreading", NULL, "pictures are renewed when they are due" },
+    { EXACT_DEPTH, "--exact-depth", NULL, "impostors have the depth of the terrain" },
     { RULE, "--rule", "picture|bound|distance", "of ground: what is tolerated [picture]" },
     { MORPH, "--morph", "RATIO", "of ground: of the distances where nodes morph [1: not]" },
     { OUT, "--out", "DIR", "directory for the pictures; made if it is missing" },
@@ -284,6 +285,7 @@ static int take(options *o, option_id id, const char *text)
     case NO_LOOKAHEAD: return take_flag(&o->no_lookahead);
     case NO_SPLITS: return take_flag(&o->no_splits);
     case NO_SPREADING: return take_flag(&o->no_spreading);
+    case EXACT_DEPTH: return take_flag(&o->exact_depth);
     case RULE: return take_rule(text, &o->rule);
     case MORPH: return take_number(text, 1.0f, 4.0f, &o->morph);
     case OUT: return take_text(text, &o->out);

@@ -25,7 +25,7 @@ typedef struct options {
     uint32_t chunk, atlas, atlas_count;
     uint32_t max_captures, max_capture_texels, max_capture_triangles;
     float fade[2], max_angle_degrees, tolerance, ground_tolerance, texels, impostor_px;
-    int no_lookahead, no_splits, no_spreading;
+    int no_lookahead, no_splits, no_spreading, exact_depth;
     int rule;                          /* terrimp_geomip_rule */
     float morph;
     uint32_t save_every;
