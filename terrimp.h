@@ -9748,10 +9748,12 @@ static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int
     const void *row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
     const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
     switch (s->desc.field.format) {
-    case TERRIMP_FORMAT_U8: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
+#ifndef TERRIMP_FIXED
+    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
+#endif
     case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
     case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
-    default: return (terrimp_sorted_height)((const float *)row)[x];
+    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
     }
 }
 

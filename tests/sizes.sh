@@ -73,7 +73,7 @@ machine() # name, prefix, flags, "judged" or ""
 # With TERRIMP_FIXED what runs for each triangle has no floats, in software or in registers.
 needs_no_float() # name, prefix, object
 {
-    calls=$({ "$2nm" -u "$3"; "$2objdump" -d "$3"; } | grep -E '__aeabi_[df]|[[:space:]]v[a-z]+[.]f')
+    calls=$("$2objdump" -dr "$3" | grep -E 'R_ARM.*__aeabi_[df]|[[:space:]]v[a-z]+[.].*f32')
     [ -n "$calls" ] || { echo "    uses no floats"; return; }
     echo "    FAILED: what runs for each triangle uses floats:" $calls
     failed=1
