@@ -632,6 +632,337 @@ static void rays_over_a_field_that_wraps_end(void)
     CHECK(hit.position[0] == -12345.5f && hit.distance == 1.0f);
 }
 
+/* ---- pages ---- */
+
+/* A host that has only some levels of some pages of the endless hills, by chance but always the
+   same ones; it packs what is asked for. */
+typedef struct sorted_host {
+    uint32_t seed, coarsest, asked, drawn;
+    int none; /* some pages are not here at all */
+    float samples[65 * 65];
+} sorted_host;
+
+static uint32_t sorted_level_here(const sorted_host *host, int32_t x, int32_t z)
+{
+    uint32_t bits = ((uint32_t)x * 73856093u ^ (uint32_t)z * 19349663u ^ host->seed) * 2654435761u;
+    if (host->none && (bits >> 24) % 7u == 0)
+        return TERRIMP_SORTED_ABSENT;
+    return (bits >> 16) % (host->coarsest + 1u);
+}
+
+static void sorted_give_page(void *user, terrimp_sorted_page *page)
+{
+    sorted_host *host = (sorted_host *)user;
+    int x, z, side, step;
+    CHECK(page->level == 0);
+    page->level = sorted_level_here(host, page->x, page->z);
+    host->asked += !page->only_level;
+    if (page->level == TERRIMP_SORTED_ABSENT || page->only_level)
+        return;
+    host->drawn++;
+    step = 1 << page->level;
+    side = 64 / step + 1;
+    for (z = 0; z < side; z++)
+        for (x = 0; x < side; x++)
+            host->samples[z * side + x] =
+                sorted_heights[((page->z & 7) * 64 + z * step) * SORTED_SIDE +
+                               (page->x & 7) * 64 + x * step];
+    page->samples = host->samples;
+    page->row_bytes = (size_t)side * sizeof(float);
+}
+
+static terrimp_sorted_desc sorted_hosted(sorted_host *host)
+{
+    terrimp_sorted_desc desc = sorted_hills();
+    memset(host, 0, sizeof *host);
+    desc.field.samples = NULL;
+    desc.field.width = desc.field.depth = 0;
+    desc.low = -40.0f;
+    desc.high = 40.0f;
+    desc.user = host;
+    desc.page = sorted_give_page;
+    return desc;
+}
+
+static void sorted_pages_come_from_the_host(void)
+{
+    static terrimp_sorted_square before[SORTED_MOST];
+    static sorted_host host;
+    terrimp_sorted_desc desc = sorted_hosted(&host), field = sorted_hills();
+    terrimp_sorted s;
+    terrimp_camera camera;
+    int i;
+    uint32_t count;
+    sorted_make_hills(8.0f);
+    field.low = desc.low, field.high = desc.high;
+    for (i = 0; i < 20; i++) {
+        CHECK(terrimp_sorted_init(&field, &s) == TERRIMP_OK);
+        camera = sorted_camera(&s.desc);
+        memset(sorted_squares, 0, sizeof sorted_squares);
+        sorted_frame(&s, &camera);
+        count = sorted_count;
+        memcpy(before, sorted_squares, sizeof before);
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        memset(sorted_squares, 0, sizeof sorted_squares);
+        sorted_frame(&s, &camera);
+        CHECK(sorted_count == count && memcmp(before, sorted_squares, sizeof before) == 0);
+    }
+    CHECK(host.asked > 100);
+}
+
+/* With levels missing here and there: no cracks, no wrong order; heights that are here are right,
+   others between those that are. */
+static void sorted_pages_may_be_coarse_or_absent(void)
+{
+    static sorted_host host;
+    terrimp_sorted_desc desc = sorted_hosted(&host);
+    int i, cracks = 0, faults = 0, absent = 0, own = 0, k;
+    uint32_t q;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 60; i++) {
+        terrimp_sorted s;
+        terrimp_camera camera;
+        double area = 0.0;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        host.seed = random_bits();
+        host.coarsest = random_range(1, 6);
+        host.none = i & 1;
+        camera = sorted_camera(&s.desc);
+        host.asked = host.drawn = 0;
+        sorted_frame(&s, &camera);
+        absent += (int)(host.asked - host.drawn);
+        cracks += sorted_count_cracks(&area);
+        faults += order_faults(&s, &camera);
+        for (q = 0; q < sorted_count; q++)
+            for (k = 0; k < sorted_squares[q].vertex_count; k++) {
+                const terrimp_sorted_vertex *v = &sorted_squares[q].vertices[k];
+                uint32_t here = sorted_level_here(&host, sorted_squares[q].page_x,
+                                                  sorted_squares[q].page_z);
+                CHECK(here != TERRIMP_SORTED_ABSENT);
+                if (((v->x | v->z) & 63) == 0) { /* of all pages that meet here */
+                    CHECK(v->height ==
+                          sorted_heights[(v->z & 511) * SORTED_SIDE + (v->x & 511)]);
+                    own++;
+                }
+            }
+    }
+    CHECK(cracks == 0 && faults == 0);
+    CHECK(absent > 10 && own > 1000);
+}
+
+/* The level of a page's texture: its texels cover 1 to 2 pixels at the page's closest point, give
+   or take the tenth that keeps it from flickering; and an eye that trembles changes nothing. */
+static void sorted_texture_levels_fit_the_screen(void)
+{
+    static uint8_t levels[64 * 64];
+    terrimp_sorted_desc desc = sorted_hills();
+    terrimp_sorted s;
+    int i, t, changes = 0, seen[16] = { 0 };
+    uint32_t k;
+    sorted_make_hills(8.0f);
+    desc.texture_level_count = 6;
+    desc.page_texels = 128;
+    desc.texture_levels = levels;
+    desc.texture_window = 64;
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    for (i = 0; i < 60; i++) {
+        terrimp_camera camera = sorted_camera(&s.desc);
+        float factor, x = camera.eye[0];
+        uint8_t first[64 * 64];
+        camera.z_far = 900.0f;
+        CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);
+        memset(levels, 255, sizeof levels);
+        for (t = 0; t < 8; t++) {
+            camera.eye[0] = x + (t & 1 ? 0.5f : -0.5f); /* 1 % and less of most distances */
+            sorted_frame(&s, &camera);
+            if (t == 0)
+                memcpy(first, levels, sizeof first);
+        }
+        for (k = 0; k < sizeof levels; k++)
+            changes += first[k] != 255 && levels[k] != first[k];
+        for (k = 0; k < sorted_count; k++) {
+            const terrimp_sorted_square *q = &sorted_squares[k];
+            float dx = fmaxf(fmaxf((float)q->page_x * 64.0f - camera.eye[0],
+                                   camera.eye[0] - (float)(q->page_x + 1) * 64.0f), 0.0f);
+            float dz = fmaxf(fmaxf((float)q->page_z * 64.0f - camera.eye[2],
+                                   camera.eye[2] - (float)(q->page_z + 1) * 64.0f), 0.0f);
+            float dy = fmaxf(fmaxf(s.desc.low - camera.eye[1], camera.eye[1] - s.desc.high), 0.0f);
+            float away = sqrtf(dx * dx + dy * dy + dz * dz);
+            float pixels = 0.5f * (float)(1 << q->texture_level) * factor / away;
+            CHECK(q->texture_level == 0 || pixels < 1.12f);
+            CHECK(q->texture_level == 5 || pixels > 0.44f);
+            seen[q->texture_level]++;
+        }
+    }
+    CHECK(changes < 60); /* those first seen late, and the closest pages */
+    CHECK(seen[0] > 0 && seen[1] > 0 && seen[2] > 0);
+}
+
+/* Halving agrees with its definition, and pages that share a border keep on sharing it. */
+static void sorted_halving_keeps_borders(void)
+{
+    static uint8_t map[65 * 65 * 3], page[2][33 * 65 * 3], half[33 * 33 * 3], part[2][17 * 33 * 3];
+    int x, y, c, i, wrap;
+    for (i = 0; i < (int)sizeof map; i++)
+        map[i] = (uint8_t)random_bits();
+    for (i = 0; i < 2; i++)
+        for (y = 0; y < 65; y++)
+            memcpy(page[i] + y * 33 * 3, map + (y * 65 + i * 32) * 3, 33 * 3);
+    for (i = 0; i < 2; i++)
+        CHECK(terrimp_sorted_halve(page[i], 33, 65, 3, 0, part[i]) == TERRIMP_OK);
+    for (y = 0; y < 33; y++)
+        CHECK(memcmp(part[0] + (y * 17 + 16) * 3, part[1] + y * 17 * 3, 3) == 0);
+    for (y = 0; y < 65; y++) /* a map that repeats */
+        memcpy(map + (y * 65 + 64) * 3, map + y * 65 * 3, 3);
+    memcpy(map + 64 * 65 * 3, map, 65 * 3);
+    for (wrap = 0; wrap < 2; wrap++) {
+        CHECK(terrimp_sorted_halve(map, 65, 65, 3, wrap, half) == TERRIMP_OK);
+        for (y = 0; y < 33; y++)
+            for (x = 0; x < 33; x++)
+                for (c = 0; c < 3; c++) {
+                    int dx, dz, sum = 0, weight = 0;
+                    for (dz = -1; dz <= 1; dz++)
+                        for (dx = -1; dx <= 1; dx++) {
+                            int u = (2 * x + dx + 64) % 64, v = (2 * y + dz + 64) % 64;
+                            int w = (2 - abs(dx)) * (2 - abs(dz));
+                            if (!wrap && ((dx && x % 32 == 0) || (dz && y % 32 == 0)))
+                                continue;
+                            sum += w * map[(v * 65 + u) * 3 + c];
+                            weight += w;
+                        }
+                    CHECK(half[(y * 33 + x) * 3 + c] == (2 * sum + weight) / (2 * weight));
+                }
+    }
+    CHECK(terrimp_sorted_halve(NULL, 65, 65, 3, 0, half) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_halve(map, 65, 65, 3, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_halve(map, 64, 65, 3, 0, half) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_halve(map, 65, 1, 3, 0, half) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_halve(map, 65, 65, 5, 0, half) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_halve(map, 65, 65, 0, 0, half) == TERRIMP_E_RANGE);
+}
+
+/* ---- pace ---- */
+
+/* Over flights: triangles stay within 3 % of what was asked for, and hardly change between frames;
+   where even the smallest scale needs more, that is used. */
+static void sorted_keeps_to_its_triangles(void)
+{
+    static const uint32_t most[4] = { 400, 1000, 2500, 6000 };
+    int i, k, frame, outside = 0, jumps = 0, fields = 0;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 8; i++)
+        for (k = 0; k < 4; k++) {
+            terrimp_sorted_desc desc = sorted_hills();
+            terrimp_sorted s;
+            terrimp_camera camera;
+            float turn = random_float(0.0f, 6.28f), rate = random_float(-0.05f, 0.05f);
+            uint32_t before = 0;
+            desc.max_triangles = most[k];
+            CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+            camera = sorted_camera(&s.desc);
+            camera.eye[1] = random_float(5.0f, 40.0f);
+            camera.forward[1] = random_float(-0.4f, 0.0f);
+            camera.fov_y_rad = 1.0f;
+            camera.z_far = 400.0f;
+            for (frame = 0; frame < 40; frame++) {
+                camera.forward[0] = cosf(turn + rate * (float)frame);
+                camera.forward[2] = sinf(turn + rate * (float)frame);
+                camera.eye[0] += camera.forward[0];
+                camera.eye[2] += camera.forward[2];
+                sorted_frame(&s, &camera);
+                if (s.scale <= 2.0f) {
+                    before = 0;
+                    continue;
+                }
+                fields++;
+                outside += (float)s.triangle_count < 0.97f * (float)most[k] ||
+                           s.triangle_count > most[k];
+                jumps += before && fabsf((float)s.triangle_count - (float)before) >
+                                       0.05f * (float)before;
+                before = s.triangle_count;
+            }
+        }
+    CHECK(fields > 600);
+    CHECK(outside * 200 <= fields); /* one split can be more than that of 400 */
+    CHECK(jumps * 200 <= fields);
+}
+
+/* Time rises with triangles by some law; the pace finds the allowance whatever it starts from, from
+   one side, and stays there. */
+static void sorted_pace_comes_to_rest(void)
+{
+    int i, frame;
+    for (i = 0; i < 300; i++) {
+        float fixed = random_float(0.0f, 8.0f), each = powf(10.0f, random_float(-4.0f, -2.0f));
+        float target = fixed + random_float(4.0f, 30.0f), ms = 0.0f;
+        uint32_t triangles = 1u << random_range(0, 17), before;
+        int side = 0, turns = 0;
+        for (frame = 0; frame < 800; frame++) {
+            int now;
+            ms = fixed + each * (float)triangles;
+            before = triangles;
+            triangles = terrimp_sorted_pace(triangles, ms, target);
+            CHECK((float)triangles >= 0.95f * (float)before - 1.0f);
+            CHECK((float)triangles <= 1.02f * (float)before + 1.0f);
+            now = triangles > before ? 1 : triangles < before ? -1 : 0;
+            turns += side && now && now != side;
+            side = now ? now : side;
+        }
+        CHECK(turns == 0);
+        CHECK(ms >= 0.97f * target && ms <= 1.03f * target);
+    }
+    CHECK(terrimp_sorted_pace(1000, not_a_number(), 16.0f) == 1000);
+    CHECK(terrimp_sorted_pace(1000, 0.0f, 16.0f) == 1000);
+    CHECK(terrimp_sorted_pace(1000, 4e4f, 16.0f) == 950);
+    CHECK(terrimp_sorted_pace(1000, 30.0f, 0.0f) == 1000);
+    CHECK(terrimp_sorted_pace(0, 1.0f, 16.0f) == 1);
+    CHECK(terrimp_sorted_pace(0xffffffffu, 1.0f, 16.0f) == 0xffffffffu);
+}
+
+/* The farthest corner of a square that the frame has. */
+static float sorted_reach(const terrimp_camera *camera)
+{
+    float reach = 0.0f;
+    uint32_t i;
+    for (i = 0; i < sorted_count; i++) {
+        const terrimp_sorted_vertex *v = sorted_squares[i].vertices;
+        reach = fmaxf(reach, hypotf((float)v->x - camera->eye[0], (float)v->z - camera->eye[2]));
+    }
+    return reach;
+}
+
+/* An eye that sinks sees less far, step by step, and as far as it can at the height given. */
+static void sorted_horizon_comes_in(void)
+{
+    terrimp_sorted_desc desc = sorted_hills();
+    terrimp_sorted s;
+    terrimp_camera camera;
+    float before = 0.0f, all, reach;
+    int i;
+    sorted_make_hills(1.0f);
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    camera = sorted_camera(&s.desc);
+    camera.eye[0] = camera.eye[2] = 0.0f;
+    camera.forward[1] = -0.1f;
+    camera.fov_y_rad = 1.0f;
+    camera.z_far = 1000.0f;
+    desc.low_far = 100.0f;
+    desc.low_height = 20.0f;
+    for (i = 0; i <= 20; i += 4) {
+        camera.eye[1] = sorted_heights[0] + (float)i;
+        desc.low_far = 0.0f;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        sorted_frame(&s, &camera);
+        all = sorted_reach(&camera);
+        desc.low_far = 100.0f;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        sorted_frame(&s, &camera);
+        reach = sorted_reach(&camera);
+        CHECK(i < 20 ? reach < all && reach > before : reach == all);
+        before = reach;
+    }
+}
+
 /* ---- bad input ---- */
 
 static void sorted_refuses_bad_input(void)
@@ -745,6 +1076,13 @@ static void sorted_tests(void)
     RUN(sorted_repeats_after_a_period);
     RUN(field_that_wraps_is_endless);
     RUN(rays_over_a_field_that_wraps_end);
+    RUN(sorted_pages_come_from_the_host);
+    RUN(sorted_pages_may_be_coarse_or_absent);
+    RUN(sorted_texture_levels_fit_the_screen);
+    RUN(sorted_halving_keeps_borders);
+    RUN(sorted_keeps_to_its_triangles);
+    RUN(sorted_pace_comes_to_rest);
+    RUN(sorted_horizon_comes_in);
     RUN(sorted_refuses_bad_input);
     RUN(sorted_bears_odd_cameras);
 }

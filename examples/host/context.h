@@ -1,5 +1,6 @@
 /* An OpenGL context without a window, 3.3 or an old one, and one framebuffer to draw frames into.
-   OSMesa (-DHOST_OSMESA) or EGL without a surface (-DHOST_EGL): only context.c knows which. */
+   OSMesa (-DHOST_OSMESA) or EGL without a surface (-DHOST_EGL): only context.c knows which. A
+   program with a window fills in a context of its own, and uses context_bind and context_read. */
 #ifndef HOST_CONTEXT_H
 #define HOST_CONTEXT_H
 
@@ -11,7 +12,8 @@ typedef struct context {
     int width, height;     /* of the frame, pixels */
     GLuint framebuffer;    /* RGBA8 colour with 24-bit depth, own making: alike on both systems */
     GLuint colour, depth;  /* its renderbuffers */
-    uint8_t *reading;      /* RGBA rows on their way to context_read */
+    int clip_x, clip_width; /* gl_terrain draws only these columns; width 0: all */
+    uint8_t *reading;      /* [height][width][4] on its way to context_read */
     void *system;          /* what the windowless system keeps */
 } context;
 

@@ -1,7 +1,7 @@
 /* A bake made on one machine and opened on another. "make FILE" builds a terrain and writes its
    bake, and to FILE.swapped the one for the other byte order; "open FILE..." opens each, or the
-   swapped one, checks what it says against the samples, draws frames of it, and damages it to see it
-   refused. Prints how many were used as they are and how many swapped. */
+   swapped one, checks what it says against the samples, draws frames of it, and damages it to see
+   it refused. Prints how many were used as they are and how many swapped. */
 #include <stdio.h>
 
 #define TERRIMP_IMPLEMENTATION
