@@ -4843,11 +4843,13 @@ static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, flo
     memset(m->closest, 0, sizeof m->closest);
     m->low[0] = m->low[1] = 0.0f;
     m->cells[0] = m->cells[1] = 1.0f;
-    for (i = 0; i < vertex_count; i++) {
+    terrimpi_split_point(m, m->xyz, low);
+    memcpy(high, low, sizeof high);
+    for (i = 1; i < vertex_count; i++) {
         terrimpi_split_point(m, m->xyz + i * 3u, p);
         for (k = 0; k < 3u; k++) {
-            low[k] = i == 0 ? p[k] : terrimpi_min(low[k], p[k]);
-            high[k] = i == 0 ? p[k] : terrimpi_max(high[k], p[k]);
+            low[k] = terrimpi_min(low[k], p[k]);
+            high[k] = terrimpi_max(high[k], p[k]);
         }
     }
     for (k = 0; k < 2u; k++) {
@@ -4977,7 +4979,7 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, te
         order[i] = i;
     terrimpi_sort(order, count, rects, terrimpi_pack_after);
     /* at most 360 steps, from 2^32 texels down to one */
-    while (!terrimpi_pack_try(width, height, rects, count, order, order + count, by)) {
+    while (count && !terrimpi_pack_try(width, height, rects, count, order, order + count, by)) {
         TERRIMPI_REFUSE(by < 2e-10f, TERRIMP_E_CAPACITY);
         by *= 0.94f;
     }
