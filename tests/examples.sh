@@ -121,7 +121,7 @@ newer_than_opengl_1_1()
 'gl(DepthFunc|DepthMask|Disable|DrawElements|Enable|EnableClientState|GenTextures|GetError)|'\
 'gl(LoadIdentity|LoadMatrixf|MatrixMode|MultMatrixf|PixelStorei|PopMatrix|PushMatrix|Scalef)|'\
 'gl(Scissor|ShadeModel|TexCoordPointer|TexEnvi|TexImage2D|TexParameteri|Translatef)|'\
-'gl(ClipPlane|VertexPointer|Viewport|ColorMask|Begin|End|TexCoord2f|Vertex2f)'
+'gl(ClipPlane|VertexPointer|Viewport|ColorMask|Begin|End|TexCoord2f|Vertex2f|PolygonStipple)'
 }
 
 # ---- flyover: the pictures are looked at by tests/render.c, here it is its manners
@@ -205,6 +205,7 @@ if [ -x build/geomip ]; then
     check "geomip draws its frames and leaves a picture" geomip_runs
 fi
 check "software draws its frames without a GPU, close to the full mesh" host_runs software
+check "sorted draws the same frames without and with a depth buffer" host_runs sorted
 if [ -x build/fixed_function ]; then
     check "fixed_function draws its frames, close to the full mesh" host_runs fixed_function
     check "fixed_function calls nothing newer than OpenGL 1.1" \
