@@ -2188,8 +2188,8 @@ TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_des
    reaches through. Texels are connected where layers touch; then edges collapse, short ones first,
    as long as the mesh stays within the tolerance of the texels and they of it. Its border and the
    seams between sheets only move along themselves. The texture needs no perspective: it is the
-   picture, as terrimp_texture_matrix projects it. Texels at a sheet's border may be wanted that have no
-   colour: hosts fill them from their neighbours, as gutters.
+   picture, as terrimp_texture_matrix projects it. Texels at a sheet's border may be wanted that
+   have no colour: hosts fill them from their neighbours, as gutters.
 
    scratch    aligned to 8 bytes
    mesh       in: arrays; out: the rest
