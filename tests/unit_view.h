@@ -472,6 +472,8 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         oracle_transform(capture->view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
         oracle_transform(command->texture_matrix, p, out);
+        /* close to the capture's eye floats of the world's size are coarse */
+        rim += 2e-6 * fabs(p[1]) * (double)(capture->slot.width + capture->slot.height) / clip[3];
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
         CHECK(fabs(x - (clip[0] / clip[3] * 0.5 + 0.5) * (double)capture->slot.width) < rim);
@@ -1691,7 +1693,7 @@ static void geomip_draws_the_selection(void)
             const terrimp_camera *camera = pilot_next(&p, &l);
             flight_update(f, camera);
             flight_render(f);
-            CHECK(terrimp_geomip_select(&tree, &view, &f->camera) == TERRIMP_OK);
+            CHECK(terrimp_geomip_select(&tree, &view, camera) == TERRIMP_OK);
             CHECK(f->item_count == view.draw_count);
             CHECK(f->stats.triangles == view.triangle_count);
             for (i = 0; i < f->item_count && i < view.draw_count; i++) {
