@@ -2205,6 +2205,36 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
                                                    void *scratch, size_t bytes,
                                                    terrimp_depth_mesh *mesh);
 
+/* --- layers all round a cell, and for all views of an object (Jeschke 3.8) --- */
+
+/* Layers for everything beyond a distance from a cube: the same ones before each of its six sides,
+   each from the middle of its side. A side's picture holds its sixth of the world, the pyramid
+   from the cube's centre, and some of its neighbours', since it is taken from closer by.
+
+   centre     [3] of the cube [wu]
+   desc       distance, depth, texel, tolerance_rad and even; distance counts from the sides. Its
+              cell_size, cell_depth, cell_tan and view_tan are not looked at
+   half       [wu] of the cube's side [Limits: > 0]
+   layers     out
+   pictures   [6] out: +x, -x, +y, -y, +z, -z
+   Errors     those of terrimp_layers_plan */
+TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
+                                                 const float centre[3], float half,
+                                                 terrimp_layers *layers,
+                                                 terrimp_capture pictures[6]);
+
+/* Layers for an object that is seen from everywhere: three sets, across x, y and z, recorded in
+   parallel projection. An eye draws the set across the direction that it looks along most, from
+   either side. Layer i of `count` stands at box->min + (i + 0.5) / count of the extent.
+
+   texel      [wu] of all layers; for an eye at a distance d no more than d / K [Limits: > 0]
+   slope      largest tangent between a line of sight and the axis of the set that is drawn: 1 for
+              eyes far away, 1 + extent / distance for closer ones [Limits: >= 1]
+   counts     [3] out: layers across x, y, z. Texels pass each other by one at most
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed */
+TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
+                                                 uint32_t counts[3]);
+
 /* ==== Placement ========================================================== >>placement */
 
 /* Which pictures to prepare, so that no view costs more than a budget and the pictures take little
@@ -15617,8 +15647,8 @@ static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, 
 static size_t terrimpi_depth_layout(terrimpi_depth *d, void *base)
 {
     terrimpi_arena arena = terrimpi_arena_at(base);
-    size_t n = 2u * (size_t)d->cell_count, points = (size_t)d->point_count + d->cell_count, slots = 
-        (size_t)d->desc->width * d->desc->height;
+    size_t n = 2u * (size_t)d->cell_count, points = (size_t)d->point_count + d->cell_count;
+    size_t slots = (size_t)d->desc->width * d->desc->height;
     size_t most = terrimpi_mul(8, n, &arena.ok);
     size_t queue = most > points ? most : points;
     arena.ok &= n < 0x10000000u;
@@ -15677,6 +15707,64 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
                    mesh->texel_count > mesh->texel_capacity
                ? TERRIMP_E_CAPACITY
                : TERRIMP_OK;
+}
+
+/* --- layers all round a cell, and for all views of an object --- */
+
+TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
+                                                 const float centre[3], float half,
+                                                 terrimp_layers *layers,
+                                                 terrimp_capture pictures[6])
+{
+    terrimp_layers_desc d;
+    terrimp_layers made;
+    uint32_t side, k;
+    TERRIMPI_REFUSE(!desc || !centre || !layers || !pictures, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(centre) || !terrimpi_finite(half), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(half > 0.0f) || !(desc->distance > 0.0f), TERRIMP_E_RANGE);
+    d = *desc;
+    for (k = 0; k < 2u; k++) { /* at depth t the pyramid is t + half wide to each side */
+        d.cell_size[k] = 2.0f * half;
+        d.cell_tan[k] = 0.0f;
+        d.view_tan[k] = 1.0f + half / desc->distance;
+    }
+    d.cell_depth = 2.0f * half;
+    TERRIMPI_TRY(terrimp_layers_plan(&d, &made));
+    *layers = made;
+    for (side = 0; side < 6u; side++) {
+        terrimp_capture *p = &pictures[side];
+        memset(p, 0, sizeof *p);
+        p->forward[side / 2u] = side & 1u ? -1.0f : 1.0f;
+        p->up[1] = 1.0f;
+        terrimpi_basis(p->forward, p->up, p->right);
+        for (k = 0; k < 3u; k++)
+            p->eye[k] = centre[k] + half * p->forward[k];
+        p->z_near = made.start;
+        p->z_far = made.end;
+        p->tan_right = p->tan_up = d.view_tan[0];
+        p->tan_left = p->tan_down = -d.view_tan[0];
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
+                                                 uint32_t counts[3])
+{
+    float needed[3];
+    int k;
+    TERRIMPI_REFUSE(!box || !counts, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
+                        !terrimpi_finite2(texel, slope),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(texel > 0.0f) || !(slope >= 1.0f), TERRIMP_E_RANGE);
+    for (k = 0; k < 3; k++) {
+        needed[k] = (box->max[k] - box->min[k]) * slope / texel;
+        TERRIMPI_REFUSE(!(needed[k] >= 0.0f) || !(needed[k] < TERRIMPI_LAYERS_MAX),
+                        TERRIMP_E_RANGE);
+    }
+    for (k = 0; k < 3; k++)
+        counts[k] = terrimpi_max_u32(1u, terrimpi_ceil_u32(needed[k]));
+    return TERRIMP_OK;
 }
 
 /* ==== Placement ========================================================== >>impl-placement */

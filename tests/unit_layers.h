@@ -1135,6 +1135,130 @@ static void vertices_of_depth_meshes_stand_on_their_layers(void)
     }
 }
 
+/* ---- all round a cell, and round an object ---- */
+
+/* Every point beyond the distance is in the picture of the side that faces it; no eye of the cube
+   sees behind a texel. */
+static void layers_all_round_hold_the_world_beyond(void)
+{
+    int i, n;
+    for (i = 0; i < 300; i++) {
+        terrimp_layers_desc d;
+        terrimp_layers l;
+        terrimp_capture pictures[6];
+        float centre[3], half = log_random(1.0f, 50.0f);
+        memset(&d, 0, sizeof d);
+        d.distance = half * log_random(2.0f, 30.0f);
+        d.depth = d.distance * log_random(0.1f, 9.0f);
+        d.texel = log_random(1e-3f, 5e-3f);
+        for (n = 0; n < 3; n++)
+            centre[n] = random_float(-100.0f, 100.0f);
+        CHECK(terrimp_layers_around(&d, centre, half, &l, pictures) == TERRIMP_OK);
+        for (n = 0; n < 30; n++) {
+            double way[3], eye[3], seen[2][3], at[2], depth = 0, texels[2][2];
+            uint32_t side = 0, layer = l.count > 1 ? random_range(0, l.count - 2) : 0, k, j;
+            const terrimp_capture *p;
+            float far_depth = terrimp_layer_depth(&l, l.count > 1 ? layer + 1 : 0);
+            for (k = 0; k < 3; k++) {
+                way[k] = (double)random_float(-1.0f, 1.0f);
+                eye[k] = (double)centre[k] + (double)half * (double)random_float(-1.0f, 1.0f);
+            }
+            for (k = 0; k < 3; k++)
+                if (fabs(way[k]) > fabs(way[side / 2]) || k == 0)
+                    side = 2 * k + (way[k] < 0.0);
+            p = &pictures[side];
+            for (k = 0; k < 3; k++) /* a point of the layer's cube, in the picture of its side */
+                seen[0][k] = (double)centre[k] + way[k] / fabs(way[side / 2]) *
+                                                     ((double)far_depth + (double)half);
+            for (j = 0; j < 2; j++) {
+                double offset[3], right[3], up[3], forward[3];
+                oracle_widen(p->eye, offset);
+                oracle_between(offset, seen[j], offset);
+                oracle_widen(p->right, right);
+                oracle_widen(p->up, up);
+                oracle_widen(p->forward, forward);
+                depth = oracle_dot(offset, forward);
+                at[0] = oracle_dot(offset, right) / depth;
+                at[1] = oracle_dot(offset, up) / depth;
+                for (k = 0; k < 2; k++) {
+                    if (j == 0)
+                        CHECK(fabs(at[k]) <= (double)p->tan_right * 1.0001);
+                    texels[j][k] = at[k] / (double)d.texel;
+                }
+                if (j == 0) { /* where its line of sight passes the layer before */
+                    double to[3], wanted = (double)terrimp_layer_depth(&l, layer), part;
+                    oracle_between(eye, seen[0], to);
+                    part = (depth - wanted) / oracle_dot(to, forward);
+                    for (k = 0; k < 3; k++)
+                        seen[1][k] = seen[0][k] - part * to[k];
+                }
+            }
+            CHECK(fabs(depth / (double)terrimp_layer_depth(&l, layer) - 1.0) < 1e-4);
+            for (k = 0; k < 2; k++)
+                CHECK(fabs(at[k]) > (double)p->tan_right ||
+                      fabs(texels[0][k] - texels[1][k]) <= 1.001 + 1e-6 * l.count);
+        }
+    }
+}
+
+static void layers_of_objects_pass_each_other_by_a_texel(void)
+{
+    int i, k;
+    for (i = 0; i < 500; i++) {
+        terrimp_box box;
+        uint32_t counts[3];
+        float texel = log_random(0.01f, 1.0f), slope = random_float(1.0f, 2.0f);
+        for (k = 0; k < 3; k++) {
+            box.min[k] = random_float(-50.0f, 50.0f);
+            box.max[k] = box.min[k] + (random_range(0, 5) ? log_random(0.1f, 50.0f) : 0.0f);
+        }
+        CHECK(terrimp_layers_object(&box, texel, slope, counts) == TERRIMP_OK);
+        for (k = 0; k < 3; k++) {
+            double extent = (double)box.max[k] - (double)box.min[k];
+            CHECK(counts[k] >= 1);
+            CHECK(extent / counts[k] * (double)slope <= (double)texel * 1.00001);
+            CHECK(counts[k] == 1 ||
+                  extent / (counts[k] - 1.0) * (double)slope > (double)texel * 0.99999);
+        }
+    }
+}
+
+static void layers_all_round_refuse(void)
+{
+    terrimp_layers_desc d;
+    terrimp_layers l;
+    terrimp_capture pictures[6];
+    terrimp_box box = {{0, 0, 0}, {1, 2, 3}}, bad = {{0, 0, 0}, {1, -2, 3}};
+    float centre[3] = {0, 0, 0}, wrong[3] = {0, 0, 0};
+    uint32_t counts[3];
+    memset(&d, 0, sizeof d);
+    d.distance = 100;
+    d.depth = 50;
+    d.texel = 0.002f;
+    wrong[1] = not_finite(0);
+    REFUSES(TERRIMP_E_NULL, l, terrimp_layers_around(NULL, centre, 5, &l, pictures));
+    REFUSES(TERRIMP_E_NULL, l, terrimp_layers_around(&d, NULL, 5, &l, pictures));
+    GIVES(TERRIMP_E_NULL, terrimp_layers_around(&d, centre, 5, NULL, pictures));
+    REFUSES(TERRIMP_E_NULL, l, terrimp_layers_around(&d, centre, 5, &l, NULL));
+    REFUSES(TERRIMP_E_NOT_FINITE, l, terrimp_layers_around(&d, wrong, 5, &l, pictures));
+    REFUSES(TERRIMP_E_NOT_FINITE, l,
+            terrimp_layers_around(&d, centre, not_finite(1), &l, pictures));
+    REFUSES(TERRIMP_E_RANGE, pictures, terrimp_layers_around(&d, centre, 0, &l, pictures));
+    d.texel = 0;
+    REFUSES(TERRIMP_E_RANGE, pictures, terrimp_layers_around(&d, centre, 5, &l, pictures));
+    d.distance = 0;
+    REFUSES(TERRIMP_E_RANGE, l, terrimp_layers_around(&d, centre, 5, &l, pictures));
+    REFUSES(TERRIMP_E_NULL, counts, terrimp_layers_object(NULL, 1, 1, counts));
+    GIVES(TERRIMP_E_NULL, terrimp_layers_object(&box, 1, 1, NULL));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&box, 0, 1, counts));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&box, 1, 0.5f, counts));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&bad, 1, 1, counts));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&box, 1e-6f, 1, counts));
+    REFUSES(TERRIMP_E_NOT_FINITE, counts, terrimp_layers_object(&box, not_finite(2), 1, counts));
+    box.max[0] = not_finite(1);
+    REFUSES(TERRIMP_E_NOT_FINITE, counts, terrimp_layers_object(&box, 1, 1, counts));
+}
+
 /* ---- bad input ---- */
 
 static void depth_meshes_refuse(void)
@@ -1418,6 +1542,9 @@ static void layers_tests(void)
     RUN(corners_between_two_layers_are_closed);
     RUN(depth_meshes_keep_to_their_layers_and_these_to_them);
     RUN(vertices_of_depth_meshes_stand_on_their_layers);
+    RUN(layers_all_round_hold_the_world_beyond);
+    RUN(layers_of_objects_pass_each_other_by_a_texel);
+    RUN(layers_all_round_refuse);
     RUN(recording_refuses);
     RUN(depth_meshes_refuse);
     RUN(layers_refuse);
