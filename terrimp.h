@@ -2298,6 +2298,67 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
                                          size_t bytes, uint8_t *shown, float *costs,
                                          terrimp_placement *placement);
 
+
+/* --- a prepared set for a terrain --- */
+
+/* Eyes are anywhere in a box, which is cut along x and z into 2^cell_levels x 2^cell_levels cells;
+   they look level, or up and down as far as the same nodes are in sight. Costs are those of draws
+   and triangles of ground, at the level that keeps the tolerance, and of coarse meshes. */
+typedef struct terrimp_place_terrain_desc {
+    const terrimp_terrain *terrain; /* (required) built */
+    terrimp_box eyes;        /* (required) [wu] */
+    uint32_t cell_levels;    /* [Limits: 0..6] */
+    uint32_t directions;     /* parts of the circle, each with its views [Limits: 1..64]
+                                [Default 0 -> 8] */
+    float fov_rad;           /* (required) width of what an eye sees, seen from above
+                                [Limits: 0.01..6.3] */
+    float pixel_factor;      /* (required) K [Limits: > 0] */
+    float tolerance_px;      /* of ground and of pictures [Limits: > 0] [Default 0 -> 1] */
+    float max_angle_rad;     /* by which a picture's node may turn over its cells [Limits: > 0]
+                                [Default 0 -> 0.1] */
+    float texels_per_px;     /* from the closest eye [Limits: > 0] [Default 0 -> 1] */
+    float draw_cost, triangle_cost; /* [Limits: >= 0] [Default both 0 -> 40 and 1] */
+} terrimp_place_terrain_desc;
+
+/* A picture that may be prepared: of a node, for a square of cells, from its middle. */
+typedef struct terrimp_place_picture {
+    uint32_t node;
+    uint32_t level;         /* 2^level x 2^level cells */
+    uint32_t x, z;          /* squares of that size from the corner of the eyes' box */
+    float eye[3];           /* [wu] terrimp_capture_fit of the node's box from here */
+    uint32_t width, height; /* [texels] without margins */
+} terrimp_place_picture;
+
+/* Arrays of the caller; counts are written also when they are more than the capacities. View
+   (z * cells + x) * directions + k looks from cell (x, z) into the k-th part of the circle, from +x
+   towards +z. Candidates' memory counts texels. */
+typedef struct terrimp_place_set {
+    terrimp_place_candidate *candidates; /* [candidate_capacity] out */
+    terrimp_place_picture *pictures;     /* [candidate_capacity] out, the same in other words */
+    terrimp_place_gain *gains;           /* [gain_capacity] out */
+    uint32_t *parents;                   /* [cluster_capacity] out: one a node */
+    float *costs;                        /* [view_capacity] out */
+    uint32_t candidate_capacity, gain_capacity, cluster_capacity, view_capacity;
+    uint32_t candidate_count, gain_count, cluster_count, view_count; /* out */
+} terrimp_place_set;
+
+/* Bytes of scratch memory that terrimp_place_terrain needs; 0 for a descriptor that it refuses. */
+TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terrain_desc *desc);
+
+/* Makes the input of terrimp_place from a terrain: every node, for every square of cells from which
+   its picture would keep within the tolerance and the angle, wherever it saves something. What is
+   chosen then is rendered once, by the captures that are always used, and drawn from read-only
+   memory: for machines that cannot render into textures.
+
+   scratch    aligned to 8 bytes
+   Errors     E_NULL; E_STATE for a terrain that is not built; E_NOT_FINITE; E_RANGE; E_ALIGN;
+              E_MEMORY; E_CAPACITY: the counts say how much is needed
+   Cost       O(views * nodes * cell_levels)
+   Source     Jeschke 2004, sections 5.5 and 5.6; box cells */
+TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
+                                                 void *scratch, size_t bytes,
+                                                 terrimp_place_set *set);
+
 #endif /* TERRIMP_NO_BUILD */
 
 #ifdef __cplusplus
@@ -16164,6 +16225,325 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     for (i = 0; i < desc->gain_count; i++)
         if (shown[i])
             costs[desc->gains[i].view] -= desc->gains[i].saved;
+    return TERRIMP_OK;
+}
+
+
+/* --- a prepared set for a terrain --- */
+
+typedef struct terrimpi_prepare {
+    terrimp_place_terrain_desc desc; /* resolved */
+    terrimp_place_set *set;
+    uint32_t cells, nodes, squares;  /* along a side; all; of all sizes */
+    float *worth;       /* [nodes] what the node costs as ground in a view */
+    uint8_t *whole;     /* [nodes] ground of the cell draws it, and none of its parts */
+    uint8_t *below;     /* [nodes] of such a node */
+    uint32_t *slots;    /* [squares][nodes] gains of that picture, later where the next one goes;
+                           TERRIMPI_PLACE_NONE: it cannot be prepared */
+} terrimpi_prepare;
+
+static float terrimpi_boxes_distance(const terrimp_box *a, const terrimp_box *b)
+{
+    float gap[3];
+    int k;
+    for (k = 0; k < 3; k++)
+        gap[k] = terrimpi_max(0.0f, terrimpi_max(a->min[k] - b->max[k], b->min[k] - a->max[k]));
+    return terrimpi_length(gap);
+}
+
+/* The box of eyes of a square of 2^level cells. */
+static void terrimpi_prepare_square(const terrimpi_prepare *p, uint32_t level, uint32_t x,
+                                    uint32_t z, terrimp_box *box)
+{
+    float part = (float)(1u << level) / (float)p->cells;
+    float width = (p->desc.eyes.max[0] - p->desc.eyes.min[0]) * part;
+    float depth = (p->desc.eyes.max[2] - p->desc.eyes.min[2]) * part;
+    *box = p->desc.eyes;
+    box->min[0] += width * (float)x;
+    box->max[0] = box->min[0] + width;
+    box->min[2] += depth * (float)z;
+    box->max[2] = box->min[2] + depth;
+}
+
+/* The number of the first square of a level. */
+static uint32_t terrimpi_prepare_first(const terrimpi_prepare *p, uint32_t level)
+{
+    uint32_t first = 0, k;
+    for (k = 0; k < level; k++)
+        first += (p->cells >> k) * (p->cells >> k);
+    return first;
+}
+
+static float terrimpi_half_diagonal(const terrimp_box *box)
+{
+    float size[3];
+    terrimpi_sub(box->max, box->min, size);
+    return 0.5f * terrimpi_length(size);
+}
+
+/* Whether a node's picture from the middle of a square can serve all of its eyes, and its size. A
+   point that lies `error` off its mesh is then seen at most K error r / d^2 pixels off, when eyes
+   are up to r from that middle and at least d from the node: the directions differ by r / d. */
+static int terrimpi_prepare_picture(const terrimpi_prepare *p, const terrimp_box *square,
+                                    uint32_t node, terrimp_place_picture *out)
+{
+    terrimp_box box;
+    terrimp_mesh_info mesh;
+    terrimp_capture capture;
+    uint32_t size[2];
+    float r = terrimpi_half_diagonal(square), d, closer, scale;
+    int k;
+    if (terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0;
+    d = terrimpi_boxes_distance(square, &box);
+    for (k = 0; k < 3; k++)
+        out->eye[k] = 0.5f * (square->min[k] + square->max[k]);
+    if (!(r <= p->desc.max_angle_rad * d) ||
+        p->desc.pixel_factor * mesh.error * r > p->desc.tolerance_px * d * d ||
+        terrimp_capture_fit(&box, out->eye, &capture) != TERRIMP_OK)
+        return 0;
+    closer = terrimp_box_distance(&box, out->eye) / d;
+    if (terrimp_impostor_size(&capture, p->desc.pixel_factor, p->desc.texels_per_px * closer, 1,
+                              8192, size, &scale) != TERRIMP_OK || scale < 1.0f)
+        return 0;
+    out->width = size[0];
+    out->height = size[1];
+    return 1;
+}
+
+/* What ground draws for a cell, node by node: whole where that keeps the tolerance from its closest
+   eye. */
+static void terrimpi_prepare_ground(const terrimpi_prepare *p, const terrimp_box *cell)
+{
+    const terrimp_quadtree *tree = &p->desc.terrain->tree;
+    uint32_t i;
+    for (i = p->nodes; i-- > 0;) {
+        terrimp_node n = terrimpi_tree_node(tree, i), parent;
+        terrimp_box box;
+        terrimpi_mip_error_box(tree, &n, &box);
+        p->whole[i] = n.level == 0 ||
+                      tree->nodes[i].error * p->desc.pixel_factor <=
+                          p->desc.tolerance_px * terrimpi_boxes_distance(cell, &box);
+        p->below[i] = 0;
+        if (i + 1u == p->nodes)
+            continue;
+        parent = terrimpi_tree_parent(tree, &n);
+        p->below[i] = p->whole[parent.number] || p->below[parent.number];
+    }
+}
+
+/* Whether some eye of a cell may see a box when it looks into the k-th part of the circle: as if
+   cell and box were round. */
+static int terrimpi_prepare_sees(const terrimpi_prepare *p, const terrimp_box *cell,
+                                 const terrimp_box *box, uint32_t k)
+{
+    const float circle = 6.2831853f;
+    float middle = circle * ((float)k + 0.5f) / (float)p->desc.directions;
+    float x = 0.5f * (box->min[0] + box->max[0] - cell->min[0] - cell->max[0]);
+    float z = 0.5f * (box->min[2] + box->max[2] - cell->min[2] - cell->max[2]);
+    float far_off = terrimpi_hypot(x, z), angle, spread;
+    float round = 0.5f * (terrimpi_hypot(box->max[0] - box->min[0], box->max[2] - box->min[2]) +
+                          terrimpi_hypot(cell->max[0] - cell->min[0],
+                                         cell->max[2] - cell->min[2]));
+    if (!(far_off > round))
+        return 1;
+    spread = 0.5f * (p->desc.fov_rad + circle / (float)p->desc.directions) +
+             TERRIMP_ASINF(round / far_off) + 1e-4f;
+    angle = (x * TERRIMP_COSF(middle) + z * TERRIMP_SINF(middle)) / far_off;
+    return spread >= 3.1415927f || angle >= TERRIMP_COSF(spread);
+}
+
+/* What each node costs as ground in a view. */
+static void terrimpi_prepare_worth(const terrimpi_prepare *p, const terrimp_box *cell, uint32_t k)
+{
+    const terrimp_quadtree *tree = &p->desc.terrain->tree;
+    float quads = (float)tree->chunk_quads;
+    float own = p->desc.draw_cost + 2.0f * quads * quads * p->desc.triangle_cost;
+    uint32_t i;
+    for (i = 0; i < p->nodes; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i), children[4];
+        terrimp_box box;
+        uint32_t count;
+        p->worth[i] = 0.0f;
+        terrimp_terrain_get_box(p->desc.terrain, i, &box);
+        if (!terrimpi_prepare_sees(p, cell, &box, k))
+            continue;
+        if (p->whole[i]) {
+            p->worth[i] = own;
+            continue;
+        }
+        count = terrimpi_tree_children(tree, &n, cell->min, children);
+        while (count-- > 0)
+            p->worth[i] += p->worth[children[count].number];
+    }
+}
+
+/* What a node's picture saves in the view at hand. */
+static float terrimpi_prepare_saved(const terrimpi_prepare *p, uint32_t node)
+{
+    terrimp_mesh_info mesh;
+    if (p->below[node] || !(p->worth[node] > 0.0f) ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0.0f;
+    return p->worth[node] - p->desc.draw_cost -
+           p->desc.triangle_cost * (float)(mesh.index_count / 3u);
+}
+
+/* Counts the gains of all pictures, or writes them. */
+static void terrimpi_prepare_gains(terrimpi_prepare *p, int write)
+{
+    uint32_t cell_x, cell_z, k, i, level, view = 0;
+    for (cell_z = 0; cell_z < p->cells; cell_z++)
+        for (cell_x = 0; cell_x < p->cells; cell_x++) {
+            terrimp_box cell;
+            terrimpi_prepare_square(p, 0, cell_x, cell_z, &cell);
+            terrimpi_prepare_ground(p, &cell);
+            for (k = 0; k < p->desc.directions; k++, view++) {
+                terrimpi_prepare_worth(p, &cell, k);
+                if (write)
+                    p->set->costs[view] = p->worth[p->nodes - 1u];
+                for (i = 0; i < p->nodes; i++) {
+                    float saved = terrimpi_prepare_saved(p, i);
+                    for (level = 0; saved > 0.0f && level <= p->desc.cell_levels; level++) {
+                        uint32_t square = terrimpi_prepare_first(p, level) +
+                                          (cell_z >> level) * (p->cells >> level) +
+                                          (cell_x >> level);
+                        uint32_t *slot = &p->slots[(size_t)square * p->nodes + i];
+                        if (*slot == TERRIMPI_PLACE_NONE)
+                            continue;
+                        if (write) {
+                            p->set->gains[*slot].view = view;
+                            p->set->gains[*slot].saved = saved;
+                        }
+                        ++*slot;
+                    }
+                }
+            }
+        }
+}
+
+/* Goes through all pictures: first marks those that can be prepared, then, when their gains have
+   been counted, gives those that have any a place. */
+static void terrimpi_prepare_pictures(terrimpi_prepare *p, int list)
+{
+    uint32_t level, x, z, i, square = 0;
+    p->set->candidate_count = p->set->gain_count = 0;
+    for (level = 0; level <= p->desc.cell_levels; level++)
+        for (z = 0; z < p->cells >> level; z++)
+            for (x = 0; x < p->cells >> level; x++, square++) {
+                terrimp_box box;
+                terrimpi_prepare_square(p, level, x, z, &box);
+                for (i = 0; i < p->nodes; i++) {
+                    uint32_t *slot = &p->slots[(size_t)square * p->nodes + i], count = *slot;
+                    terrimp_place_picture made;
+                    uint32_t at = p->set->candidate_count;
+                    if (!list)
+                        *slot = terrimpi_prepare_picture(p, &box, i, &made) ? 0u
+                                                                            : TERRIMPI_PLACE_NONE;
+                    if (!list || count == TERRIMPI_PLACE_NONE || count == 0)
+                        continue;
+                    if (at < p->set->candidate_capacity) {
+                        terrimpi_prepare_picture(p, &box, i, &made);
+                        made.node = i;
+                        made.level = level;
+                        made.x = x;
+                        made.z = z;
+                        p->set->pictures[at] = made;
+                        p->set->candidates[at].cluster = i;
+                        p->set->candidates[at].first_gain = p->set->gain_count;
+                        p->set->candidates[at].gain_count = count;
+                        p->set->candidates[at].memory = (float)made.width * (float)made.height;
+                    }
+                    *slot = p->set->gain_count;
+                    p->set->gain_count += count;
+                    p->set->candidate_count++;
+                }
+            }
+}
+
+/* Checks a descriptor, fills in its defaults and lays out the scratch memory. */
+static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *desc, void *base,
+                                             terrimpi_prepare *p, size_t *bytes)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    terrimp_terrain_info info;
+    terrimp_place_terrain_desc *d = &p->desc;
+    int k;
+    TERRIMPI_REFUSE(!desc || !desc->terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_terrain_get_info(desc->terrain, &info));
+    *d = *desc;
+    TERRIMPI_DEFAULT(d->directions, 8u);
+    TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
+                        !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
+                        !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
+                        !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
+                        !terrimpi_finite(d->texels_per_px),
+                    TERRIMP_E_NOT_FINITE);
+    for (k = 0; k < 3; k++)
+        TERRIMPI_REFUSE(d->eyes.min[k] > d->eyes.max[k], TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(d->cell_levels > 6u || d->directions > 64u ||
+                        !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
+                        d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f ||
+                        d->texels_per_px < 0.0f || d->draw_cost < 0.0f || d->triangle_cost < 0.0f,
+                    TERRIMP_E_RANGE);
+    d->tolerance_px = d->tolerance_px > 0.0f ? d->tolerance_px : 1.0f;
+    d->max_angle_rad = d->max_angle_rad > 0.0f ? d->max_angle_rad : 0.1f;
+    d->texels_per_px = d->texels_per_px > 0.0f ? d->texels_per_px : 1.0f;
+    if (!(d->draw_cost > 0.0f) && !(d->triangle_cost > 0.0f)) {
+        d->draw_cost = 40.0f;
+        d->triangle_cost = 1.0f;
+    }
+    p->cells = 1u << d->cell_levels;
+    p->nodes = info.node_count;
+    p->squares = terrimpi_prepare_first(p, d->cell_levels + 1u);
+    p->worth = (float *)terrimpi_take(&arena, p->nodes, sizeof *p->worth);
+    p->whole = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->below = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->slots = (uint32_t *)terrimpi_take(&arena, terrimpi_mul(p->squares, p->nodes, &arena.ok),
+                                         sizeof *p->slots);
+    *bytes = arena.bytes;
+    return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
+}
+
+TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terrain_desc *desc)
+{
+    terrimpi_prepare p;
+    size_t bytes;
+    return terrimpi_prepare_begin(desc, NULL, &p, &bytes) == TERRIMP_OK ? bytes : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
+                                                 void *scratch, size_t bytes,
+                                                 terrimp_place_set *set)
+{
+    terrimpi_prepare p;
+    size_t needed;
+    uint32_t i;
+    TERRIMPI_REFUSE(!scratch || !set || !set->candidates || !set->pictures || !set->gains ||
+                        !set->parents || !set->costs,
+                    TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
+    p.set = set;
+    set->cluster_count = p.nodes;
+    set->view_count = p.cells * p.cells * p.desc.directions;
+    terrimpi_prepare_pictures(&p, 0);
+    terrimpi_prepare_gains(&p, 0);
+    terrimpi_prepare_pictures(&p, 1);
+    TERRIMPI_REFUSE(set->candidate_count > set->candidate_capacity ||
+                        set->gain_count > set->gain_capacity ||
+                        set->cluster_count > set->cluster_capacity ||
+                        set->view_count > set->view_capacity,
+                    TERRIMP_E_CAPACITY);
+    terrimpi_prepare_gains(&p, 1);
+    for (i = 0; i < p.nodes; i++) {
+        terrimp_node n = terrimpi_tree_node(&p.desc.terrain->tree, i);
+        set->parents[i] = i + 1u == p.nodes
+                              ? i
+                              : terrimpi_tree_parent(&p.desc.terrain->tree, &n).number;
+    }
     return TERRIMP_OK;
 }
 
