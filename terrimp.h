@@ -16291,7 +16291,7 @@ static int terrimpi_prepare_sees(const terrimpi_prepare *p, const terrimp_box *c
         return 1;
     spread = 0.5f * (p->desc.fov_rad + circle / (float)p->desc.directions) +
              TERRIMP_ASINF(round / far_off) + 1e-4f;
-    angle = (x * TERRIMP_COSF(middle) + z * TERRIMP_SINF(middle)) / far_off;
+    angle = (x * TERRIMP_COSF(middle) + z * TERRIMP_COSF(middle - 0.25f * circle)) / far_off;
     return spread >= 3.1415927f || angle >= TERRIMP_COSF(spread);
 }
 
