@@ -228,7 +228,7 @@ extern "C" {
     X(TERRIMP_E_STATE, 11, "called too early: build or update first")                             \
     X(TERRIMP_E_MISS, 12, "the ray or the point does not meet the terrain")                       \
     X(TERRIMP_E_BAKE, 13, "the block is damaged, or no bake of this version and heightfield")     \
-    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: convert it")
+    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: write it swapped")
 
 typedef enum terrimp_result {
 #define TERRIMPI_X(name, value, text) name = value,
@@ -902,10 +902,8 @@ typedef struct terrimp_terrain_desc {
     int not_proud;             /* nonzero: meshes are not raised, whatever proud says */
     int no_lower_skirts;       /* nonzero: without skirts that hang from the border, by a quarter of
                                   the node's heights, down to neighbours of other levels */
-    int upper_skirts;          /* nonzero: also with skirts that rise over the border by what still
-                                  stands out there. Raised meshes gain nothing from them */
     float height_low;          /* [wu] between these two all samples lie, also after edits: */
-    float height_high;         /* meshes store their heights in 65535 steps of 3 times that range
+    float height_high;         /* meshes store those of borders in 2^22 steps of 3 times that range
                                   [Limits: height_low <= height_high]
                                   [Default both 0 -> terrimp_terrain_build_begin finds them] */
 } terrimp_terrain_desc;
@@ -925,6 +923,8 @@ typedef struct terrimp_terrain_info {
     uint32_t mesh_index_stride;     /* the same of its indices */
     uint32_t mesh_vertex_count;     /* node_count * mesh_vertex_stride, and the floor */
     uint32_t mesh_index_count;      /* node_count * mesh_index_stride, and the floor */
+    uint32_t floor_vertex_count;    /* what is behind the meshes of all nodes */
+    uint32_t floor_index_count;
     uint32_t mesh_triangle_count;   /* of all coarse meshes without skirts */
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
@@ -1031,9 +1031,9 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain);
 
 /* What building a terrain results in, as one block: for a file, for read-only memory, for a memory
    map. It holds no pointer and is used where it lies, on machines of the byte order that it was
-   made on; convert turns that round. Floats are IEEE 754 of 32 bits. The samples stay apart. */
+   made on. Floats are IEEE 754 of 32 bits. The samples stay apart. */
 
-#define TERRIMP_BAKE_VERSION 1u
+#define TERRIMP_BAKE_VERSION 2u
 
 /* What a bake says about itself. */
 typedef struct terrimp_bake_info {
@@ -1046,31 +1046,18 @@ typedef struct terrimp_bake_info {
 } terrimp_bake_info;
 
 /* Looks at a bake: sizes, checksum, and every number in it, so that whatever block passes can be
-   drawn without harm, also one that somebody made to do harm.
+   drawn without harm, also a crafted one; and, when there is a field, whether that still has the
+   very samples which the bake was made of: open compares only its size, format, scale and offset.
 
    block      [bytes] aligned to 8 bytes
+   field      NULL: not compared
    info       out; NULL: not wanted
-   Errors     E_BAKE; E_ORDER when it has to be converted first
-   Cost       O(nodes), about 1 us for each */
+   Errors     E_BAKE, also for another field; E_ORDER when it was made for the other byte order;
+              those of terrimp_heightfield_resolve
+   Cost       O(nodes), about 1 us for each, and with a field O(width * depth) */
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
+                                              const terrimp_heightfield *field,
                                               terrimp_bake_info *info);
-
-/* Turns the byte order of a bake round: from the other one to this machine's, or from this one to
-   the other, for a host that bakes for another machine.
-
-   block      [bytes] aligned to 8 bytes
-   out        [capacity] aligned to 8 bytes; may be block, else apart from it
-   Errors     E_BAKE: out, if it is not block, may have changed */
-TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
-                                                size_t capacity);
-
-/* Whether a heightfield still has the very samples that a bake was made of: open compares only its
-   size, format, scale and offset.
-
-   Errors     those of check and of terrimp_heightfield_resolve; E_BAKE when it is another field
-   Cost       O(width * depth) */
-TERRIMP_API terrimp_result terrimp_bake_matches(const void *block, size_t bytes,
-                                                const terrimp_heightfield *field);
 
 /* The bytes of memory that a terrain needs which uses a bake where it lies. */
 TERRIMP_API size_t terrimp_terrain_open_bytes(void);
@@ -1529,7 +1516,7 @@ typedef struct terrimp_sorted {
                                     of this level is split */
     terrimp_sorted_int whole[TERRIMP_SORTED_LEVELS]; /* up to here a vertex has its own height */
     float fade[TERRIMP_SORTED_LEVELS]; /* 1 / (split of the next level - whole) */
-    terrimp_sorted_int texel_steps[3]; /* where the level after 0 begins; with less, with more */
+    terrimp_sorted_int texel_steps[2]; /* squared: where level 1 begins, and where it is left */
     uint32_t side_count;         /* of the footprint: sides[0] x + sides[1] z + sides[2] >= 0 */
     terrimp_sorted_int sides[TERRIMP_SORTED_SIDES][3];
     int32_t bounds[2][2];        /* of the footprint: first and last page along each axis */
@@ -1666,6 +1653,24 @@ TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
                                                  const terrimp_layer_quad *quad,
                                                  const uint32_t atlas[2], float xyz[12],
                                                  float st[8]);
+
+/* A vertex of a depth mesh, in the grid of its layers: column and row of the picture in texels, and
+   the layer, whole numbers at the layers themselves. One unit in any direction is about one pixel
+   from where it shows most. With layers planned `even` planes of the world are planes in it. */
+typedef struct terrimp_depth_vertex {
+    float u, v, layer;
+} terrimp_depth_vertex;
+
+/* Where the vertices of a depth mesh stand in the world.
+
+   vertices    [count]
+   xyz         [count][3] out [wu]
+   Errors      E_NULL; E_RANGE for layers that are none
+   Cost        O(count * log(layers)) */
+TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
+                                                const terrimp_capture *picture,
+                                                const terrimp_depth_vertex *vertices,
+                                                uint32_t count, float *xyz);
 
 #ifndef TERRIMP_NO_BUILD
 
@@ -1942,9 +1947,10 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
+   swapped    nonzero: for a machine of the other byte order
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
-                                              size_t bytes);
+                                              size_t bytes, int swapped);
 
 /* ==== Visible sets ======================================================= >>visible-sets */
 
@@ -2148,6 +2154,93 @@ TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uin
                                                 uint32_t width, uint32_t height,
                                                 uint32_t *wanted);
 
+/* --- textured depth meshes (Jeschke 4) --- */
+
+/* A part of a depth mesh that shows each texel once, and so has one texture: its rectangle of the
+   picture, where each texel has the colour of one of the layers. */
+typedef struct terrimp_depth_sheet {
+    terrimp_rect texels;
+    uint32_t first_texel;              /* of its rectangle, row by row, in texel_layers */
+    uint32_t first_index, index_count; /* its triangles */
+} terrimp_depth_sheet;
+
+#define TERRIMP_DEPTH_NONE 0xffffu /* a texel that no layer has a colour for */
+
+typedef struct terrimp_depth_mesh_desc {
+    const uint32_t *opaque;  /* (required) [layers][height][TERRIMP_MASK_WORDS(width)] all texels:
+                                where layers touch in these, the mesh is connected */
+    const uint32_t *visible; /* (required) the same, culled: what must be shown; may be opaque */
+    uint32_t width;        /* (required) [texels] [Limits: 1..16384] */
+    uint32_t height;       /* (required) [texels] [Limits: 1..16384] */
+    uint32_t layers;       /* (required) [Limits: 1..65535] */
+    float tolerance;       /* [texels, layers] from the middle of each opaque texel to the mesh, and
+                              in each direction from the mesh to such a middle, looked at in steps
+                              of up to 1
+                              [Limits: 0.75..64] [Default 0 -> 1] */
+} terrimp_depth_mesh_desc;
+
+/* A depth mesh in arrays of the caller. */
+typedef struct terrimp_depth_mesh {
+    terrimp_depth_vertex *vertices; /* (required) [vertex_capacity] */
+    uint32_t *indices;              /* (required) [index_capacity] they wind counter-clockwise */
+    terrimp_depth_sheet *sheets;    /* (required) [sheet_capacity] */
+    uint16_t *texel_layers;         /* (required) [texel_capacity] or TERRIMP_DEPTH_NONE */
+    uint32_t vertex_capacity, index_capacity, sheet_capacity, texel_capacity;
+    uint32_t vertex_count, index_count, sheet_count, texel_count; /* out, also when too many */
+    uint32_t first_triangle_count;  /* out: before any was saved */
+} terrimp_depth_mesh;
+
+/* Bytes of scratch memory for a depth mesh of these masks; 0 for bad ones, or when they overflow.
+   Looks at all of them. */
+TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_desc *desc);
+
+/* Makes one mesh of all layers: as many triangles as the shape needs, however many layers that
+   reaches through. Texels are connected where layers touch; then edges collapse, short ones first,
+   as long as the mesh stays within the tolerance of the texels and they of it. Its border and the
+   seams between sheets only move along themselves. The texture needs no perspective: it is the
+   picture, as terrimp_texture_matrix projects it. Texels at a sheet's border may be wanted that
+   have no colour: hosts fill them from their neighbours, as gutters.
+
+   scratch    aligned to 8 bytes
+   mesh       in: arrays; out: the rest
+   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY: counts say how much is needed
+   Cost       about 3 us for each visible texel; 0.14 s for 58,000 in 113 layers
+   Source     Jeschke 2004, chapter 4. Ours: one vertex for each corner of texels where he has four
+              for each texel; the bound from mesh to layers; sheets */
+TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc *desc,
+                                                   void *scratch, size_t bytes,
+                                                   terrimp_depth_mesh *mesh);
+
+/* --- layers all round a cell, and for all views of an object (Jeschke 3.8) --- */
+
+/* Layers for everything beyond a distance from a cube: the same ones before each of its six sides,
+   each from the middle of its side. A side's picture holds its sixth of the world, the pyramid
+   from the cube's centre, and some of its neighbours', since it is taken from closer by.
+
+   centre     [3] of the cube [wu]
+   desc       distance, depth, texel, tolerance_rad and even; distance counts from the sides. Its
+              cell_size, cell_depth, cell_tan and view_tan are not looked at
+   half       [wu] of the cube's side [Limits: > 0]
+   layers     out
+   pictures   [6] out: +x, -x, +y, -y, +z, -z
+   Errors     those of terrimp_layers_plan */
+TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
+                                                 const float centre[3], float half,
+                                                 terrimp_layers *layers,
+                                                 terrimp_capture pictures[6]);
+
+/* Layers for an object that is seen from everywhere: three sets, across x, y and z, recorded in
+   parallel projection. An eye draws the set across the direction that it looks along most, from
+   either side. Layer i of `count` stands at box->min + (i + 0.5) / count of the extent.
+
+   texel      [wu] of all layers; for an eye at a distance d no more than d / K [Limits: > 0]
+   slope      largest tangent between a line of sight and the axis of the set that is drawn: 1 for
+              eyes far away, 1 + extent / distance for closer ones [Limits: >= 1]
+   counts     [3] out: layers across x, y, z. Texels pass each other by one at most
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed */
+TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
+                                                 uint32_t counts[3]);
+
 /* ==== Placement ========================================================== >>placement */
 
 /* Which pictures to prepare, so that no view costs more than a budget and the pictures take little
@@ -2210,6 +2303,67 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
 TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
                                          size_t bytes, uint8_t *shown, float *costs,
                                          terrimp_placement *placement);
+
+
+/* --- a prepared set for a terrain --- */
+
+/* Eyes are anywhere in a box, which is cut along x and z into 2^cell_levels x 2^cell_levels cells;
+   they look level, or up and down as far as the same nodes are in sight. Costs are those of draws
+   and triangles of ground, at the level that keeps the tolerance, and of coarse meshes. */
+typedef struct terrimp_place_terrain_desc {
+    const terrimp_terrain *terrain; /* (required) built */
+    terrimp_box eyes;        /* (required) [wu] */
+    uint32_t cell_levels;    /* [Limits: 0..6] */
+    uint32_t directions;     /* parts of the circle, each with its views [Limits: 1..64]
+                                [Default 0 -> 8] */
+    float fov_rad;           /* (required) width of what an eye sees, seen from above
+                                [Limits: 0.01..6.3] */
+    float pixel_factor;      /* (required) K [Limits: > 0] */
+    float tolerance_px;      /* of ground and of pictures [Limits: > 0] [Default 0 -> 1] */
+    float max_angle_rad;     /* by which a picture's node may turn over its cells [Limits: > 0]
+                                [Default 0 -> 0.1] */
+    float texels_per_px;     /* from the closest eye [Limits: > 0] [Default 0 -> 1] */
+    float draw_cost, triangle_cost; /* [Limits: >= 0] [Default both 0 -> 40 and 1] */
+} terrimp_place_terrain_desc;
+
+/* A picture that may be prepared: of a node, for a square of cells, from its middle. */
+typedef struct terrimp_place_picture {
+    uint32_t node;
+    uint32_t level;         /* 2^level x 2^level cells */
+    uint32_t x, z;          /* squares of that size from the corner of the eyes' box */
+    float eye[3];           /* [wu] terrimp_capture_fit of the node's box from here */
+    uint32_t width, height; /* [texels] without margins */
+} terrimp_place_picture;
+
+/* Arrays of the caller; counts are written also when they are more than the capacities. View
+   (z * cells + x) * directions + k looks from cell (x, z) into the k-th part of the circle, from +x
+   towards +z. Candidates' memory counts texels. */
+typedef struct terrimp_place_set {
+    terrimp_place_candidate *candidates; /* [candidate_capacity] out */
+    terrimp_place_picture *pictures;     /* [candidate_capacity] out, the same in other words */
+    terrimp_place_gain *gains;           /* [gain_capacity] out */
+    uint32_t *parents;                   /* [cluster_capacity] out: one a node */
+    float *costs;                        /* [view_capacity] out */
+    uint32_t candidate_capacity, gain_capacity, cluster_capacity, view_capacity;
+    uint32_t candidate_count, gain_count, cluster_count, view_count; /* out */
+} terrimp_place_set;
+
+/* Bytes of scratch memory that terrimp_place_terrain needs; 0 for a descriptor that it refuses. */
+TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terrain_desc *desc);
+
+/* Makes the input of terrimp_place from a terrain: every node, for every square of cells from which
+   its picture would keep within the tolerance and the angle, wherever it saves something. What is
+   chosen then is rendered once, by the captures that are always used, and drawn from read-only
+   memory: for machines that cannot render into textures.
+
+   scratch    aligned to 8 bytes
+   Errors     E_NULL; E_STATE for a terrain that is not built; E_NOT_FINITE; E_RANGE; E_ALIGN;
+              E_MEMORY; E_CAPACITY: the counts say how much is needed
+   Cost       O(views * nodes * cell_levels)
+   Source     Jeschke 2004, sections 5.5 and 5.6; box cells */
+TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
+                                                 void *scratch, size_t bytes,
+                                                 terrimp_place_set *set);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -5429,29 +5583,33 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
 /* Based on: Hess 2010, sections 3.1, 4.2 and 6.5 (coarse meshes, skirts, meshes for many chunks);
    de Boer 2000, section 2.2 (quadtree).
 
-   What is built stands in four arrays with a fixed share for each node and without any pointer:
-   so nodes can be built in any order, and the arrays can lie in read-only memory (room Bake). */
+   What is built stands in four arrays of 32-bit words with a fixed share for each node and without
+   any pointer: so nodes can be built in any order, and the arrays can lie in read-only memory and
+   change their byte order (room Bake). */
 
-#define TERRIMPI_DIRECTIONS 8u      /* neighbours of a node */
-#define TERRIMPI_FLOOR_QUADS 32u    /* along a side of the floor at most: 2048 triangles in all */
-#define TERRIMPI_WALL_POINTS 2u     /* of the walls round it, for each of these */
-#define TERRIMPI_HEIGHT_STEPS 65535 /* of the heights of meshes */
+#define TERRIMPI_DIRECTIONS 8u           /* neighbours of a node */
+#define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
+#define TERRIMPI_WALL_POINTS 2u          /* of the walls round it, for each of these */
+#define TERRIMPI_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
+#define TERRIMPI_INNER_STEPS 0xffffu     /* of those of inner vertices */
 
 /* What is kept of a node's coarse mesh. Skirts are not stored: they follow from the border loop. */
 typedef struct terrimpi_mesh {
     float error, error_rms; /* [wu] of the mesh as drawn, against every sample */
-    float upper_skirt;      /* [wu] its height */
+    float base;             /* [wu] the heights of inner vertices count from it on */
     float low, high;        /* [wu] of everything that is drawn of the node and of those below */
-    uint16_t triangle_count;
-    uint8_t border_count;
-    uint8_t vertex_count;   /* of the surface; 0: not built */
+    uint32_t counts;        /* 9 bits: triangles; 7: vertices of the border; 8: of the surface, 0 if
+                               it is not built; 8: the exponent of the steps of inner heights */
 } terrimpi_mesh;
 
 /* A vertex of it. Column and row count in steps of 2^level samples within the node; the last ones
-   stand for its last column and row. The height counts in steps of the terrain's range. */
+   stand for its last column and row. Inner ones are stored as 8 bits of column, 8 of row and 16 of
+   height, in steps of the node's own: one extreme sample spoils only the nodes that hold it. Those
+   of borders have to meet those of neighbours to the bit: 8 bits along the side, 2 for which side,
+   and 22 of height, in steps of the terrain. */
 typedef struct terrimpi_point {
-    uint8_t x, z;
-    uint16_t height;
+    uint32_t x, z;
+    float height;
 } terrimpi_point;
 
 struct terrimp_terrain {
@@ -5460,11 +5618,11 @@ struct terrimp_terrain {
     uint32_t mesh_triangle_count;          /* all nodes */
     uint32_t floor_level;                  /* level whose nodes are the floor's quads */
     float sample_low, sample_high;         /* [wu] between these all samples lie */
-    float range_low, range_step;           /* [wu] heights of meshes: low + step * 0..65535 */
+    float range_low, range_step;           /* [wu] heights of borders: low + step * 0..2^22 - 1 */
     uint16_t begun, built, baked;
     terrimpi_mesh *meshes;                 /* [node_count] */
-    terrimpi_point *points;                /* [node_count][vertex_limit] */
-    uint8_t *corners;                      /* [node_count][index_limit] indices of the surface */
+    uint32_t *points;                      /* [node_count][vertex_limit] */
+    uint32_t *corners;                     /* [node_count][index_limit / 4] four indices each */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -5555,7 +5713,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
 {
     uint32_t budget = t->desc.triangle_budget, skirts;
     int ok = 1;
-    skirts = (t->desc.no_lower_skirts ? 0u : 1u) + (t->desc.upper_skirts ? 1u : 0u);
+    skirts = t->desc.no_lower_skirts ? 0u : 1u;
     terrimp_quadtree_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
     /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices in all. */
     t->border_limit = 4u * (terrimpi_border_points(budget) + 1u);
@@ -5581,9 +5739,8 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
     count = t->tree.node_count;
     t->tree.nodes = (terrimp_geomip_node *)terrimpi_take(&b, count, sizeof *t->tree.nodes);
     t->meshes = (terrimpi_mesh *)terrimpi_take(&b, count, sizeof *t->meshes);
-    t->points =
-        (terrimpi_point *)terrimpi_take(&b, count, t->vertex_limit * sizeof *t->points);
-    t->corners = (uint8_t *)terrimpi_take(&b, count, t->index_limit);
+    t->points = (uint32_t *)terrimpi_take(&b, count, t->vertex_limit * sizeof *t->points);
+    t->corners = (uint32_t *)terrimpi_take(&b, count, t->index_limit);
     return b.ok ? b.bytes : 0;
 }
 
@@ -5609,17 +5766,6 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
     return p;
 }
 
-/* Samples from the node's first one to a point of its mesh. */
-static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
-{
-    return terrimpi_lattice(point->x, p->level, p->span_x);
-}
-
-static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
-{
-    return terrimpi_lattice(point->z, p->level, p->span_z);
-}
-
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
@@ -5631,17 +5777,67 @@ static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
     return terrimpi_tree_z(&t->tree, 0, row);
 }
 
-/* The height that a number of steps stands for. */
-static float terrimpi_mesh_height(const terrimp_terrain *t, uint32_t steps)
+static uint32_t terrimpi_mesh_triangles(const terrimpi_mesh *mesh)
+{
+    return mesh->counts & 0x1ffu;
+}
+
+static uint32_t terrimpi_mesh_border(const terrimpi_mesh *mesh)
+{
+    return mesh->counts >> 9 & 0x7fu;
+}
+
+static uint32_t terrimpi_mesh_vertices(const terrimpi_mesh *mesh)
+{
+    return mesh->counts >> 16 & 0xffu;
+}
+
+/* The step of a mesh's inner heights: a power of two, or 0. */
+static float terrimpi_mesh_step(const terrimpi_mesh *mesh)
+{
+    uint32_t bits = mesh->counts >> 24 << 23;
+    float step;
+    memcpy(&step, &bits, sizeof step);
+    return step;
+}
+
+/* The height that a number of steps stands for, on a border. */
+static float terrimpi_border_height(const terrimp_terrain *t, uint32_t steps)
 {
     return t->range_low + t->range_step * (float)steps;
+}
+
+/* Vertex i of a node's mesh. */
+static terrimpi_point terrimpi_mesh_point(const terrimp_terrain *t, const terrimpi_patch *p,
+                                          uint32_t node, uint32_t i)
+{
+    const terrimpi_mesh *mesh = &t->meshes[node];
+    uint32_t word = t->points[(size_t)node * t->vertex_limit + i];
+    terrimpi_point point;
+    point.x = word & 0xffu;
+    point.z = word >> 8 & 0xffu;
+    if (i < terrimpi_mesh_border(mesh)) {
+        uint32_t side = point.z & 3u;
+        point.height = terrimpi_border_height(t, word >> 10);
+        point.z = terrimpi_along_x((int)side) ? side & 1u ? p->rows - 1u : 0u : point.x;
+        point.x = terrimpi_along_x((int)side) ? point.x : side & 1u ? p->cols - 1u : 0u;
+    } else {
+        point.height = mesh->base + terrimpi_mesh_step(mesh) * (float)(word >> 16);
+    }
+    return point;
+}
+
+/* Index i of a node's mesh. */
+static uint32_t terrimpi_mesh_corner(const terrimp_terrain *t, uint32_t node, uint32_t i)
+{
+    return t->corners[(size_t)node * (t->index_limit / 4u) + i / 4u] >> i % 4u * 8u & 0xffu;
 }
 
 /* Whether a range of heights does not overflow, nor squared errors that are summed up over all
    samples. */
 static int terrimpi_range_fits(const terrimp_heightfield *field, float low, float step)
 {
-    float range = step * (float)TERRIMPI_HEIGHT_STEPS;
+    float range = step * (float)TERRIMPI_BORDER_STEPS;
     return step >= 0.0f && terrimpi_finite(low) && terrimpi_finite(low + range) &&
            terrimpi_finite(range * range * (float)field->width * (float)field->depth);
 }
@@ -5678,12 +5874,12 @@ TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrai
 static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp_mesh_info *info)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
-    uint32_t skirts = (t->desc.no_lower_skirts ? 0u : 1u) + (mesh->upper_skirt > 0.0f ? 1u : 0u);
+    uint32_t rim = t->desc.no_lower_skirts ? 0u : terrimpi_mesh_border(mesh);
     info->base_vertex = node * t->vertex_stride;
-    info->vertex_count = mesh->vertex_count + skirts * mesh->border_count;
+    info->vertex_count = terrimpi_mesh_vertices(mesh) + rim;
     info->first_index = node * t->index_stride;
-    info->index_count = 3u * mesh->triangle_count + skirts * 6u * mesh->border_count;
-    info->triangle_count = mesh->triangle_count;
+    info->triangle_count = terrimpi_mesh_triangles(mesh);
+    info->index_count = 3u * info->triangle_count + 6u * rim;
     info->error = mesh->error;
     info->error_rms = mesh->error_rms;
 }
@@ -5872,10 +6068,10 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
-    info->mesh_vertex_count = tree->node_count * terrain->vertex_stride +
-                              terrimpi_floor_vertices(terrain);
-    info->mesh_index_count = tree->node_count * terrain->index_stride +
-                             terrimpi_floor_indices(terrain);
+    info->floor_vertex_count = terrimpi_floor_vertices(terrain);
+    info->floor_index_count = terrimpi_floor_indices(terrain);
+    info->mesh_vertex_count = tree->node_count * terrain->vertex_stride + info->floor_vertex_count;
+    info->mesh_index_count = tree->node_count * terrain->index_stride + info->floor_index_count;
     info->mesh_triangle_count = terrain->mesh_triangle_count;
     root = terrimpi_tree_root(tree);
     terrimpi_node_box(terrain, &root, &info->box);
@@ -6019,7 +6215,7 @@ static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const 
                                  uint32_t i)
 {
     const terrimp_geomip_node *range = &t->tree.nodes[node];
-    uint32_t n = t->meshes[node].border_count;
+    uint32_t n = terrimpi_mesh_border(&t->meshes[node]);
     float height = border[i * 3u + 1u];
     float lowest = terrimpi_min(border[(i + 1u) % n * 3u + 1u],
                                 border[(i + n - 1u) % n * 3u + 1u]);
@@ -6033,37 +6229,27 @@ static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const 
 static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
                                uint16_t *indices)
 {
-    const terrimpi_mesh *mesh = t->meshes + node;
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    terrimpi_patch p;
-    uint32_t i, vertices, index_count;
-    int upper;
-    p = terrimpi_patch_of(t, node);
-    vertices = mesh->vertex_count;
-    index_count = 3u * mesh->triangle_count;
+    terrimpi_patch p = terrimpi_patch_of(t, node);
+    uint32_t border = terrimpi_mesh_border(&t->meshes[node]), i;
+    uint32_t vertices = terrimpi_mesh_vertices(&t->meshes[node]);
+    uint32_t index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
+    float *rim = xyz + (size_t)vertices * 3u;
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
     for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_point_x(&p, &points[i]), z = terrimpi_point_z(&p, &points[i]);
-        xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
-        xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
-        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
+        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        xyz[i * 3u] = terrimpi_world_x(t, p.x + terrimpi_lattice(point.x, p.level, p.span_x));
+        xyz[i * 3u + 1u] = point.height;
+        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + terrimpi_lattice(point.z, p.level, p.span_z));
     }
     for (i = 0; i < index_count; i++)
-        indices[i] = corners[i];
-    for (upper = 0; upper < 2; upper++) {
-        float *rim = xyz + (size_t)vertices * 3u;
-        if (upper ? !(mesh->upper_skirt > 0.0f) : t->desc.no_lower_skirts)
-            continue;
-        memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
-        for (i = 0; i < mesh->border_count; i++)
-            rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
-                                     : terrimpi_skirt_foot(t, node, xyz, i);
-        terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
-        vertices += mesh->border_count;
-        index_count += 6u * mesh->border_count;
-    }
+        indices[i] = (uint16_t)terrimpi_mesh_corner(t, node, i);
+    if (t->desc.no_lower_skirts)
+        return;
+    memcpy(rim, xyz, (size_t)border * 3u * sizeof *rim);
+    for (i = 0; i < border; i++)
+        rim[i * 3u + 1u] = terrimpi_skirt_foot(t, node, xyz, i);
+    terrimpi_write_wall(indices + index_count, border, vertices, 0);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
@@ -6091,18 +6277,19 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity)
 {
-    size_t node, nodes;
+    size_t node, vertex_stride, index_stride;
     TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_check_node(terrain, 0, xyz));
-    nodes = terrain->tree.node_count;
-    if (xyz_capacity / 3u < nodes * terrain->vertex_stride + terrimpi_floor_vertices(terrain) ||
-        index_capacity < nodes * terrain->index_stride + terrimpi_floor_indices(terrain))
+    vertex_stride = terrain->vertex_stride;
+    index_stride = terrain->index_stride;
+    node = terrain->tree.node_count;
+    if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_vertices(terrain) ||
+        index_capacity < node * index_stride + terrimpi_floor_indices(terrain))
         return TERRIMP_E_CAPACITY;
-    for (node = 0; node < nodes; node++)
-        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + node * terrain->vertex_stride * 3u,
-                           indices + node * terrain->index_stride);
-    terrimpi_fill_floor(terrain, xyz + nodes * terrain->vertex_stride * 3u,
-                        indices + nodes * terrain->index_stride);
+    terrimpi_fill_floor(terrain, xyz + 3u * node * vertex_stride, indices + node * index_stride);
+    while (node-- > 0)
+        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + 3u * node * vertex_stride,
+                           indices + node * index_stride);
     return TERRIMP_OK;
 }
 
@@ -6145,16 +6332,15 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 #endif /* TERRIMP_NO_MALLOC */
 
 /* ==== Bake =============================================================== >>impl-bake */
-/* A header of 32-bit words, then the four arrays of the terrain's block as they are. Where they
-   stand follows from the header's sizes: there is no offset to be false. */
+/* A header, then the four arrays of the terrain's block as they are: nothing but 32-bit words.
+   Where the arrays stand follows from the header's sizes: there is no offset to be false. */
 
-#define TERRIMPI_BAKE_MAGIC 0x54494d50u /* reads otherwise in the other byte order */
-#define TERRIMPI_BAKE_MAGIC_TURNED 0x504d4954u
+#define TERRIMPI_BAKE_MAGIC 0x54494d50u
+#define TERRIMPI_BAKE_MAGIC_SWAPPED 0x504d4954u /* as it reads in the other byte order */
 
 enum {
     TERRIMPI_BAKE_NO_LOWER_SKIRTS = 1 << 0,
-    TERRIMPI_BAKE_NO_UPPER_SKIRTS = 1 << 1,
-    TERRIMPI_BAKE_NOT_PROUD = 1 << 2
+    TERRIMPI_BAKE_NOT_PROUD = 1 << 1
 };
 
 typedef struct terrimpi_bake {
@@ -6184,40 +6370,15 @@ static uint32_t terrimpi_float_bits(float value)
     return bits;
 }
 
-/* Copied, since a float may not be looked at as an integer where it lies. */
-static uint32_t terrimpi_hash_words(uint32_t hash, const void *words, size_t count)
+/* The checksum of a bake. Words are copied, since a float may not be looked at as an integer. */
+static uint32_t terrimpi_bake_hash(const void *block)
 {
-    const unsigned char *at = (const unsigned char *)words;
-    uint32_t word;
-    for (; count > 0; count--, at += sizeof word) {
+    const unsigned char *at = (const unsigned char *)block + offsetof(terrimpi_bake, width);
+    uint32_t hash = 2166136261u, word, bytes;
+    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
+    for (bytes -= (uint32_t)offsetof(terrimpi_bake, width); bytes >= 4u; bytes -= 4u, at += 4) {
         memcpy(&word, at, sizeof word);
         hash = terrimpi_hash(hash, word);
-    }
-    return hash;
-}
-
-/* The checksum of a bake's header and arrays, the same in either byte order. */
-static uint32_t terrimpi_bake_hash(const terrimpi_bake *bake, const terrimp_terrain *t)
-{
-    const size_t before = offsetof(terrimpi_bake, width); /* magic to checksum */
-    uint32_t hash = 2166136261u;
-    size_t i, count = t->tree.node_count;
-    hash = terrimpi_hash_words(hash, (const unsigned char *)bake + before,
-                               (sizeof *bake - before) / 4u);
-    hash = terrimpi_hash_words(hash, t->tree.nodes, count * sizeof *t->tree.nodes / 4u);
-    for (i = 0; i < count; i++) {
-        const terrimpi_mesh *mesh = &t->meshes[i];
-        hash = terrimpi_hash_words(hash, mesh, 5u);
-        hash = terrimpi_hash(hash, (uint32_t)mesh->triangle_count << 16 |
-                                       (uint32_t)mesh->border_count << 8 | mesh->vertex_count);
-    }
-    for (i = 0; i < count * t->vertex_limit; i++)
-        hash = terrimpi_hash(hash, (uint32_t)t->points[i].height << 16 |
-                                       (uint32_t)t->points[i].z << 8 | t->points[i].x);
-    for (i = 0; i < count * t->index_limit; i += 4u) { /* a multiple of 4 */
-        const uint8_t *c = t->corners + i;
-        hash = terrimpi_hash(hash, (uint32_t)c[0] | (uint32_t)c[1] << 8 | (uint32_t)c[2] << 16 |
-                                       (uint32_t)c[3] << 24);
     }
     return hash;
 }
@@ -6245,7 +6406,7 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     memset(&desc, 0, sizeof desc);
     if (bake->version != TERRIMP_BAKE_VERSION || bake->format == 0 ||
         bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
-        bake->triangle_budget == 0 || bake->flags > 7u)
+        bake->triangle_budget == 0 || bake->flags > 3u)
         return 0;
     desc.field.samples = &any;
     desc.field.width = bake->width;
@@ -6258,7 +6419,6 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     desc.proud = bake->proud;
     desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
     desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
-    desc.upper_skirts = (bake->flags & TERRIMPI_BAKE_NO_UPPER_SKIRTS) == 0;
     desc.height_low = bake->height_low;
     desc.height_high = bake->height_high;
     if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK)
@@ -6284,20 +6444,22 @@ static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
     terrimpi_terrain_layout(t, (unsigned char *)(uintptr_t)block + sizeof(terrimpi_bake));
 }
 
-/* Whether the loop runs once round the tile, counter-clockwise seen from above, from (0, 0). */
-static int terrimpi_loop_ok(const terrimpi_point *points, uint32_t count, uint32_t last_x,
-                            uint32_t last_z)
+/* Whether the border runs once round the tile, counter-clockwise seen from above, from (0, 0). */
+static int terrimpi_loop_ok(const terrimp_terrain *t, const terrimpi_patch *tile, uint32_t node)
 {
-    uint32_t i;
-    if (points[0].x != 0 || points[0].z != 0)
+    uint32_t i, count = terrimpi_mesh_border(&t->meshes[node]);
+    uint32_t last_x = tile->cols - 1u, last_z = tile->rows - 1u;
+    terrimpi_point p = terrimpi_mesh_point(t, tile, node, 0), q;
+    if (p.x != 0 || p.z != 0)
         return 0;
-    for (i = 0; i < count; i++) {
-        const terrimpi_point *p = points + i, *q = points + (i + 1u < count ? i + 1u : 0);
-        int ok = (p->x == 0 && q->x == 0 && q->z > p->z) ||
-                 (p->z == last_z && q->z == last_z && q->x > p->x) ||
-                 (p->x == last_x && q->x == last_x && q->z < p->z) ||
-                 (p->z == 0 && q->z == 0 && q->x < p->x);
-        if (!ok || (i > 0 && p->x == 0 && p->z == 0))
+    for (i = 0; i < count; i++, p = q) {
+        int ok;
+        q = terrimpi_mesh_point(t, tile, node, i + 1u < count ? i + 1u : 0);
+        ok = (p.x == 0 && q.x == 0 && q.z > p.z) ||
+             (p.z == last_z && q.z == last_z && q.x > p.x) ||
+             (p.x == last_x && q.x == last_x && q.z < p.z) ||
+             (p.z == 0 && q.z == 0 && q.x < p.x);
+        if (!ok || (i > 0 && p.x == 0 && p.z == 0))
             return 0;
     }
     return 1;
@@ -6319,29 +6481,31 @@ static uint32_t terrimpi_edge_sum(uint32_t from, uint32_t to)
 
 /* Whether the triangles of a surface face up, have corners that exist, and cover its node: that
    inner edges have two sides, and border edges one, is told from a sum over all. */
-static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const terrimpi_patch *p)
+static int terrimpi_corners_ok(const terrimp_terrain *t, const terrimpi_patch *p, uint32_t node)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
     int64_t all = 0;
-    uint32_t i, k, edges = 0, border = mesh->border_count;
+    uint32_t i, k, edges = 0, border = terrimpi_mesh_border(mesh);
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
-    for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
+    for (i = 0; i < terrimpi_mesh_triangles(mesh); i++) {
+        uint32_t corner[3];
         int64_t at[3][2], area;
         for (k = 0; k < 3u; k++) {
-            if (corners[k] >= mesh->vertex_count)
+            terrimpi_point point;
+            corner[k] = terrimpi_mesh_corner(t, node, 3u * i + k);
+            if (corner[k] >= terrimpi_mesh_vertices(mesh))
                 return 0;
-            at[k][0] = terrimpi_point_x(p, &points[corners[k]]);
-            at[k][1] = terrimpi_point_z(p, &points[corners[k]]);
+            point = terrimpi_mesh_point(t, p, node, corner[k]);
+            at[k][0] = terrimpi_lattice(point.x, p->level, p->span_x);
+            at[k][1] = terrimpi_lattice(point.z, p->level, p->span_z);
         }
         area = terrimpi_twice_area(at[0], at[1], at[2]);
         if (area <= 0)
             return 0;
         all += area;
         for (k = 0; k < 3u; k++)
-            edges += terrimpi_edge_sum(corners[k], corners[k == 2u ? 0 : k + 1u]);
+            edges += terrimpi_edge_sum(corner[k], corner[k == 2u ? 0 : k + 1u]);
     }
     return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
@@ -6351,37 +6515,28 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
 {
     const terrimp_geomip_node *ground = &t->tree.nodes[node];
     const terrimpi_mesh *mesh = &t->meshes[node];
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const float most = TERRIMPI_FLOAT_MAX, slack = t->range_step; /* other machines round */
+    const float most = TERRIMPI_FLOAT_MAX;
+    float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
+    uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
+    uint32_t triangles = terrimpi_mesh_triangles(mesh);
     terrimpi_patch p = terrimpi_patch_of(t, node);
-    float sizes[5];
-    uint32_t i;
-    sizes[0] = ground->error;
-    sizes[1] = ground->rms;
-    sizes[2] = mesh->error;
-    sizes[3] = mesh->error_rms;
-    sizes[4] = mesh->upper_skirt;
-    for (i = 0; i < 5u; i++)
-        if (!terrimpi_within(sizes[i], 0.0f, most))
-            return 0;
-    if (!terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
+    if (!terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
+        !terrimpi_within(mesh->error, 0.0f, most) ||
+        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
+        !terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
         !terrimpi_within(ground->low, mesh->low, mesh->high) ||
-        !terrimpi_within(ground->high, ground->low, mesh->high) ||
-        (!t->desc.upper_skirts && mesh->upper_skirt > 0.0f))
+        !terrimpi_within(ground->high, ground->low, mesh->high))
         return 0;
-    if (mesh->border_count < 4u || mesh->border_count > t->border_limit ||
-        mesh->vertex_count < mesh->border_count || mesh->vertex_count > t->vertex_limit ||
-        mesh->triangle_count < 2u || mesh->triangle_count > t->desc.triangle_budget)
+    if (border < 4u || border > t->border_limit || vertices < border ||
+        vertices > t->vertex_limit || triangles < 2u || triangles > t->desc.triangle_budget)
         return 0;
-    for (i = 0; i < mesh->vertex_count; i++) {
-        float height = terrimpi_mesh_height(t, points[i].height);
-        if (points[i].x >= p.cols || points[i].z >= p.rows ||
-            height + slack < mesh->low ||
-            height - slack + (i < mesh->border_count ? mesh->upper_skirt : 0.0f) > mesh->high)
+    for (i = 0; i < vertices; i++) {
+        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        if (point.x >= p.cols || point.z >= p.rows ||
+            !(point.height + slack >= mesh->low && point.height - slack <= mesh->high))
             return 0;
     }
-    return terrimpi_loop_ok(points, mesh->border_count, p.cols - 1u, p.rows - 1u) &&
-           terrimpi_corners_ok(t, node, &p);
+    return terrimpi_loop_ok(t, &p, node) && terrimpi_corners_ok(t, &p, node);
 }
 
 /* Whether a node is held by its parent. */
@@ -6395,138 +6550,59 @@ static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
            t->meshes[node].high <= t->meshes[parent].high;
 }
 
-/* Checks a whole block and fills in a terrain from it, all but the field. */
-static terrimp_result terrimpi_bake_read(const void *block, size_t bytes, terrimp_terrain *t)
+/* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
+   could have been made of. */
+static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
+                                         const terrimp_heightfield *field, terrimp_terrain *t)
 {
+    const terrimp_heightfield *f = &t->desc.field;
     terrimpi_bake bake;
     uint32_t node, triangles = 0;
     TERRIMPI_REFUSE(!block, TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)block % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(bytes < sizeof bake, TERRIMP_E_BAKE);
     memcpy(&bake, block, sizeof bake);
-    TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_TURNED, TERRIMP_E_ORDER);
-    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC ||
-                    !terrimpi_bake_header(&bake, bytes, t), TERRIMP_E_BAKE);
+    TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_SWAPPED, TERRIMP_E_ORDER);
+    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, t) ||
+                    terrimpi_bake_hash(block) != bake.checksum, TERRIMP_E_BAKE);
+    TERRIMPI_REFUSE(field && (field->width != f->width || field->depth != f->depth ||
+                              field->format != f->format ||
+                              field->height_scale != f->height_scale ||
+                              field->height_offset != f->height_offset), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
-    TERRIMPI_REFUSE(terrimpi_bake_hash(&bake, t) != bake.checksum, TERRIMP_E_BAKE);
     for (node = 0; node < t->tree.node_count; node++) {
         if (!terrimpi_node_ok(t, node) || !terrimpi_parent_ok(t, node))
             return TERRIMP_E_BAKE;
-        triangles += t->meshes[node].triangle_count;
+        triangles += terrimpi_mesh_triangles(&t->meshes[node]);
     }
     return triangles == t->mesh_triangle_count ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
+                                              const terrimp_heightfield *field,
                                               terrimp_bake_info *info)
-{
-    terrimp_terrain t;
-    terrimp_result result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK || !info)
-        return result;
-    info->bytes = sizeof(terrimpi_bake) + terrimpi_terrain_layout(&t, NULL);
-    info->width = t.desc.field.width;
-    info->depth = t.desc.field.depth;
-    info->format = t.desc.field.format;
-    info->height_scale = t.desc.field.height_scale;
-    info->height_offset = t.desc.field.height_offset;
-    info->chunk_quads = t.desc.chunk_quads;
-    info->triangle_budget = t.desc.triangle_budget;
-    info->level_count = t.tree.level_count;
-    info->node_count = t.tree.node_count;
-    return TERRIMP_OK;
-}
-
-/* ---- byte order ---- */
-
-static void terrimpi_turn_words(void *words, size_t count)
-{
-    unsigned char *at = (unsigned char *)words, swap;
-    for (; count > 0; count--, at += 4) {
-        swap = at[0];
-        at[0] = at[3];
-        at[3] = swap;
-        swap = at[1];
-        at[1] = at[2];
-        at[2] = swap;
-    }
-}
-
-static uint16_t terrimpi_turned(uint16_t value)
-{
-    return (uint16_t)(value >> 8 | value << 8);
-}
-
-/* Turns the arrays of a terrain round. */
-static void terrimpi_turn_arrays(terrimp_terrain *t)
-{
-    size_t i, count = t->tree.node_count;
-    terrimpi_turn_words(t->tree.nodes, count * sizeof *t->tree.nodes / 4u);
-    for (i = 0; i < count; i++) {
-        terrimpi_turn_words(&t->meshes[i], 5u);
-        t->meshes[i].triangle_count = terrimpi_turned(t->meshes[i].triangle_count);
-    }
-    for (i = 0; i < count * t->vertex_limit; i++)
-        t->points[i].height = terrimpi_turned(t->points[i].height);
-}
-
-TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
-                                                size_t capacity)
-{
-    terrimp_terrain t;
-    terrimpi_bake bake;
-    terrimp_result result;
-    TERRIMPI_REFUSE(!block || !out, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK && result != TERRIMP_E_ORDER)
-        return result;
-    memcpy(&bake, block, sizeof bake);
-    if (result == TERRIMP_E_ORDER) {
-        terrimpi_turn_words(&bake, sizeof bake / 4u);
-        if (!terrimpi_bake_header(&bake, bytes, &t))
-            return TERRIMP_E_BAKE;
-    }
-    TERRIMPI_REFUSE(capacity < bake.bytes, TERRIMP_E_CAPACITY);
-    memmove(out, block, bake.bytes);
-    terrimpi_turn_words(out, sizeof bake / 4u);
-    terrimpi_bake_arrays_at(&t, out);
-    terrimpi_turn_arrays(&t);
-    if (result == TERRIMP_OK)
-        return TERRIMP_OK;
-    result = terrimpi_bake_read(out, bake.bytes, &t);
-    if (result != TERRIMP_OK && out == block) { /* back: a false block stays as it was */
-        terrimpi_turn_words(out, sizeof bake / 4u);
-        terrimpi_turn_arrays(&t);
-    }
-    return result;
-}
-
-/* ---- opening ---- */
-
-/* Whether a resolved field could be the one that a bake was made of. */
-static int terrimpi_bake_fits(const terrimp_terrain *t, const terrimp_heightfield *field)
-{
-    const terrimp_heightfield *f = &t->desc.field;
-    return field->width == f->width && field->depth == f->depth && field->format == f->format &&
-           field->height_scale == f->height_scale && field->height_offset == f->height_offset;
-}
-
-TERRIMP_API terrimp_result terrimp_bake_matches(const void *block, size_t bytes,
-                                                const terrimp_heightfield *field)
 {
     terrimp_terrain t;
     terrimp_heightfield resolved;
     terrimpi_bake bake;
-    terrimp_result result = terrimp_heightfield_resolve(field, &resolved);
-    if (result == TERRIMP_OK)
-        result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK)
-        return result;
+    if (field)
+        TERRIMPI_TRY(terrimp_heightfield_resolve(field, &resolved));
+    TERRIMPI_TRY(terrimpi_bake_read(block, bytes, field ? &resolved : NULL, &t));
     memcpy(&bake, block, sizeof bake);
-    return terrimpi_bake_fits(&t, &resolved) && terrimpi_samples_hash(&resolved) == bake.samples
-               ? TERRIMP_OK
-               : TERRIMP_E_BAKE;
+    TERRIMPI_REFUSE(field && terrimpi_samples_hash(&resolved) != bake.samples, TERRIMP_E_BAKE);
+    if (!info)
+        return TERRIMP_OK;
+    info->bytes = bake.bytes;
+    info->width = bake.width;
+    info->depth = bake.depth;
+    info->format = (int)bake.format;
+    info->height_scale = t.desc.field.height_scale;
+    info->height_offset = bake.height_offset;
+    info->chunk_quads = bake.chunk_quads;
+    info->triangle_budget = bake.triangle_budget;
+    info->level_count = t.tree.level_count;
+    info->node_count = bake.node_count;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API size_t terrimp_terrain_open_bytes(void)
@@ -6540,16 +6616,10 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 {
     terrimp_terrain t;
     terrimp_heightfield resolved;
-    terrimp_result result;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    result = terrimp_heightfield_resolve(field, &resolved);
-    if (result == TERRIMP_OK)
-        result = terrimpi_check_block(memory, memory_bytes, sizeof t);
-    if (result == TERRIMP_OK)
-        result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK)
-        return result;
-    TERRIMPI_REFUSE(!terrimpi_bake_fits(&t, &resolved), TERRIMP_E_BAKE);
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &resolved));
+    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes, sizeof t));
+    TERRIMPI_TRY(terrimpi_bake_read(block, bytes, &resolved, &t));
     t.desc.field = t.tree.field = resolved;
     t.begun = t.built = t.baked = 1;
     *(terrimp_terrain *)memory = t;
@@ -7492,6 +7562,64 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          19 of 20 would spare too little (seven flights) */
 #define TERRIMPI_NO_PICTURE 0xffffu
 
+/* How the eye moves: how far it is from where it was in the mean of the last 4, 16, 64 and 256
+   frames. Who bobs is fast, but not far away from where he was: a picture that is good as far as
+   that lasts. And how often all pictures are lost at once, by jumps or because the host says so. */
+#define TERRIMPI_MOTIONS 4u
+typedef struct terrimpi_motion {
+    float away[TERRIMPI_MOTIONS][3]; /* [wu] */
+    float frames[TERRIMPI_MOTIONS];  /* which an eye of constant speed needs for that way */
+    float since, between;            /* [frames] since the last loss, and between two in the mean */
+} terrimpi_motion;
+
+static void terrimpi_motion_begin(terrimpi_motion *m)
+{
+    memset(m, 0, sizeof *m);
+    m->between = TERRIMPI_VIEW_LIFE;
+}
+
+/* Notes that all pictures are lost, or of no use. */
+static void terrimpi_motion_lose(terrimpi_motion *m)
+{
+    m->between = 0.5f * (m->between + m->since);
+    m->since = 0.0f;
+}
+
+/* A frame later; a jump is no motion. */
+static void terrimpi_motion_step(terrimpi_motion *m, const float step[3], float jump)
+{
+    float way[3] = {0.0f, 0.0f, 0.0f}, frames = 4.0f;
+    uint32_t k, i;
+    m->since += 1.0f;
+    if (terrimpi_length(step) > jump)
+        terrimpi_motion_lose(m);
+    else
+        memcpy(way, step, sizeof way);
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        float keep = 1.0f - 1.0f / frames;
+        for (i = 0; i < 3u; i++) {
+            m->away[k][i] = keep * (m->away[k][i] + way[i]);
+            if (terrimpi_abs(m->away[k][i]) < 1e-6f * jump) /* at rest, some time */
+                m->away[k][i] = 0.0f;
+        }
+        m->frames[k] = keep * (m->frames[k] + 1.0f);
+    }
+}
+
+/* The speed [wu a frame] with which an eye gets to `reach` away: the mean over about as many frames
+   as it needs for that. */
+static float terrimpi_motion_speed(const terrimpi_motion *m, float reach)
+{
+    float frames = 4.0f, speed = 0.0f;
+    uint32_t k;
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        speed = terrimpi_length(m->away[k]) / terrimpi_max(m->frames[k], 0.75f);
+        if (!(speed * frames < reach))
+            break;
+    }
+    return speed;
+}
+
 /* What the whole of a frame looks at, and nothing changes. */
 typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
@@ -7500,8 +7628,7 @@ typedef struct terrimpi_frame {
     terrimp_camera camera;         /* resolved */
     terrimp_frustum frustum;
     float pixel_factor;
-    float motion[3];               /* [wu] a frame, smoothed */
-    float speed;
+    terrimpi_motion motion;
 } terrimpi_frame;
 
 /* ---- settings ---- */
@@ -7965,8 +8092,9 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
     float way = f->desc->no_lookahead ? 1.0f : 1.0f + TERRIMPI_VIEW_AHEAD;
-    float life = way * closest * terrimpi_view_sine(f, node, closest) /
-                 terrimpi_max(f->speed, 1e-20f);
+    float reach = way * closest * terrimpi_view_sine(f, node, closest);
+    float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
+    life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -7990,15 +8118,16 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
 static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
                                 const terrimp_box *box, float closest, float eye[3])
 {
-    float ahead;
+    const float *way = f->motion.away[0];
+    float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
     memcpy(eye, f->camera.eye, sizeof f->camera.eye);
-    if (f->desc->no_lookahead || !(f->speed > 0.0f))
+    if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
-    ahead = TERRIMPI_VIEW_AHEAD * closest * terrimpi_view_sine(f, node->number, closest);
-    ahead = terrimpi_min(ahead, f->speed * 0.5f * TERRIMPI_VIEW_LIFE);
+    ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
+    ahead = terrimpi_min(TERRIMPI_VIEW_AHEAD * reach, ahead * 0.5f * TERRIMPI_VIEW_LIFE);
     for (i = 0; i < 3u; i++)
-        eye[i] += f->motion[i] / f->speed * ahead;
+        eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
         memcpy(eye, f->camera.eye, sizeof f->camera.eye);
 }
@@ -8270,6 +8399,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
+    terrimpi_motion_lose(&view->frame.motion);
     view->job_count = view->open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
@@ -8731,8 +8861,8 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
         return 0;
-    terrimpi_capture_split(&plan->camera, xyz, mesh->vertex_count, indices,
-                           3u * mesh->triangle_count, sine * closest, overlap, &split);
+    terrimpi_capture_split(&plan->camera, xyz, terrimpi_mesh_vertices(mesh), indices,
+                           3u * terrimpi_mesh_triangles(mesh), sine * closest, overlap, &split);
     *distance = split.distance;
     return split.gap * sine * f->pixel_factor >
                TERRIMPI_VIEW_SPLIT_SMEAR * f->desc->tolerance_px &&
@@ -9095,14 +9225,13 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
-    for (i = 0; i < 3u; i++) {
-        step[i] = camera->eye[i] - before->camera.eye[i];
-        f.motion[i] = 0.75f * before->motion[i] + 0.25f * step[i];
+    if (f.number == 1u) {
+        terrimpi_motion_begin(&f.motion);
+        return f;
     }
-    if (f.number <= 1u || terrimpi_length(step) > TERRIMPI_VIEW_JUMP * f.desc->fade_start ||
-        terrimpi_length(f.motion) < 1e-6f * f.desc->fade_start)
-        memset(f.motion, 0, sizeof f.motion);
-    f.speed = terrimpi_length(f.motion);
+    for (i = 0; i < 3u; i++)
+        step[i] = camera->eye[i] - before->camera.eye[i];
+    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
     return f;
 }
 
@@ -9486,6 +9615,8 @@ static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_hull *hull, f
     side[2] = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
 }
 
+static int32_t terrimpi_larger(int32_t a, int32_t b) { return a > b ? a : b; }
+
 static int32_t terrimpi_floor(float value)
 {
     int32_t whole = (int32_t)value;
@@ -9543,22 +9674,23 @@ static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], i
     return (int)crossing;
 }
 
-/* First and last page of a row that the footprint can touch. */
+/* First and last page of a row that the footprint can touch, or one more: sides are divided in
+   pages, of which there are few, so that 32 bits are enough. */
 static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *first,
                                 int32_t *last)
 {
     int along = s->row_axis, across = 1 - along;
-    float page = (float)s->desc.page_quads, low = (float)row * page;
     uint32_t i;
     *first = s->bounds[along][0];
     *last = s->bounds[along][1];
     for (i = 0; i < s->side_count; i++) {
-        float n = (float)s->sides[i][along], m = (float)s->sides[i][across];
-        float at = -((float)s->sides[i][2] + m * (m > 0.0f ? low + page : low)) / n;
-        if (n > 0.0f && at > (float)*first * page)
-            *first = terrimpi_floor(at / page - 0.01f);
-        else if (n < 0.0f && at < (float)*last * page)
-            *last = terrimpi_floor(at / page + 0.01f);
+        int32_t n = (int32_t)s->sides[i][along], m = (int32_t)s->sides[i][across];
+        int32_t most = (int32_t)(s->sides[i][2] >> s->top) + 1 +
+                       m * (m > 0 ? row + 1 : row);
+        if (n > 0)
+            *first = terrimpi_larger(*first, -most / n - 1);
+        else if (n < 0)
+            *last = -terrimpi_larger(-*last, most / n);
     }
 }
 
@@ -9681,8 +9813,8 @@ static int terrimpi_sorted_quarter(terrimp_sorted *s)
 
 /* ---- pages ---- */
 
-/* The level at which a page's texels are no smaller than pixels at its closest point. One that was
-   left is entered again only a tenth farther on. */
+/* The level whose texels are one to two pixels large at the page's closest point. A coarser one is
+   left only a tenth closer than where it began. */
 static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int32_t page[2])
 {
     const terrimp_sorted_desc *d = &s->desc;
@@ -9699,7 +9831,7 @@ static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int
             level--;
     }
     while (level + 1u < d->texture_level_count &&
-           away >> 2u * level >= s->texel_steps[kept && *kept <= level ? 2 : 0])
+           away >> 2u * level >= s->texel_steps[0])
         level++;
     if (kept)
         *kept = (uint8_t)level;
@@ -9828,10 +9960,12 @@ static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int
     const void *row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
     const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
     switch (s->desc.field.format) {
-    case TERRIMP_FORMAT_U8: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
+#ifndef TERRIMP_FIXED
+    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
+#endif
     case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
     case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
-    default: return (terrimp_sorted_height)((const float *)row)[x];
+    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
     }
 }
 
@@ -10229,7 +10363,6 @@ static void terrimpi_sorted_texels(terrimp_sorted *s, const terrimp_camera *came
                (float)d->page_quads / (float)d->page_texels;
     s->texel_steps[0] = terrimpi_sorted_square(s, at);
     s->texel_steps[1] = terrimpi_sorted_square(s, at / 1.1f);
-    s->texel_steps[2] = terrimpi_sorted_square(s, at * 1.1f);
 }
 
 /* Rows across the view come before columns; beyond the last page of a field there is nothing. */
@@ -10372,6 +10505,27 @@ TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
             continue;
         st[2u * i] = (float)(quad->x + x) / (float)atlas[0];
         st[2u * i + 1u] = (float)(quad->y + y) / (float)atlas[1];
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
+                                                const terrimp_capture *picture,
+                                                const terrimp_depth_vertex *vertices,
+                                                uint32_t count, float *xyz)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!layers || !picture || !vertices || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!layers->count, TERRIMP_E_RANGE);
+    for (i = 0; i < count; i++) {
+        float last = (float)(layers->count - 1u);
+        float layer = terrimpi_min(terrimpi_max(vertices[i].layer, 0.0f), last), d;
+        uint32_t k = (uint32_t)layer;
+        d = terrimpi_layer_inverse(layers, k);
+        if (layer > (float)k) /* between two layers 1 / depth is what goes on evenly */
+            d += (layer - (float)k) * (terrimpi_layer_inverse(layers, k + 1u) - d);
+        terrimpi_layer_point(picture, layers->texel, vertices[i].u, vertices[i].v, 1.0f / d,
+                             xyz + (size_t)3 * i);
     }
     return TERRIMP_OK;
 }
@@ -13049,7 +13203,7 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
     terrimpi_segment s;
     for (i = 0; i < mesh->border_vertex_count; i++) {
         float *height = &mesh->vertices[i].height;
-        *height = terrimpi_min(*height, terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
+        *height = terrimpi_min(*height, terrimpi_border_height(t, TERRIMPI_BORDER_STEPS));
         lift[i] = 0.0f;
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
@@ -13070,40 +13224,81 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
         mesh->vertices[i].height += lift[i];
 }
 
-/* The steps that a height is stored as: rounded up when meshes stand proud. */
-static uint16_t terrimpi_height_steps(const terrimp_terrain *t, float height)
+/* The steps above `low` that a height is stored as: rounded up when meshes stand proud. */
+static uint32_t terrimpi_height_steps(float height, float low, float step, uint32_t most, int up)
 {
-    float steps = height - t->range_low;
+    float steps = height - low;
     uint32_t whole;
-    if (!(steps > 0.0f) || !(t->range_step > 0.0f))
+    if (!(steps > 0.0f) || !(step > 0.0f))
         return 0;
-    steps /= t->range_step;
-    if (!(steps < (float)TERRIMPI_HEIGHT_STEPS))
-        return TERRIMPI_HEIGHT_STEPS;
-    whole = (uint32_t)(t->desc.proud > 0.0f ? steps : steps + 0.5f);
-    if (t->desc.proud > 0.0f && terrimpi_mesh_height(t, whole) < height)
-        whole++;
-    return (uint16_t)terrimpi_min_u32(whole, TERRIMPI_HEIGHT_STEPS);
+    steps /= step;
+    if (!(steps < (float)most))
+        return most;
+    whole = (uint32_t)(up ? steps : steps + 0.5f);
+    return whole + (uint32_t)(up && low + step * (float)whole < height && whole < most);
+}
+
+/* Settles what the heights of a node's inner vertices count from, in which steps: the exponent of
+   the least power of two with which they reach to the highest. */
+static uint32_t terrimpi_inner_range(const terrimp_terrain *t, const terrimp_mesh *mesh,
+                                     float *base)
+{
+    float most = terrimpi_border_height(t, TERRIMPI_BORDER_STEPS), low = most, step;
+    float high = t->range_low;
+    uint32_t i, bits;
+    for (i = mesh->border_vertex_count; i < mesh->surface_vertex_count; i++) {
+        mesh->vertices[i].height = terrimpi_clamp(mesh->vertices[i].height, t->range_low, most);
+        low = terrimpi_min(low, mesh->vertices[i].height);
+        high = terrimpi_max(high, mesh->vertices[i].height);
+    }
+    *base = low;
+    step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_INNER_STEPS;
+    memcpy(&bits, &step, sizeof bits);
+    return (bits + 0x7fffffu) >> 23;
+}
+
+/* A vertex of a surface as it is stored. */
+static uint32_t terrimpi_store_point(const terrimp_terrain *t, const terrimpi_patch *p,
+                                     const terrimpi_mesh *mesh, const terrimp_mesh_vertex *v,
+                                     int inner)
+{
+    int up = t->desc.proud > 0.0f, side;
+    if (inner)
+        return v->x | (uint32_t)v->z << 8 |
+               terrimpi_height_steps(v->height, mesh->base, terrimpi_mesh_step(mesh),
+                                     TERRIMPI_INNER_STEPS, up) << 16;
+    side = v->x == 0               ? TERRIMP_SIDE_X0
+           : v->z == 0             ? TERRIMP_SIDE_Z0
+           : v->x == p->cols - 1u  ? TERRIMP_SIDE_X1
+                                   : TERRIMP_SIDE_Z1;
+    return (terrimpi_along_x(side) ? v->x : v->z) | (uint32_t)side << 8 |
+           terrimpi_height_steps(v->height, t->range_low, t->range_step, TERRIMPI_BORDER_STEPS, up)
+               << 10;
 }
 
 /* Stores a surface, and leaves in it the heights that have been stored. */
-static void terrimpi_store_surface(terrimp_terrain *t, uint32_t node, terrimp_mesh *mesh)
+static void terrimpi_store_surface(terrimp_terrain *t, const terrimpi_patch *p, uint32_t node,
+                                   const terrimp_mesh *mesh)
 {
-    terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    uint32_t i;
+    terrimpi_mesh *out = &t->meshes[node];
+    uint32_t *points = t->points + (size_t)node * t->vertex_limit;
+    uint32_t *corners = t->corners + (size_t)node * (t->index_limit / 4u), i;
     TERRIMP_ASSERT(mesh->surface_vertex_count <= t->vertex_limit);
     TERRIMP_ASSERT(mesh->border_vertex_count <= t->border_limit);
     memset(points, 0, t->vertex_limit * sizeof *points);
     memset(corners, 0, t->index_limit);
+    out->counts = terrimpi_inner_range(t, mesh, &out->base) << 24 |
+                  mesh->surface_vertex_count << 16 | mesh->border_vertex_count << 9 |
+                  mesh->surface_index_count / 3u;
     for (i = 0; i < mesh->surface_vertex_count; i++) {
-        points[i].x = (uint8_t)mesh->vertices[i].x;
-        points[i].z = (uint8_t)mesh->vertices[i].z;
-        points[i].height = terrimpi_height_steps(t, mesh->vertices[i].height);
-        mesh->vertices[i].height = terrimpi_mesh_height(t, points[i].height);
+        terrimp_mesh_vertex *v = &mesh->vertices[i];
+        points[i] = terrimpi_store_point(t, p, out, v, i >= mesh->border_vertex_count);
+        v->height = terrimpi_mesh_point(t, p, node, i).height;
+        out->low = i == 0 ? v->height : terrimpi_min(out->low, v->height);
+        out->high = i == 0 ? v->height : terrimpi_max(out->high, v->height);
     }
     for (i = 0; i < mesh->surface_index_count; i++)
-        corners[i] = (uint8_t)mesh->indices[i];
+        corners[i / 4u] |= (uint32_t)mesh->indices[i] << i % 4u * 8u;
 }
 
 /* Differences of samples to the surface. */
@@ -13137,29 +13332,6 @@ static void terrimpi_measure_node(const terrimp_terrain *t, const terrimpi_patch
     *rms = TERRIMP_SQRTF(squares / ((float)(p->span_x + 1u) * (float)(p->span_z + 1u)));
 }
 
-/* Notes what is to be known of a finished mesh. What still rises over the surface decides how high
-   the upper skirt has to be. */
-static void terrimpi_store_mesh(terrimp_terrain *t, uint32_t node, const terrimp_mesh *mesh,
-                                const terrimpi_error *error, float rms)
-{
-    terrimpi_mesh *out = &t->meshes[node];
-    uint32_t i;
-    out->error = terrimpi_max(error->above, error->below);
-    out->error_rms = rms;
-    out->upper_skirt = t->desc.upper_skirts ? error->above : 0.0f;
-    out->low = out->high = mesh->vertices[0].height;
-    for (i = 0; i < mesh->surface_vertex_count; i++) {
-        float height = mesh->vertices[i].height;
-        out->low = terrimpi_min(out->low, height);
-        if (i < mesh->border_vertex_count)
-            height += out->upper_skirt;
-        out->high = terrimpi_max(out->high, height);
-    }
-    out->triangle_count = (uint16_t)(mesh->surface_index_count / 3u);
-    out->border_count = (uint8_t)mesh->border_vertex_count;
-    out->vertex_count = (uint8_t)mesh->surface_vertex_count;
-}
-
 static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
                                           const terrimpi_build *build)
 {
@@ -13173,10 +13345,14 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
         TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
         terrimpi_lift_border(t, &p, &mesh, build);
     }
-    terrimpi_store_surface(t, node, &mesh);
+    terrimpi_store_surface(t, &p, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
-    TERRIMPI_REFUSE(!terrimpi_finite2(error.above, error.below), TERRIMP_E_NOT_FINITE);
-    terrimpi_store_mesh(t, node, &mesh, &error, rms);
+    if (!terrimpi_finite2(error.above, error.below)) {
+        t->meshes[node].counts = 0;
+        return TERRIMP_E_NOT_FINITE;
+    }
+    t->meshes[node].error = terrimpi_max(error.above, error.below);
+    t->meshes[node].error_rms = rms;
     return TERRIMP_OK;
 }
 
@@ -13240,7 +13416,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
         TERRIMPI_TRY(terrimpi_height_range(f, all, 0, &low, &high));
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
-    step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
+    step = (high - low + 2.0f * room) / (float)TERRIMPI_BORDER_STEPS;
     TERRIMPI_REFUSE(!terrimpi_range_fits(&terrain->desc.field, low - room, step), TERRIMP_E_RANGE);
     terrain->sample_low = low;
     terrain->sample_high = high;
@@ -13257,9 +13433,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= terrain->tree.node_count, TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+                                      terrimpi_build_layout(&terrain->desc, scratch, &build)));
     TERRIMPI_REFUSE(!terrain->begun, TERRIMP_E_STATE);
-    terrimpi_build_layout(&terrain->desc, scratch, &build);
     TERRIMPI_TRY(terrimp_geomip_build_node(&terrain->tree, node, build.row));
     TERRIMPI_REFUSE(node < terrain->tree.level_first[1] &&
                     (terrain->tree.nodes[node].low < terrain->sample_low ||
@@ -13281,12 +13456,12 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
-        TERRIMPI_REFUSE(terrain->meshes[node].vertex_count == 0, TERRIMP_E_STATE);
+        TERRIMPI_REFUSE(terrimpi_mesh_vertices(&terrain->meshes[node]) == 0, TERRIMP_E_STATE);
     terrimp_geomip_build_finish(tree);
     terrain->mesh_triangle_count = 0;
     for (node = 0; node < tree->node_count; node++) {
         terrimpi_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
-        terrain->mesh_triangle_count += terrain->meshes[node].triangle_count;
+        terrain->mesh_triangle_count += terrimpi_mesh_triangles(&terrain->meshes[node]);
     }
     for (node = 0; node + 1u < tree->node_count; node++)
         terrimpi_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
@@ -13390,8 +13565,20 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
     return arrays ? sizeof(terrimpi_bake) + arrays : 0;
 }
 
+static void terrimpi_swap_words(unsigned char *words, size_t bytes)
+{
+    size_t i;
+    for (i = 0; i + 4u <= bytes; i += 4u) {
+        unsigned char first = words[i], second = words[i + 1u];
+        words[i] = words[i + 3u];
+        words[i + 1u] = words[i + 2u];
+        words[i + 2u] = second;
+        words[i + 3u] = first;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
-                                              size_t bytes)
+                                              size_t bytes, int swapped)
 {
     const terrimp_terrain_desc *desc;
     terrimpi_bake bake;
@@ -13413,7 +13600,6 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.chunk_quads = desc->chunk_quads;
     bake.triangle_budget = desc->triangle_budget;
     bake.flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
-                 (desc->upper_skirts ? 0u : (uint32_t)TERRIMPI_BAKE_NO_UPPER_SKIRTS) |
                  (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
     bake.node_count = terrain->tree.node_count;
     bake.vertex_limit = terrain->vertex_limit;
@@ -13429,9 +13615,12 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.range_low = terrain->range_low;
     bake.range_step = terrain->range_step;
     bake.proud = desc->proud;
-    bake.checksum = terrimpi_bake_hash(&bake, terrain);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    bake.checksum = terrimpi_bake_hash(out);
+    memcpy(out, &bake, sizeof bake);
+    if (swapped)
+        terrimpi_swap_words((unsigned char *)out, bake.bytes);
     return TERRIMP_OK;
 }
 
@@ -14758,6 +14947,972 @@ TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uin
     return TERRIMP_OK;
 }
 
+
+/* --- textured depth meshes --- */
+
+#define TERRIMPI_DEPTH_STAR 48u /* triangles round a vertex at most, or it stays */
+#define TERRIMPI_DEPTH_END 0xffffffffu
+
+/* A run of opaque texels of one column and row through neighbouring layers: where a surface passes
+   it is one cell of its mesh. Its corners are numbered x + 2 y. */
+typedef struct terrimpi_depth_cell {
+    uint16_t x, y, k0, k1;
+    uint32_t sheet;
+} terrimpi_depth_cell;
+
+/* A corner that cells share. */
+typedef struct terrimpi_depth_corner {
+    float at[3]; /* column, row, layer */
+    uint16_t low, high; /* layers that all of its cells have */
+    uint8_t fixed;      /* which of these it takes is settled */
+} terrimpi_depth_corner;
+
+typedef struct terrimpi_depth_triangle {
+    uint32_t corner[3]; /* the first one is TERRIMPI_DEPTH_END once it is gone */
+    uint32_t next[3];   /* corners of other triangles at the same vertex: 3 * triangle + number */
+    uint32_t sheet;
+    uint32_t points;    /* the opaque texels that it stands for, as a list */
+} terrimpi_depth_triangle;
+
+/* A texel of a layer that can be seen, by its middle. */
+typedef struct terrimpi_depth_point {
+    uint16_t x, y, k;
+    uint32_t next;
+} terrimpi_depth_point;
+
+typedef struct terrimpi_depth {
+    const terrimp_depth_mesh_desc *desc;
+    float tolerance;
+    terrimpi_depth_cell *cells;        /* sorted by row, column, layer */
+    uint32_t *first_cell;              /* [height * width + 1] */
+    terrimpi_depth_cell *whole;        /* the same before runs are cut in two */
+    uint32_t *beside;                  /* [4 * cells] the cells that they go on in, side by side */
+    uint32_t *joined;                  /* [4 * cells] corners that are one, as trees */
+    uint32_t *vertex_of;               /* [4 * cells] and where they stand in: */
+    terrimpi_depth_corner *corners;    /* [4 * cells + 4 * cells] */
+    terrimpi_depth_triangle *triangles; /* [4 * cells] */
+    terrimpi_depth_point *points;      /* [points] */
+    uint32_t *at;                      /* [8 * cells] first triangle corner of each vertex; before
+                                          that a slot for each texel */
+    uint8_t *stale;                    /* [8 * cells] nothing has changed round it */
+    uint32_t *queue;                   /* [8 * cells] */
+    uint32_t cell_count, corner_count, triangle_count, point_count, sheet_count;
+} terrimpi_depth;
+
+static int terrimpi_depth_set(const terrimp_depth_mesh_desc *d, const uint32_t *masks, uint32_t x,
+                              uint32_t y, uint32_t k)
+{
+    return (int)(masks[((size_t)k * d->height + y) * TERRIMP_MASK_WORDS(d->width) + x / 32u] >>
+                     x % 32u & 1u);
+}
+
+/* Finds the next run of opaque texels from layer k on, and how many of them can be seen; 0 when
+   there are no more. */
+static int terrimpi_depth_run(const terrimp_depth_mesh_desc *s, uint32_t x, uint32_t y, uint32_t k,
+                              terrimpi_depth_cell *run, uint32_t *seen)
+{
+    while (k < s->layers && !terrimpi_depth_set(s, s->opaque, x, y, k))
+        k++;
+    run->x = (uint16_t)x;
+    run->y = (uint16_t)y;
+    run->k0 = (uint16_t)k;
+    run->sheet = TERRIMPI_DEPTH_END;
+    if (k >= s->layers)
+        return 0;
+    for (*seen = 0; k < s->layers && terrimpi_depth_set(s, s->opaque, x, y, k); k++) {
+        *seen += (uint32_t)terrimpi_depth_set(s, s->visible, x, y, k);
+        run->k1 = (uint16_t)k;
+    }
+    return 1;
+}
+
+/* Finds the cells, runs of which something can be seen, or only counts them and their texels. */
+static void terrimpi_depth_cells(terrimpi_depth *d, int fill)
+{
+    const terrimp_depth_mesh_desc *s = d->desc;
+    uint32_t x, y, k, seen;
+    d->cell_count = d->point_count = 0;
+    for (y = 0; y < s->height; y++)
+        for (x = 0; x < s->width; x++) {
+            terrimpi_depth_cell run;
+            if (fill)
+                d->first_cell[y * s->width + x] = d->cell_count;
+            for (k = 0; terrimpi_depth_run(s, x, y, k, &run, &seen); k = run.k1 + 1u) {
+                if (seen && fill)
+                    d->whole[d->cell_count] = run;
+                d->cell_count += seen > 0;
+                d->point_count += seen;
+            }
+        }
+    if (fill)
+        d->first_cell[s->height * s->width] = d->cell_count;
+}
+
+static uint32_t terrimpi_depth_root(uint32_t *joined, uint32_t i)
+{
+    while (joined[i] != i)
+        i = joined[i] = joined[joined[i]];
+    return i;
+}
+
+static void terrimpi_depth_join(uint32_t *joined, uint32_t a, uint32_t b)
+{
+    a = terrimpi_depth_root(joined, a);
+    b = terrimpi_depth_root(joined, b);
+    joined[a > b ? a : b] = a > b ? b : a;
+}
+
+static int terrimpi_depth_touch(const terrimpi_depth_cell *a, const terrimpi_depth_cell *b)
+{
+    return a->k0 <= b->k1 + 1u && b->k0 <= a->k1 + 1u;
+}
+
+/* The texel beside one: sides are +x, +y, -x, -y. TERRIMPI_DEPTH_END: the picture ends there. */
+static uint32_t terrimpi_depth_texel(const terrimpi_depth *d, uint32_t x, uint32_t y, uint32_t side)
+{
+    uint32_t width = d->desc->width, texel = y * width + x;
+    switch (side) {
+    case 0: return x + 1u < width ? texel + 1u : TERRIMPI_DEPTH_END;
+    case 1: return y + 1u < d->desc->height ? texel + width : TERRIMPI_DEPTH_END;
+    case 2: return x > 0 ? texel - 1u : TERRIMPI_DEPTH_END;
+    default: return y > 0 ? texel - width : TERRIMPI_DEPTH_END;
+    }
+}
+
+/* Where a surface turns back behind itself two surfaces share a run, and part in the next texel:
+   there two cells touch it. Returns the last layer of the closer one; or the run's own last one. */
+static uint16_t terrimpi_depth_fold(const terrimpi_depth *d, const terrimpi_depth_cell *c)
+{
+    uint32_t side, i;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side), touching = 0;
+        uint16_t end = c->k1;
+        if (texel == TERRIMPI_DEPTH_END)
+            continue;
+        for (i = d->first_cell[texel]; i < d->first_cell[texel + 1u]; i++)
+            if (terrimpi_depth_touch(c, &d->whole[i]) && touching++ == 0)
+                end = d->whole[i].k1;
+        if (touching > 1u)
+            return end < c->k0 ? c->k0 : end;
+    }
+    return c->k1;
+}
+
+/* A run that goes no further itself, but reaches over both halves of one beside it, is cut like
+   that. */
+static uint16_t terrimpi_depth_fold_on(const terrimpi_depth *d, const terrimpi_depth_cell *c,
+                                       const uint16_t *folds)
+{
+    uint32_t side, i;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+        if (texel == TERRIMPI_DEPTH_END)
+            continue;
+        for (i = d->first_cell[texel]; i < d->first_cell[texel + 1u]; i++)
+            if (folds[i] < d->whole[i].k1 && c->k0 <= folds[i] + 1u && c->k1 > folds[i] + 1u)
+                return folds[i] < c->k0 ? c->k0 : folds[i];
+    }
+    return c->k1;
+}
+
+/* Cuts such runs in two cells that have that layer in common. */
+static void terrimpi_depth_unfold(terrimpi_depth *d)
+{
+    uint32_t texels = d->desc->width * d->desc->height, texel, i, end = 0, count = 0;
+    uint16_t *folds = (uint16_t *)d->vertex_of; /* [cells] these two are used later */
+    uint16_t *on = (uint16_t *)d->joined;       /* [cells] */
+    for (i = 0; i < d->cell_count; i++)
+        folds[i] = terrimpi_depth_fold(d, &d->whole[i]);
+    for (i = 0; i < d->cell_count; i++)
+        on[i] = folds[i] < d->whole[i].k1 ? folds[i]
+                                          : terrimpi_depth_fold_on(d, &d->whole[i], folds);
+    memcpy(folds, on, d->cell_count * sizeof *on);
+    for (texel = 0, i = 0; texel < texels; texel++) {
+        end = d->first_cell[texel + 1u];
+        d->first_cell[texel] = count;
+        for (; i < end; i++) {
+            terrimpi_depth_cell run = d->whole[i]; /* cells are written over runs that are done */
+            d->cells[count] = run;
+            d->cells[count++].k1 = folds[i];
+            if (folds[i] == run.k1)
+                continue;
+            d->cells[count] = run;
+            d->cells[count++].k0 = folds[i];
+        }
+    }
+    d->first_cell[texels] = d->cell_count = count;
+}
+
+/* Finds the cells that go on in each other, texel by texel: of those that touch, the closest with
+   the closest. */
+static void terrimpi_depth_match(terrimpi_depth *d)
+{
+    uint32_t i, n, end, last, side, first;
+    memset(d->beside, 0xff, 4u * d->cell_count * sizeof *d->beside);
+    for (first = 0; first < d->cell_count; first = last) {
+        const terrimpi_depth_cell *c = &d->cells[first];
+        last = d->first_cell[c->y * d->desc->width + c->x + 1u];
+        for (side = 0; side < 2u; side++) {
+            uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+            if (texel == TERRIMPI_DEPTH_END)
+                continue;
+            end = d->first_cell[texel + 1u];
+            for (i = first, n = d->first_cell[texel]; i < last && n < end;) {
+                if (terrimpi_depth_touch(&d->cells[i], &d->cells[n])) {
+                    d->beside[4u * i + side] = n;
+                    d->beside[4u * n++ + side + 2u] = i++;
+                } else if (d->cells[i].k1 < d->cells[n].k1)
+                    i++;
+                else
+                    n++;
+            }
+        }
+    }
+}
+
+/* Whether a cell and the one behind it are a run that was cut in two. */
+static int terrimpi_depth_folded(const terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *a = &d->cells[cell], *b = a + 1;
+    return cell + 1u < d->cell_count && a->x == b->x && a->y == b->y && a->k1 == b->k0;
+}
+
+/* At a side of such a run: 0 when neither of its halves goes on, 1 when they go on together, in the
+   halves of another one, or only one does; 2 when they part. */
+static int terrimpi_depth_parting(const terrimpi_depth *d, uint32_t cell, uint32_t side)
+{
+    uint32_t a = d->beside[4u * cell + side], b = d->beside[4u * (cell + 1u) + side];
+    if (a == TERRIMPI_DEPTH_END && b == TERRIMPI_DEPTH_END)
+        return 0;
+    return a == TERRIMPI_DEPTH_END || b == TERRIMPI_DEPTH_END ||
+                   (b == a + 1u && terrimpi_depth_folded(d, a))
+               ? 1
+               : 2;
+}
+
+/* Joins the halves of cut runs along the edge where the surface turns back. */
+static void terrimpi_depth_hem(terrimpi_depth *d)
+{
+    uint32_t i, k;
+    for (i = 0; i < d->cell_count; i++)
+        for (k = 0; terrimpi_depth_folded(d, i) && k < 4u; k++) {
+            int across = terrimpi_depth_parting(d, i, k & 1u ? 0 : 2);
+            int up = terrimpi_depth_parting(d, i, k & 2u ? 1 : 3);
+            if ((!across && up < 2) || (!up && across < 2))
+                terrimpi_depth_join(d->joined, 4u * i + k, 4u * (i + 1u) + k);
+        }
+}
+
+/* Makes one vertex of all corners that connected cells share, with the layers common to them. */
+static void terrimpi_depth_connect(terrimpi_depth *d)
+{
+    uint32_t i, k;
+    for (i = 0; i < 4u * d->cell_count; i++)
+        d->joined[i] = i;
+    for (i = 0; i < d->cell_count; i++) {
+        uint32_t right = d->beside[4u * i], above = d->beside[4u * i + 1u];
+        for (k = 0; k < 2u && right != TERRIMPI_DEPTH_END; k++)
+            terrimpi_depth_join(d->joined, 4u * i + 1u + 2u * k, 4u * right + 2u * k);
+        for (k = 0; k < 2u && above != TERRIMPI_DEPTH_END; k++)
+            terrimpi_depth_join(d->joined, 4u * i + 2u + k, 4u * above + k);
+    }
+    terrimpi_depth_hem(d);
+    d->corner_count = 0;
+    for (i = 0; i < 4u * d->cell_count; i++) {
+        const terrimpi_depth_cell *c = &d->cells[i / 4u];
+        uint32_t root = terrimpi_depth_root(d->joined, i);
+        terrimpi_depth_corner *v;
+        d->vertex_of[i] = root == i ? d->corner_count++ : d->vertex_of[root];
+        v = &d->corners[d->vertex_of[i]];
+        if (root == i) {
+            v->at[0] = (float)(c->x + (i & 1u));
+            v->at[1] = (float)(c->y + (i >> 1 & 1u));
+            v->low = c->k0;
+            v->high = c->k1;
+        }
+        v->low = v->low > c->k0 ? v->low : c->k0;
+        v->high = v->high < c->k1 ? v->high : c->k1;
+        v->fixed = 0;
+    }
+    for (i = 0; i < d->corner_count; i++) {
+        d->corners[i].at[2] = 0.5f * ((float)d->corners[i].low + (float)d->corners[i].high);
+        d->corners[i].fixed = d->corners[i].high <= d->corners[i].low + 1u;
+    }
+}
+
+static void terrimpi_depth_fix(terrimpi_depth_corner *v, int high)
+{
+    if (v->fixed)
+        return;
+    v->at[2] = (float)(high ? v->high : v->low);
+    v->fixed = 1;
+}
+
+/* A surface that is seen edge-on is one long cell in each texel. Its corners take the ends of that,
+   which is left to choose where other cells do not say. */
+static void terrimpi_depth_stretch(terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    int low = 0, high = 0, upright = d->beside[4u * cell + 1u] != TERRIMPI_DEPTH_END;
+    uint32_t i;
+    for (i = 0; i < 4u; i++) {
+        const terrimpi_depth_corner *v = &d->corners[d->vertex_of[4u * cell + i]];
+        low |= v->fixed && v->at[2] < (float)c->k0 + 1.0f;
+        high |= v->fixed && v->at[2] > (float)c->k1 - 1.0f;
+    }
+    for (i = 0; i < 4u && !(low && high); i++)
+        terrimpi_depth_fix(&d->corners[d->vertex_of[4u * cell + i]],
+                           low || (!high && (upright ? i & 1u : i >> 1)));
+}
+
+static uint32_t terrimpi_depth_triangle_add(terrimpi_depth *d, uint32_t a, uint32_t b, uint32_t c,
+                                            uint32_t sheet)
+{
+    terrimpi_depth_triangle *t = &d->triangles[d->triangle_count];
+    uint32_t k;
+    t->corner[0] = a;
+    t->corner[1] = b;
+    t->corner[2] = c;
+    t->sheet = sheet;
+    t->points = TERRIMPI_DEPTH_END;
+    for (k = 0; k < 3u; k++) {
+        t->next[k] = d->at[t->corner[k]];
+        d->at[t->corner[k]] = 3u * d->triangle_count + k;
+    }
+    return d->triangle_count++;
+}
+
+/* A cell of which no triangle would come near one end gets two more, along the line of sight. */
+static uint32_t terrimpi_depth_spine(terrimpi_depth *d, const terrimpi_depth_cell *c)
+{
+    uint32_t first = d->corner_count, k;
+    for (k = 0; k < 4u; k++) {
+        terrimpi_depth_corner *v = &d->corners[d->corner_count];
+        v->at[0] = (float)c->x + 0.5f;
+        v->at[1] = (float)(c->y + (k & 1u));
+        v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
+        d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
+    }
+    terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
+    return terrimpi_depth_triangle_add(d, first + 2u, first + 1u, first + 3u, c->sheet);
+}
+
+/* Squared distance from a point to a segment. */
+static float terrimpi_depth_to_edge(const float p[3], const float a[3], const float b[3])
+{
+    float ab[3], ap[3], square, part;
+    int k;
+    terrimpi_sub(b, a, ab);
+    terrimpi_sub(p, a, ap);
+    square = terrimpi_dot(ab, ab);
+    part = square > 0.0f ? terrimpi_dot(ap, ab) / square : 0.0f;
+    part = terrimpi_min(terrimpi_max(part, 0.0f), 1.0f);
+    for (k = 0; k < 3; k++)
+        ap[k] -= part * ab[k];
+    return terrimpi_dot(ap, ap);
+}
+
+/* Squared distance from a point to a triangle. */
+static float terrimpi_depth_to_triangle(const float p[3], const float a[3], const float b[3],
+                                        const float c[3])
+{
+    float ab[3], ac[3], ap[3], aa, bb, mix, s, t, scale, best;
+    int k;
+    terrimpi_sub(b, a, ab);
+    terrimpi_sub(c, a, ac);
+    terrimpi_sub(p, a, ap);
+    aa = terrimpi_dot(ab, ab);
+    bb = terrimpi_dot(ac, ac);
+    mix = terrimpi_dot(ab, ac);
+    s = bb * terrimpi_dot(ap, ab) - mix * terrimpi_dot(ap, ac);
+    t = aa * terrimpi_dot(ap, ac) - mix * terrimpi_dot(ap, ab);
+    scale = aa * bb - mix * mix;
+    if (s >= 0.0f && t >= 0.0f && s + t <= scale && scale > 0.0f) {
+        for (k = 0; k < 3; k++)
+            ap[k] -= (s * ab[k] + t * ac[k]) / scale;
+        return terrimpi_dot(ap, ap);
+    }
+    best = terrimpi_min(terrimpi_depth_to_edge(p, a, b), terrimpi_depth_to_edge(p, b, c));
+    return terrimpi_min(best, terrimpi_depth_to_edge(p, c, a));
+}
+
+static const float *terrimpi_depth_at(const terrimpi_depth *d, uint32_t vertex)
+{
+    return d->corners[vertex].at;
+}
+
+/* Squared distance from an opaque texel's middle to a triangle of three vertices. */
+static float terrimpi_depth_gap(const terrimpi_depth *d, const terrimpi_depth_point *p,
+                                const uint32_t v[3])
+{
+    float at[3];
+    at[0] = (float)p->x + 0.5f;
+    at[1] = (float)p->y + 0.5f;
+    at[2] = (float)p->k;
+    return terrimpi_depth_to_triangle(at, terrimpi_depth_at(d, v[0]), terrimpi_depth_at(d, v[1]),
+                                      terrimpi_depth_at(d, v[2]));
+}
+
+static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t triangle)
+{
+    d->points[point].next = d->triangles[triangle].points;
+    d->triangles[triangle].points = point;
+}
+
+/* Two triangles for each cell, and the opaque texels that they stand for. */
+static void terrimpi_depth_first_mesh(terrimpi_depth *d)
+{
+    float limit = d->tolerance * d->tolerance;
+    uint32_t i, k, point = 0;
+    for (i = 0; i < d->cell_count; i++)
+        terrimpi_depth_stretch(d, i);
+    memset(d->at, 0xff, d->corner_count * sizeof *d->at);
+    d->triangle_count = 0;
+    for (i = 0; i < d->cell_count; i++) {
+        const terrimpi_depth_cell *c = &d->cells[i];
+        const uint32_t *v = d->vertex_of + 4u * i;
+        uint32_t a = terrimpi_depth_triangle_add(d, v[0], v[1], v[2], c->sheet);
+        uint32_t b = terrimpi_depth_triangle_add(d, v[3], v[2], v[1], c->sheet);
+        uint32_t spine = TERRIMPI_DEPTH_END;
+        for (k = c->k0; k <= c->k1; k++) {
+            terrimpi_depth_point *p = &d->points[point];
+            float to_a, to_b;
+            if (!terrimpi_depth_set(d->desc, d->desc->visible, c->x, c->y, k))
+                continue;
+            p->x = c->x;
+            p->y = c->y;
+            p->k = (uint16_t)k;
+            to_a = terrimpi_depth_gap(d, p, d->triangles[a].corner);
+            to_b = terrimpi_depth_gap(d, p, d->triangles[b].corner);
+            if (terrimpi_min(to_a, to_b) > limit && spine == TERRIMPI_DEPTH_END)
+                spine = terrimpi_depth_spine(d, c);
+            terrimpi_depth_give(d, point++, terrimpi_min(to_a, to_b) > limit ? spine
+                                            : to_a <= to_b                   ? a
+                                                                             : b);
+        }
+    }
+}
+
+/* Deals the cells out to sheets: each is what can be reached from its first cell over shared edges
+   without coming to a texel twice. */
+static void terrimpi_depth_sheets(terrimpi_depth *d)
+{
+    uint32_t i, k, n, end, width = d->desc->width, *slot = d->at;
+    d->sheet_count = 0;
+    for (i = 0; i < d->desc->height * width; i++)
+        slot[i] = TERRIMPI_DEPTH_END;
+    for (i = 0; i < d->cell_count; i++) {
+        if (d->cells[i].sheet != TERRIMPI_DEPTH_END)
+            continue;
+        d->cells[i].sheet = d->sheet_count;
+        slot[d->cells[i].y * width + d->cells[i].x] = d->sheet_count;
+        d->queue[0] = i;
+        for (n = 0, end = 1; n < end; n++)
+            for (k = 0; k < 4u; k++) {
+                uint32_t o = d->beside[4u * d->queue[n] + k], *at;
+                if (o == TERRIMPI_DEPTH_END || d->cells[o].sheet != TERRIMPI_DEPTH_END)
+                    continue;
+                at = &slot[d->cells[o].y * width + d->cells[o].x];
+                if (*at == d->sheet_count)
+                    continue;
+                *at = d->cells[o].sheet = d->sheet_count;
+                d->queue[end++] = o;
+            }
+        d->sheet_count++;
+    }
+}
+
+/* What stands round a vertex. */
+typedef struct terrimpi_depth_star {
+    uint32_t triangles[TERRIMPI_DEPTH_STAR], others[2u * TERRIMPI_DEPTH_STAR];
+    uint32_t count, other_count;
+    uint8_t shared[2u * TERRIMPI_DEPTH_STAR]; /* triangles at the edge to each other vertex */
+    uint8_t open[2u * TERRIMPI_DEPTH_STAR];   /* that edge is border or seam */
+    uint32_t open_count;
+} terrimpi_depth_star;
+
+/* Collects the living triangles at a vertex, and forgets the others; 0 when they are too many. */
+static int terrimpi_depth_collect(terrimpi_depth *d, uint32_t vertex, terrimpi_depth_star *s)
+{
+    uint32_t *at = &d->at[vertex], i, k, n, sheet[2u * TERRIMPI_DEPTH_STAR];
+    s->count = s->other_count = s->open_count = 0;
+    while (*at != TERRIMPI_DEPTH_END) {
+        const terrimpi_depth_triangle *t = &d->triangles[*at / 3u];
+        if (t->corner[0] == TERRIMPI_DEPTH_END) {
+            *at = t->next[*at % 3u];
+            continue;
+        }
+        if (s->count == TERRIMPI_DEPTH_STAR)
+            return 0;
+        s->triangles[s->count++] = *at / 3u;
+        at = &d->triangles[*at / 3u].next[*at % 3u];
+    }
+    for (i = 0; i < s->count; i++)
+        for (k = 0; k < 3u; k++) {
+            const terrimpi_depth_triangle *t = &d->triangles[s->triangles[i]];
+            if (t->corner[k] == vertex)
+                continue;
+            for (n = 0; n < s->other_count && s->others[n] != t->corner[k]; n++) {}
+            if (n == s->other_count) {
+                s->others[s->other_count++] = t->corner[k];
+                s->shared[n] = 0;
+                s->open[n] = 0;
+                sheet[n] = t->sheet;
+            }
+            s->shared[n]++;
+            s->open[n] |= sheet[n] != t->sheet;
+        }
+    for (n = 0; n < s->other_count; n++) {
+        s->open[n] |= s->shared[n] != 2u;
+        s->open_count += s->open[n];
+    }
+    return 1;
+}
+
+/* Whether an opaque texel's middle lies within the tolerance of a point, in each direction. */
+static int terrimpi_depth_near_texel(const terrimpi_depth *d, const float p[3])
+{
+    const terrimp_depth_mesh_desc *s = d->desc;
+    float r = d->tolerance;
+    uint32_t size[3], low[3], high[3], i, x, y, k;
+    size[0] = s->width;
+    size[1] = s->height;
+    size[2] = s->layers;
+    for (i = 0; i < 3u; i++) { /* those at low..high - 1 */
+        float middle = i < 2u ? p[i] - 0.5f : p[i];
+        low[i] = !(middle - r > 0.0f) ? 0u : terrimpi_ceil_u32(middle - r);
+        high[i] = middle + r < 0.0f ? 0u : terrimpi_min_u32((uint32_t)(middle + r) + 1u, size[i]);
+    }
+    for (k = low[2]; k < high[2]; k++)
+        for (y = low[1]; y < high[1]; y++)
+            for (x = low[0]; x < high[0]; x++)
+                if (terrimpi_depth_set(s, s->opaque, x, y, k))
+                    return 1;
+    return 0;
+}
+
+static float terrimpi_depth_length(const terrimpi_depth *d, uint32_t a, uint32_t b)
+{
+    float between[3];
+    terrimpi_sub(terrimpi_depth_at(d, b), terrimpi_depth_at(d, a), between);
+    return terrimpi_length(between);
+}
+
+/* Whether a triangle lies near opaque texels everywhere: looked at in steps of up to one unit. */
+static int terrimpi_depth_on_texels(const terrimpi_depth *d, const uint32_t v[3])
+{
+    const float *a = terrimpi_depth_at(d, v[0]), *b = terrimpi_depth_at(d, v[1]);
+    const float *c = terrimpi_depth_at(d, v[2]);
+    uint32_t rows = 1u + (uint32_t)terrimpi_depth_length(d, v[0], v[2]), i, n, k;
+    float across = terrimpi_depth_length(d, v[0], v[1]);
+    for (n = 0; n <= rows; n++) {
+        float t = (float)n / (float)rows;
+        uint32_t steps = 1u + (uint32_t)((1.0f - t) * across);
+        for (i = 0; i <= steps; i++) {
+            float s = (1.0f - t) * (float)i / (float)steps, p[3];
+            for (k = 0; k < 3u; k++)
+                p[k] = a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]);
+            if (!terrimpi_depth_near_texel(d, p))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* Twice the area of a triangle in the picture; > 0 as long as it shows its front. */
+static float terrimpi_depth_area(const terrimpi_depth *d, const uint32_t v[3])
+{
+    const float *a = terrimpi_depth_at(d, v[0]), *b = terrimpi_depth_at(d, v[1]);
+    const float *c = terrimpi_depth_at(d, v[2]);
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/* The triangles that take the place of a star when its middle moves to another vertex. */
+typedef struct terrimpi_depth_fan {
+    uint32_t triangles[2u * TERRIMPI_DEPTH_STAR], corner[TERRIMPI_DEPTH_STAR][3];
+    uint32_t count, all; /* after them those that stand round that vertex already */
+} terrimpi_depth_fan;
+
+static int terrimpi_depth_fan_of(const terrimpi_depth *d, const terrimpi_depth_star *s,
+                                 uint32_t from, uint32_t to, terrimpi_depth_fan *f)
+{
+    uint32_t i, k;
+    f->count = 0;
+    for (i = 0; i < s->count; i++) {
+        const uint32_t *v = d->triangles[s->triangles[i]].corner;
+        if (v[0] == to || v[1] == to || v[2] == to)
+            continue;
+        for (k = 0; k < 3u; k++)
+            f->corner[f->count][k] = v[k] == from ? to : v[k];
+        if (!(terrimpi_depth_area(d, f->corner[f->count]) > 0.25f))
+            return 0;
+        f->triangles[f->count++] = s->triangles[i];
+    }
+    return 1;
+}
+
+/* Whether all that a star stands for is still met by the fan; if so, that is dealt out anew. */
+static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s,
+                                 const terrimpi_depth_fan *f)
+{
+    float limit = d->tolerance * d->tolerance;
+    uint32_t i, k, p, list = TERRIMPI_DEPTH_END, *queue = d->queue, n = 0;
+    for (i = 0; i < s->count; i++)
+        for (p = d->triangles[s->triangles[i]].points; p != TERRIMPI_DEPTH_END;
+             p = d->points[p].next) {
+            uint32_t first = n ? queue[n - 1u] : 0u; /* neighbours mostly go to the same one */
+            for (k = 0; k < f->all; k++) {
+                uint32_t i_fan = (first + k) % f->all;
+                if (terrimpi_depth_gap(d, &d->points[p],
+                                       i_fan < f->count
+                                           ? f->corner[i_fan]
+                                           : d->triangles[f->triangles[i_fan]].corner) <= limit)
+                    break;
+            }
+            if (k == f->all)
+                return 0;
+            queue[n++] = (first + k) % f->all;
+        }
+    for (i = 0; i < s->count; i++) { /* one list of all, in the order of the queue */
+        terrimpi_depth_triangle *t = &d->triangles[s->triangles[s->count - 1u - i]];
+        uint32_t last = t->points;
+        if (last == TERRIMPI_DEPTH_END)
+            continue;
+        while (d->points[last].next != TERRIMPI_DEPTH_END)
+            last = d->points[last].next;
+        d->points[last].next = list;
+        list = t->points;
+        t->points = TERRIMPI_DEPTH_END;
+    }
+    for (n = 0; list != TERRIMPI_DEPTH_END; n++) {
+        p = list;
+        list = d->points[p].next;
+        terrimpi_depth_give(d, p, f->triangles[queue[n]]);
+    }
+    return 1;
+}
+
+/* Whether an edge of a star may collapse as far as its topology goes: borders and seams stay. */
+static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
+                              uint32_t n, const terrimpi_depth_star *t)
+{
+    uint32_t i, k, common = 0;
+    if (s->open_count && (!s->open[n] || s->open_count != 2u))
+        return 0;
+    for (i = 0; i < s->other_count; i++)
+        for (k = 0; k < t->other_count; k++)
+            common += s->others[i] == t->others[k];
+    if (common != s->shared[n])
+        return 0;
+    for (i = 0; i < s->other_count; i++) /* the border may not be cut short */
+        if (s->open_count && s->open[i] && i != n) {
+            float bound = 0.75f * d->tolerance;
+            if (terrimpi_depth_to_edge(terrimpi_depth_at(d, from),
+                                       terrimpi_depth_at(d, s->others[n]),
+                                       terrimpi_depth_at(d, s->others[i])) > bound * bound)
+                return 0;
+        }
+    return 1;
+}
+
+/* Moves a vertex to its n-th neighbour if the mesh stays as it should; -1: not yet, for edges would
+   become much longer than the longest that now collapse, and thin triangles with them. */
+static int terrimpi_depth_collapse(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
+                                   uint32_t n, float longest)
+{
+    terrimpi_depth_star t;
+    terrimpi_depth_fan f;
+    uint32_t to = s->others[n], i, k;
+    for (i = 0; i < s->other_count; i++)
+        if (terrimpi_depth_length(d, to, s->others[i]) > 2.0f * longest)
+            return -1;
+    if (!terrimpi_depth_fan_of(d, s, from, to, &f) || !terrimpi_depth_collect(d, to, &t) ||
+        !terrimpi_depth_may(d, s, from, n, &t))
+        return 0;
+    for (i = 0, f.all = f.count; i < t.count; i++) {
+        const uint32_t *v = d->triangles[t.triangles[i]].corner;
+        if (v[0] != from && v[1] != from && v[2] != from)
+            f.triangles[f.all++] = t.triangles[i];
+    }
+    for (i = 0; i < f.count; i++)
+        if (!terrimpi_depth_on_texels(d, f.corner[i]))
+            return 0;
+    if (!terrimpi_depth_covers(d, s, &f))
+        return 0;
+    for (i = 0; i < s->count; i++)
+        d->triangles[s->triangles[i]].corner[0] = TERRIMPI_DEPTH_END;
+    for (i = 0; i < f.count; i++) { /* in its old place, so that what it stands for stays with it */
+        uint32_t triangle = f.triangles[i];
+        memcpy(d->triangles[triangle].corner, f.corner[i], sizeof f.corner[i]);
+        for (k = 0; k < 3u; k++)
+            if (f.corner[i][k] == to) {
+                d->triangles[triangle].next[k] = d->at[to];
+                d->at[to] = 3u * triangle + k;
+            }
+    }
+    d->at[from] = TERRIMPI_DEPTH_END;
+    d->stale[to] = 0;
+    for (i = 0; i < s->other_count; i++)
+        d->stale[s->others[i]] = 0;
+    return 1;
+}
+
+/* Collapses edges up to a length, each vertex to the closest neighbour that it may go to. Where
+   nothing has changed only edges are tried that were too long before. */
+static uint32_t terrimpi_depth_pass(terrimpi_depth *d, float before, float longest)
+{
+    terrimpi_depth_star s;
+    uint32_t vertex, i, done = 0;
+    for (vertex = 0; vertex < d->corner_count; vertex++) {
+        float lengths[2u * TERRIMPI_DEPTH_STAR];
+        uint32_t next = 0;
+        int collapsed;
+        if (d->at[vertex] == TERRIMPI_DEPTH_END || !terrimpi_depth_collect(d, vertex, &s))
+            continue;
+        for (i = 0; i < s.other_count; i++) {
+            lengths[i] = terrimpi_depth_length(d, vertex, s.others[i]);
+            if (lengths[i] > longest || (d->stale[vertex] && lengths[i] <= before))
+                lengths[i] = 0.0f; /* not to be tried, or no more */
+        }
+        d->stale[vertex] = 1;
+        while (next != TERRIMPI_DEPTH_END) {
+            next = TERRIMPI_DEPTH_END;
+            for (i = 0; i < s.other_count; i++)
+                if (lengths[i] > 0.0f &&
+                    (next == TERRIMPI_DEPTH_END || lengths[i] < lengths[next]))
+                    next = i;
+            if (next == TERRIMPI_DEPTH_END)
+                break;
+            lengths[next] = 0.0f;
+            collapsed = terrimpi_depth_collapse(d, &s, vertex, next, longest);
+            if (collapsed < 0)
+                d->stale[vertex] = 0;
+            if (collapsed > 0)
+                next = TERRIMPI_DEPTH_END;
+            done += collapsed > 0;
+        }
+    }
+    return done;
+}
+
+static void terrimpi_depth_simplify(terrimpi_depth *d)
+{
+    float end = 2.0f * (float)(d->desc->width + d->desc->height + d->desc->layers);
+    float before = 0.0f, longest;
+    memset(d->stale, 0, d->corner_count);
+    for (longest = 1.5f; before < end; longest *= 1.4f) {
+        while (terrimpi_depth_pass(d, before, longest) > d->corner_count / 1000u) {}
+        before = longest;
+    }
+}
+
+/* Writes the triangles sheet by sheet, the vertices in the order in which they are met. */
+static void terrimpi_depth_write_mesh(terrimpi_depth *d, terrimp_depth_mesh *m)
+{
+    uint32_t i, k, sheet, *first = d->joined; /* [sheets + 1] */
+    uint32_t *name = d->queue;                /* [corners] */
+    memset(first, 0, (d->sheet_count + 1u) * sizeof *first);
+    memset(name, 0xff, d->corner_count * sizeof *name);
+    m->vertex_count = m->index_count = 0;
+    for (i = 0; i < d->triangle_count; i++)
+        if (d->triangles[i].corner[0] != TERRIMPI_DEPTH_END)
+            first[d->triangles[i].sheet + 1u] += 3u;
+    for (sheet = 0; sheet < d->sheet_count; sheet++) {
+        first[sheet + 1u] += first[sheet];
+        if (sheet < m->sheet_capacity) {
+            m->sheets[sheet].first_index = first[sheet];
+            m->sheets[sheet].index_count = first[sheet + 1u] - first[sheet];
+        }
+    }
+    for (i = 0; i < d->triangle_count; i++) {
+        const terrimpi_depth_triangle *t = &d->triangles[i];
+        if (t->corner[0] == TERRIMPI_DEPTH_END)
+            continue;
+        for (k = 0; k < 3u; k++) {
+            uint32_t vertex = t->corner[k], at = first[t->sheet]++;
+            if (name[vertex] == TERRIMPI_DEPTH_END) {
+                name[vertex] = m->vertex_count++;
+                if (name[vertex] < m->vertex_capacity) {
+                    m->vertices[name[vertex]].u = d->corners[vertex].at[0];
+                    m->vertices[name[vertex]].v = d->corners[vertex].at[1];
+                    m->vertices[name[vertex]].layer = d->corners[vertex].at[2];
+                }
+            }
+            if (at < m->index_capacity)
+                m->indices[at] = name[vertex];
+            m->index_count++;
+        }
+    }
+}
+
+/* Rectangles of the sheets, and from which layer their texels have their colours. */
+static void terrimpi_depth_write_sheets(terrimpi_depth *d, terrimp_depth_mesh *m)
+{
+    uint32_t i, sheet;
+    m->sheet_count = d->sheet_count;
+    m->texel_count = 0;
+    if (d->sheet_count > m->sheet_capacity)
+        return;
+    for (i = 0; i < d->sheet_count; i++)
+        m->sheets[i].texels = terrimpi_rect(0, 0, 0, 0);
+    for (i = 0; i < d->cell_count; i++) {
+        terrimp_rect *r = &m->sheets[d->cells[i].sheet].texels;
+        terrimp_rect cell = terrimpi_rect(d->cells[i].x, d->cells[i].y, 1, 1);
+        *r = r->width ? terrimpi_rect_union(r, &cell) : cell;
+    }
+    for (sheet = 0; sheet < d->sheet_count; sheet++) {
+        m->sheets[sheet].first_texel = m->texel_count;
+        m->texel_count += m->sheets[sheet].texels.width * m->sheets[sheet].texels.height;
+    }
+    if (m->texel_count > m->texel_capacity)
+        return;
+    memset(m->texel_layers, 0xff, m->texel_count * sizeof *m->texel_layers);
+    for (i = 0; i < d->cell_count; i++) {
+        const terrimpi_depth_cell *c = &d->cells[i];
+        const terrimp_depth_sheet *s = &m->sheets[c->sheet];
+        m->texel_layers[s->first_texel + (c->y - s->texels.y) * s->texels.width + c->x -
+                        s->texels.x] = (uint16_t)((c->k0 + c->k1) / 2u);
+    }
+}
+
+static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, terrimpi_depth *d)
+{
+    TERRIMPI_REFUSE(!desc || !desc->opaque || !desc->visible, TERRIMP_E_NULL);
+    d->desc = desc;
+    d->tolerance = desc->tolerance;
+    TERRIMPI_DEFAULT(d->tolerance, 1.0f);
+    return terrimpi_within_u32(desc->width, 1, 16384) &&
+                   terrimpi_within_u32(desc->height, 1, 16384) &&
+                   terrimpi_within_u32(desc->layers, 1, 65535) &&
+                   terrimpi_within(d->tolerance, 0.75f, 64.0f)
+               ? TERRIMP_OK
+               : TERRIMP_E_RANGE;
+}
+
+/* Lays out the scratch memory, for cells and texels that have been counted. */
+static size_t terrimpi_depth_layout(terrimpi_depth *d, void *base)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    size_t n = 2u * (size_t)d->cell_count, points = (size_t)d->point_count + d->cell_count;
+    size_t slots = (size_t)d->desc->width * d->desc->height;
+    size_t most = terrimpi_mul(8, n, &arena.ok);
+    size_t queue = most > points ? most : points;
+    arena.ok &= n < 0x10000000u;
+    d->cells = (terrimpi_depth_cell *)terrimpi_take(&arena, n, sizeof *d->cells);
+    d->whole = d->cells ? d->cells + d->cell_count : NULL;
+    d->beside = (uint32_t *)terrimpi_take(&arena, most / 2u, sizeof *d->beside);
+    d->first_cell = (uint32_t *)terrimpi_take(&arena, slots + 1u, sizeof *d->first_cell);
+    d->joined = (uint32_t *)terrimpi_take(&arena, most / 2u + 2u, sizeof *d->joined);
+    d->vertex_of = (uint32_t *)terrimpi_take(&arena, most / 2u, sizeof *d->vertex_of);
+    d->corners = (terrimpi_depth_corner *)terrimpi_take(&arena, most, sizeof *d->corners);
+    d->triangles =
+        (terrimpi_depth_triangle *)terrimpi_take(&arena, most / 2u, sizeof *d->triangles);
+    d->points = (terrimpi_depth_point *)terrimpi_take(&arena, points, sizeof *d->points);
+    d->at = (uint32_t *)terrimpi_take(&arena, most > slots ? most : slots, sizeof *d->at);
+    d->stale = (uint8_t *)terrimpi_take(&arena, most, 1);
+    d->queue = (uint32_t *)terrimpi_take(&arena, queue, sizeof *d->queue);
+    return arena.ok ? arena.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_desc *desc)
+{
+    terrimpi_depth d;
+    if (terrimpi_depth_check(desc, &d) != TERRIMP_OK)
+        return 0;
+    terrimpi_depth_cells(&d, 0);
+    return terrimpi_depth_layout(&d, NULL);
+}
+
+TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc *desc,
+                                                   void *scratch, size_t bytes,
+                                                   terrimp_depth_mesh *mesh)
+{
+    terrimpi_depth d;
+    size_t needed;
+    TERRIMPI_TRY(terrimpi_depth_check(desc, &d));
+    TERRIMPI_REFUSE(!scratch || !mesh || !mesh->vertices || !mesh->indices || !mesh->sheets ||
+                        !mesh->texel_layers,
+                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    terrimpi_depth_cells(&d, 0);
+    needed = terrimpi_depth_layout(&d, scratch);
+    TERRIMPI_REFUSE(!needed || bytes < needed, TERRIMP_E_MEMORY);
+    terrimpi_depth_cells(&d, 1);
+    terrimpi_depth_unfold(&d);
+    terrimpi_depth_match(&d);
+    terrimpi_depth_connect(&d);
+    terrimpi_depth_sheets(&d);
+    terrimpi_depth_first_mesh(&d);
+    mesh->first_triangle_count = d.triangle_count;
+    terrimpi_depth_simplify(&d);
+    terrimpi_depth_write_mesh(&d, mesh);
+    terrimpi_depth_write_sheets(&d, mesh);
+    return mesh->vertex_count > mesh->vertex_capacity ||
+                   mesh->index_count > mesh->index_capacity ||
+                   mesh->sheet_count > mesh->sheet_capacity ||
+                   mesh->texel_count > mesh->texel_capacity
+               ? TERRIMP_E_CAPACITY
+               : TERRIMP_OK;
+}
+
+/* --- layers all round a cell, and for all views of an object --- */
+
+TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
+                                                 const float centre[3], float half,
+                                                 terrimp_layers *layers,
+                                                 terrimp_capture pictures[6])
+{
+    terrimp_layers_desc d;
+    terrimp_layers made;
+    uint32_t side, k;
+    TERRIMPI_REFUSE(!desc || !centre || !layers || !pictures, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(centre) || !terrimpi_finite(half), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(half > 0.0f) || !(desc->distance > 0.0f), TERRIMP_E_RANGE);
+    d = *desc;
+    for (k = 0; k < 2u; k++) { /* at depth t the pyramid is t + half wide to each side */
+        d.cell_size[k] = 2.0f * half;
+        d.cell_tan[k] = 0.0f;
+        d.view_tan[k] = 1.0f + half / desc->distance;
+    }
+    d.cell_depth = 2.0f * half;
+    TERRIMPI_TRY(terrimp_layers_plan(&d, &made));
+    *layers = made;
+    for (side = 0; side < 6u; side++) {
+        terrimp_capture *p = &pictures[side];
+        memset(p, 0, sizeof *p);
+        p->forward[side / 2u] = side & 1u ? -1.0f : 1.0f;
+        p->up[1] = 1.0f;
+        terrimpi_basis(p->forward, p->up, p->right);
+        for (k = 0; k < 3u; k++)
+            p->eye[k] = centre[k] + half * p->forward[k];
+        p->z_near = made.start;
+        p->z_far = made.end;
+        p->tan_right = p->tan_up = d.view_tan[0];
+        p->tan_left = p->tan_down = -d.view_tan[0];
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
+                                                 uint32_t counts[3])
+{
+    float needed[3];
+    int k;
+    TERRIMPI_REFUSE(!box || !counts, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
+                        !terrimpi_finite2(texel, slope),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(texel > 0.0f) || !(slope >= 1.0f), TERRIMP_E_RANGE);
+    for (k = 0; k < 3; k++) {
+        needed[k] = (box->max[k] - box->min[k]) * slope / texel;
+        TERRIMPI_REFUSE(!(needed[k] >= 0.0f) || !(needed[k] < TERRIMPI_LAYERS_MAX),
+                        TERRIMP_E_RANGE);
+    }
+    for (k = 0; k < 3; k++)
+        counts[k] = terrimpi_max_u32(1u, terrimpi_ceil_u32(needed[k]));
+    return TERRIMP_OK;
+}
+
 /* ==== Placement ========================================================== >>impl-placement */
 /* Based on: Jeschke 2004, chapter 5. */
 
@@ -15155,6 +16310,325 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     for (i = 0; i < desc->gain_count; i++)
         if (shown[i])
             costs[desc->gains[i].view] -= desc->gains[i].saved;
+    return TERRIMP_OK;
+}
+
+
+/* --- a prepared set for a terrain --- */
+
+typedef struct terrimpi_prepare {
+    terrimp_place_terrain_desc desc; /* resolved */
+    terrimp_place_set *set;
+    uint32_t cells, nodes, squares;  /* along a side; all; of all sizes */
+    float *worth;       /* [nodes] what the node costs as ground in a view */
+    uint8_t *whole;     /* [nodes] ground of the cell draws it, and none of its parts */
+    uint8_t *below;     /* [nodes] of such a node */
+    uint32_t *slots;    /* [squares][nodes] gains of that picture, later where the next one goes;
+                           TERRIMPI_PLACE_NONE: it cannot be prepared */
+} terrimpi_prepare;
+
+static float terrimpi_boxes_distance(const terrimp_box *a, const terrimp_box *b)
+{
+    float gap[3];
+    int k;
+    for (k = 0; k < 3; k++)
+        gap[k] = terrimpi_max(0.0f, terrimpi_max(a->min[k] - b->max[k], b->min[k] - a->max[k]));
+    return terrimpi_length(gap);
+}
+
+/* The box of eyes of a square of 2^level cells. */
+static void terrimpi_prepare_square(const terrimpi_prepare *p, uint32_t level, uint32_t x,
+                                    uint32_t z, terrimp_box *box)
+{
+    float part = (float)(1u << level) / (float)p->cells;
+    float width = (p->desc.eyes.max[0] - p->desc.eyes.min[0]) * part;
+    float depth = (p->desc.eyes.max[2] - p->desc.eyes.min[2]) * part;
+    *box = p->desc.eyes;
+    box->min[0] += width * (float)x;
+    box->max[0] = box->min[0] + width;
+    box->min[2] += depth * (float)z;
+    box->max[2] = box->min[2] + depth;
+}
+
+/* The number of the first square of a level. */
+static uint32_t terrimpi_prepare_first(const terrimpi_prepare *p, uint32_t level)
+{
+    uint32_t first = 0, k;
+    for (k = 0; k < level; k++)
+        first += (p->cells >> k) * (p->cells >> k);
+    return first;
+}
+
+static float terrimpi_half_diagonal(const terrimp_box *box)
+{
+    float size[3];
+    terrimpi_sub(box->max, box->min, size);
+    return 0.5f * terrimpi_length(size);
+}
+
+/* Whether a node's picture from the middle of a square can serve all of its eyes, and its size. A
+   point that lies `error` off its mesh is then seen at most K error r / d^2 pixels off, when eyes
+   are up to r from that middle and at least d from the node: the directions differ by r / d. */
+static int terrimpi_prepare_picture(const terrimpi_prepare *p, const terrimp_box *square,
+                                    uint32_t node, terrimp_place_picture *out)
+{
+    terrimp_box box;
+    terrimp_mesh_info mesh;
+    terrimp_capture capture;
+    uint32_t size[2];
+    float r = terrimpi_half_diagonal(square), d, closer, scale;
+    int k;
+    if (terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0;
+    d = terrimpi_boxes_distance(square, &box);
+    for (k = 0; k < 3; k++)
+        out->eye[k] = 0.5f * (square->min[k] + square->max[k]);
+    if (!(r <= p->desc.max_angle_rad * d) ||
+        p->desc.pixel_factor * mesh.error * r > p->desc.tolerance_px * d * d ||
+        terrimp_capture_fit(&box, out->eye, &capture) != TERRIMP_OK)
+        return 0;
+    closer = terrimp_box_distance(&box, out->eye) / d;
+    if (terrimp_impostor_size(&capture, p->desc.pixel_factor, p->desc.texels_per_px * closer, 1,
+                              8192, size, &scale) != TERRIMP_OK || scale < 1.0f)
+        return 0;
+    out->width = size[0];
+    out->height = size[1];
+    return 1;
+}
+
+/* What ground draws for a cell, node by node: whole where that keeps the tolerance from its closest
+   eye. */
+static void terrimpi_prepare_ground(const terrimpi_prepare *p, const terrimp_box *cell)
+{
+    const terrimp_quadtree *tree = &p->desc.terrain->tree;
+    uint32_t i;
+    for (i = p->nodes; i-- > 0;) {
+        terrimp_node n = terrimpi_tree_node(tree, i), parent;
+        terrimp_box box;
+        terrimpi_mip_error_box(tree, &n, &box);
+        p->whole[i] = n.level == 0 ||
+                      tree->nodes[i].error * p->desc.pixel_factor <=
+                          p->desc.tolerance_px * terrimpi_boxes_distance(cell, &box);
+        p->below[i] = 0;
+        if (i + 1u == p->nodes)
+            continue;
+        parent = terrimpi_tree_parent(tree, &n);
+        p->below[i] = p->whole[parent.number] || p->below[parent.number];
+    }
+}
+
+/* Whether some eye of a cell may see a box when it looks into the k-th part of the circle: as if
+   cell and box were round. */
+static int terrimpi_prepare_sees(const terrimpi_prepare *p, const terrimp_box *cell,
+                                 const terrimp_box *box, uint32_t k)
+{
+    const float circle = 6.2831853f;
+    float middle = circle * ((float)k + 0.5f) / (float)p->desc.directions;
+    float x = 0.5f * (box->min[0] + box->max[0] - cell->min[0] - cell->max[0]);
+    float z = 0.5f * (box->min[2] + box->max[2] - cell->min[2] - cell->max[2]);
+    float far_off = terrimpi_hypot(x, z), angle, spread;
+    float round = 0.5f * (terrimpi_hypot(box->max[0] - box->min[0], box->max[2] - box->min[2]) +
+                          terrimpi_hypot(cell->max[0] - cell->min[0],
+                                         cell->max[2] - cell->min[2]));
+    if (!(far_off > round))
+        return 1;
+    spread = 0.5f * (p->desc.fov_rad + circle / (float)p->desc.directions) +
+             TERRIMP_ASINF(round / far_off) + 1e-4f;
+    angle = (x * TERRIMP_COSF(middle) + z * TERRIMP_COSF(middle - 0.25f * circle)) / far_off;
+    return spread >= 3.1415927f || angle >= TERRIMP_COSF(spread);
+}
+
+/* What each node costs as ground in a view. */
+static void terrimpi_prepare_worth(const terrimpi_prepare *p, const terrimp_box *cell, uint32_t k)
+{
+    const terrimp_quadtree *tree = &p->desc.terrain->tree;
+    float quads = (float)tree->chunk_quads;
+    float own = p->desc.draw_cost + 2.0f * quads * quads * p->desc.triangle_cost;
+    uint32_t i;
+    for (i = 0; i < p->nodes; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i), children[4];
+        terrimp_box box;
+        uint32_t count;
+        p->worth[i] = 0.0f;
+        terrimp_terrain_get_box(p->desc.terrain, i, &box);
+        if (!terrimpi_prepare_sees(p, cell, &box, k))
+            continue;
+        if (p->whole[i]) {
+            p->worth[i] = own;
+            continue;
+        }
+        count = terrimpi_tree_children(tree, &n, cell->min, children);
+        while (count-- > 0)
+            p->worth[i] += p->worth[children[count].number];
+    }
+}
+
+/* What a node's picture saves in the view at hand. */
+static float terrimpi_prepare_saved(const terrimpi_prepare *p, uint32_t node)
+{
+    terrimp_mesh_info mesh;
+    if (p->below[node] || !(p->worth[node] > 0.0f) ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0.0f;
+    return p->worth[node] - p->desc.draw_cost -
+           p->desc.triangle_cost * (float)(mesh.index_count / 3u);
+}
+
+/* Counts the gains of all pictures, or writes them. */
+static void terrimpi_prepare_gains(terrimpi_prepare *p, int write)
+{
+    uint32_t cell_x, cell_z, k, i, level, view = 0;
+    for (cell_z = 0; cell_z < p->cells; cell_z++)
+        for (cell_x = 0; cell_x < p->cells; cell_x++) {
+            terrimp_box cell;
+            terrimpi_prepare_square(p, 0, cell_x, cell_z, &cell);
+            terrimpi_prepare_ground(p, &cell);
+            for (k = 0; k < p->desc.directions; k++, view++) {
+                terrimpi_prepare_worth(p, &cell, k);
+                if (write)
+                    p->set->costs[view] = p->worth[p->nodes - 1u];
+                for (i = 0; i < p->nodes; i++) {
+                    float saved = terrimpi_prepare_saved(p, i);
+                    for (level = 0; saved > 0.0f && level <= p->desc.cell_levels; level++) {
+                        uint32_t square = terrimpi_prepare_first(p, level) +
+                                          (cell_z >> level) * (p->cells >> level) +
+                                          (cell_x >> level);
+                        uint32_t *slot = &p->slots[(size_t)square * p->nodes + i];
+                        if (*slot == TERRIMPI_PLACE_NONE)
+                            continue;
+                        if (write) {
+                            p->set->gains[*slot].view = view;
+                            p->set->gains[*slot].saved = saved;
+                        }
+                        ++*slot;
+                    }
+                }
+            }
+        }
+}
+
+/* Goes through all pictures: first marks those that can be prepared, then, when their gains have
+   been counted, gives those that have any a place. */
+static void terrimpi_prepare_pictures(terrimpi_prepare *p, int list)
+{
+    uint32_t level, x, z, i, square = 0;
+    p->set->candidate_count = p->set->gain_count = 0;
+    for (level = 0; level <= p->desc.cell_levels; level++)
+        for (z = 0; z < p->cells >> level; z++)
+            for (x = 0; x < p->cells >> level; x++, square++) {
+                terrimp_box box;
+                terrimpi_prepare_square(p, level, x, z, &box);
+                for (i = 0; i < p->nodes; i++) {
+                    uint32_t *slot = &p->slots[(size_t)square * p->nodes + i], count = *slot;
+                    terrimp_place_picture made;
+                    uint32_t at = p->set->candidate_count;
+                    if (!list)
+                        *slot = terrimpi_prepare_picture(p, &box, i, &made) ? 0u
+                                                                            : TERRIMPI_PLACE_NONE;
+                    if (!list || count == TERRIMPI_PLACE_NONE || count == 0)
+                        continue;
+                    if (at < p->set->candidate_capacity) {
+                        terrimpi_prepare_picture(p, &box, i, &made);
+                        made.node = i;
+                        made.level = level;
+                        made.x = x;
+                        made.z = z;
+                        p->set->pictures[at] = made;
+                        p->set->candidates[at].cluster = i;
+                        p->set->candidates[at].first_gain = p->set->gain_count;
+                        p->set->candidates[at].gain_count = count;
+                        p->set->candidates[at].memory = (float)made.width * (float)made.height;
+                    }
+                    *slot = p->set->gain_count;
+                    p->set->gain_count += count;
+                    p->set->candidate_count++;
+                }
+            }
+}
+
+/* Checks a descriptor, fills in its defaults and lays out the scratch memory. */
+static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *desc, void *base,
+                                             terrimpi_prepare *p, size_t *bytes)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    terrimp_terrain_info info;
+    terrimp_place_terrain_desc *d = &p->desc;
+    int k;
+    TERRIMPI_REFUSE(!desc || !desc->terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_terrain_get_info(desc->terrain, &info));
+    *d = *desc;
+    TERRIMPI_DEFAULT(d->directions, 8u);
+    TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
+                        !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
+                        !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
+                        !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
+                        !terrimpi_finite(d->texels_per_px),
+                    TERRIMP_E_NOT_FINITE);
+    for (k = 0; k < 3; k++)
+        TERRIMPI_REFUSE(d->eyes.min[k] > d->eyes.max[k], TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(d->cell_levels > 6u || d->directions > 64u ||
+                        !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
+                        d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f ||
+                        d->texels_per_px < 0.0f || d->draw_cost < 0.0f || d->triangle_cost < 0.0f,
+                    TERRIMP_E_RANGE);
+    d->tolerance_px = d->tolerance_px > 0.0f ? d->tolerance_px : 1.0f;
+    d->max_angle_rad = d->max_angle_rad > 0.0f ? d->max_angle_rad : 0.1f;
+    d->texels_per_px = d->texels_per_px > 0.0f ? d->texels_per_px : 1.0f;
+    if (!(d->draw_cost > 0.0f) && !(d->triangle_cost > 0.0f)) {
+        d->draw_cost = 40.0f;
+        d->triangle_cost = 1.0f;
+    }
+    p->cells = 1u << d->cell_levels;
+    p->nodes = info.node_count;
+    p->squares = terrimpi_prepare_first(p, d->cell_levels + 1u);
+    p->worth = (float *)terrimpi_take(&arena, p->nodes, sizeof *p->worth);
+    p->whole = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->below = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->slots = (uint32_t *)terrimpi_take(&arena, terrimpi_mul(p->squares, p->nodes, &arena.ok),
+                                         sizeof *p->slots);
+    *bytes = arena.bytes;
+    return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
+}
+
+TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terrain_desc *desc)
+{
+    terrimpi_prepare p;
+    size_t bytes;
+    return terrimpi_prepare_begin(desc, NULL, &p, &bytes) == TERRIMP_OK ? bytes : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
+                                                 void *scratch, size_t bytes,
+                                                 terrimp_place_set *set)
+{
+    terrimpi_prepare p;
+    size_t needed;
+    uint32_t i;
+    TERRIMPI_REFUSE(!scratch || !set || !set->candidates || !set->pictures || !set->gains ||
+                        !set->parents || !set->costs,
+                    TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
+    p.set = set;
+    set->cluster_count = p.nodes;
+    set->view_count = p.cells * p.cells * p.desc.directions;
+    terrimpi_prepare_pictures(&p, 0);
+    terrimpi_prepare_gains(&p, 0);
+    terrimpi_prepare_pictures(&p, 1);
+    TERRIMPI_REFUSE(set->candidate_count > set->candidate_capacity ||
+                        set->gain_count > set->gain_capacity ||
+                        set->cluster_count > set->cluster_capacity ||
+                        set->view_count > set->view_capacity,
+                    TERRIMP_E_CAPACITY);
+    terrimpi_prepare_gains(&p, 1);
+    for (i = 0; i < p.nodes; i++) {
+        terrimp_node n = terrimpi_tree_node(&p.desc.terrain->tree, i);
+        set->parents[i] = i + 1u == p.nodes
+                              ? i
+                              : terrimpi_tree_parent(&p.desc.terrain->tree, &n).number;
+    }
     return TERRIMP_OK;
 }
 
