@@ -372,15 +372,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 /* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
 typedef struct terrimp_camera {
-    float eye[3];           /* [wu] */
+    float eye[3];           /* [wu] [Limits: -1e18..1e18] */
     float forward[3];       /* (required) viewing direction, any length > 0 */
     float up[3];            /* [Default 0,0,0 -> 0,1,0]; along forward: another one is chosen */
     float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
     uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
     uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
     float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near].
-                               What is drawn may need more: see terrimp_stats.z_far */
+    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
+                               ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
@@ -447,8 +447,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
-              E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum, or for 1e18 and more; E_INSIDE when the
+              eye is in the box; E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -701,8 +701,9 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
-/* The matrix that takes a world position (x, y, z, 1) to (s, t, r, q): the capture's picture lies
-   in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth in 0..1.
+/* The matrix that takes (x, y, z, 1), a position relative to the capture's eye, to (s, t, r, q):
+   the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
+   in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
@@ -715,9 +716,10 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq);
+   xyz [count][3], world positions, and the capture's eye, to stq [count][3], which may not overlap
+   xyz. */
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
@@ -1287,10 +1289,10 @@ typedef struct terrimp_capture_command {
 } terrimp_capture_command;
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
-   texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
-   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
-   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
+   texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
+   bilinear, divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a
+   picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
+   the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1301,6 +1303,7 @@ typedef struct terrimp_impostor_command {
     uint32_t index_count;
     float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
                              by a dither pattern: its ground shows on the others */
+    float eye[3];         /* that the picture was made from: positions are relative to it */
     float texture_matrix[16];
 } terrimp_impostor_command;
 
@@ -1955,11 +1958,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-static int terrimpi_finite(float value)
+/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
+   since compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value)
 {
-    float rounded = terrimpi_float(value);
-    return rounded - rounded == 0.0f;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x7fffffffu;
 }
+
+static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
 {
@@ -2282,7 +2291,7 @@ static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t
 
 static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 {
-    return field->has_no_data && (raw == field->no_data || raw != raw);
+    return field->has_no_data && (raw == field->no_data || terrimpi_bits(raw) > TERRIMPI_INFINITE);
 }
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
@@ -2824,6 +2833,16 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
+#define TERRIMPI_FARTHEST 1e18f /* of coordinates: products of two distances stay finite */
+
+/* Whether two vectors are of unit length and at a right angle, but for rounding. */
+static int terrimpi_orthonormal(const float a[3], const float b[3])
+{
+    return terrimpi_abs(terrimpi_dot(a, a) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(b, b) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(a, b)) < 2e-6f;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
 {
     terrimp_camera c;
@@ -2839,8 +2858,12 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
                     !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
-    terrimpi_basis(c.forward, c.up, right);
+                    c.z_far <= c.z_near || c.z_far > TERRIMPI_FARTHEST ||
+                    terrimpi_largest(c.eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
+    if (!terrimpi_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
+        TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
+        terrimpi_basis(c.forward, c.up, right);
+    }
     *out = c;
     return TERRIMP_OK;
 }
@@ -3038,7 +3061,8 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
-                    box->min[2] > box->max[2], TERRIMP_E_RANGE);
+                    box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_FARTHEST ||
+                    terrimp_box_farthest(box, eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
@@ -4149,6 +4173,7 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
     terrimp_capture_matrices(capture, 0, view, projection);
+    view[12] = view[13] = view[14] = 0.0f; /* relative to the eye */
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
     scale[2] = 0.5f;
@@ -4182,18 +4207,21 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq)
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq)
 {
     static const int rows[3] = {0, 1, 3};
     size_t i;
     int k;
-    TERRIMPI_REFUSE(!matrix || (count && (!xyz || !stq)), TERRIMP_E_NULL);
-    for (i = 0; i < count; i++, xyz += 3, stq += 3)
+    TERRIMPI_REFUSE(!matrix || !eye || (count && (!xyz || !stq)), TERRIMP_E_NULL);
+    for (i = 0; i < count; i++, xyz += 3, stq += 3) {
+        float to[3];
+        terrimpi_sub(xyz, eye, to);
         for (k = 0; k < 3; k++) {
             const float *m = matrix + rows[k];
-            stq[k] = m[0] * xyz[0] + m[4] * xyz[1] + m[8] * xyz[2] + m[12];
+            stq[k] = m[0] * to[0] + m[4] * to[1] + m[8] * to[2] + m[12];
         }
+    }
     return TERRIMP_OK;
 }
 
@@ -6871,13 +6899,11 @@ static terrimp_result terrimpi_cut_ground(terrimp_view *v)
         terrimpi_list_chunks(v, v->ground.draws_needed);
     } else {
         terrimp_result result = TERRIMP_E_CAPACITY;
-        terrimp_camera camera;
-        TERRIMPI_TRY(terrimp_camera_resolve(&v->camera, &camera));
         v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
         while (result == TERRIMP_E_CAPACITY) {
             float tolerance = v->desc.ground_tolerance_px * v->ground_scale;
             v->ground.tolerance_px = terrimpi_min(tolerance, 1000.0f);
-            result = terrimpi_mip_select(&v->terrain->tree, &v->ground, &camera);
+            result = terrimpi_mip_select(&v->terrain->tree, &v->ground, &v->camera);
             if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f) {
                 v->outdated = 1; /* select has written over the list of the frame before */
                 return result;
@@ -7068,7 +7094,7 @@ static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
 
 static float terrimpi_sharpness(const terrimp_view *v, float closest)
 {
-    return v->pixel_factor * v->desc.texels_per_px / terrimpi_max(closest, 1e-6f);
+    return v->pixel_factor * v->desc.texels_per_px / terrimpi_max(closest, 1e-6f * v->desc.fade_start);
 }
 
 /* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
@@ -8019,6 +8045,7 @@ static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
     for (part = 0; part < record->part_count; part++) {
         command.part = part;
         command.atlas = record->parts[part].atlas;
+        memcpy(command.eye, record->eye, sizeof command.eye);
         memcpy(command.texture_matrix, record->texture_matrix[part],
                sizeof command.texture_matrix);
         callbacks->draw_impostor(callbacks->user, &command);

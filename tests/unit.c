@@ -27,6 +27,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_atlas.h"
 #include "unit_terrain.h"
 #include "unit_view.h"
+#include "unit_numbers.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
 #include "unit_layers.h"
@@ -47,6 +48,7 @@ int main(int argc, char **argv)
     impostor_tests();
     atlas_tests();
     terrain_tests();
+    numbers_tests();
     bake_tests();
     view_tests();
     bad_input_tests();

@@ -467,11 +467,14 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     for (i = 0; i < mesh.vertex_count; i += step) {
         double p[3], seen[4], clip[4], out[4], x, y;
         double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height);
-        int shown = 0;
+        int shown = 0, k;
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
         oracle_transform(capture->view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
+        for (k = 0; k < 3; k++)
+            p[k] -= (double)command->eye[k];
         oracle_transform(command->texture_matrix, p, out);
+        oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
         CHECK(fabs(x - (clip[0] / clip[3] * 0.5 + 0.5) * (double)capture->slot.width) < rim);

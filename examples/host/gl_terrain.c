@@ -73,14 +73,14 @@ static const char impostor_vertex[] =
     "#version 330 core\n"
     "in vec3 position;\n"
     "uniform mat4 matrix, texture_matrix;\n"
-    "uniform vec3 eye;\n"
+    "uniform vec3 eye, picture_eye;\n"
     "out vec2 uv;\n"
     "out vec3 place;\n"
     "out vec4 strq;\n"
     "void main() {\n"
     "    uv = vec2(0.0);\n"
     "    place = position;\n"
-    "    strq = texture_matrix * vec4(position, 1.0);\n"
+    "    strq = texture_matrix * vec4(position - picture_eye, 1.0);\n"
     "    gl_Position = matrix * vec4(position - eye, 1.0);\n"
     "}\n";
 
@@ -145,6 +145,7 @@ static gl_program make_program(const char *vertex_source, const char *const *par
     p.side = glGetUniformLocation(p.id, "side");
     p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
+    p.picture_eye = glGetUniformLocation(p.id, "picture_eye");
     p.tint = glGetUniformLocation(p.id, "tint");
     p.on_screen = glGetUniformLocation(p.id, "on_screen");
     return p;
@@ -677,6 +678,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     glUniform3f(p->tint, 0.85f, 0.10f, 0.05f);
     glUniform1f(p->alpha, c->alpha);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
+    glUniform3fv(p->picture_eye, 1, c->eye);
     draw_mesh(g, g->atlas[c->atlas], slot_of(g, &g->mesh_pool, c->node), c->index_count);
 }
 
