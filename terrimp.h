@@ -45,15 +45,19 @@
        >>quadtree     which node: its place, box, parent, neighbours, children closest first
        >>geomipmap    levels, crack-free index patterns, selection, morphing
        >>impostor     size in texels, texture matrix, view angle, parallax error, lifetime
-       >>atlas        first-fit decreasing height packing; two atlases in turn; a live atlas
+       >>atlas        first-fit decreasing height packing; an atlas whose slots come and go
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
+       >>visibility   the horizon: which nodes are hidden behind others
        >>view         the per-frame decision, the schedule, the draw commands
+       >>sorted       terrain in exact painter's order, for machines without a depth buffer
        >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>visible-sets what a horizon is made of
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
+       >>placement    which pictures to prepare so that no view costs too much
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
 
@@ -154,6 +158,7 @@
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
+         TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on
        a Cortex-M4, 24 KiB without the three options that follow it above, if its linker drops
@@ -165,6 +170,7 @@
    REFERENCES
        Hess     W. Hess, Terrain Impostors, Master's thesis, Cal Poly San Luis Obispo, 2010
        de Boer  W. H. de Boer, Fast Terrain Rendering Using Geometrical MipMapping, 2000
+       Finch    M. Finch, L. Bishop, Sorted Height Field Rendering, Numerical Design, 1998
        Wagner   D. Wagner, Terrain Geomorphing in the Vertex Shader, in ShaderX2, 2003
        FFDH     E. G. Coffman, M. R. Garey, D. S. Johnson, R. E. Tarjan, Performance Bounds for
                 Level-Oriented Two-Dimensional Packing Algorithms, SIAM J. Comput. 9, 1980
@@ -278,6 +284,9 @@ typedef struct terrimp_heightfield {
     float origin_z;         /* [wu] z of row 0 */
     float no_data;          /* the sample value that means no data, when has_no_data */
     int has_no_data;        /* nonzero: samples equal to no_data are voids; F32 NaN is one too */
+    int wrap;               /* nonzero: the field repeats without end, its last column and row being
+                               the first ones of the next. Heights, normals, rays and Sorted know
+                               of it; a terrain is one repetition */
 } terrimp_heightfield;
 
 /* Every function below takes the descriptor as it was filled in, or as resolve wrote it. The
@@ -358,7 +367,8 @@ typedef struct terrimp_ray_hit {
 
    origin        [3] [wu] start of the ray, anywhere
    direction     [3] any length but zero
-   max_distance  [wu] end of the ray [Limits: > 0; FLT_MAX for no end]
+   max_distance  [wu] end of the ray [Limits: > 0; FLT_MAX for no end. In a field that wraps, where
+                 a level ray would go on for ever, up to 2^20 spacings]
    hit           receives the meeting; NULL: not wanted
    Errors        E_MISS when the ray meets nothing
    Cost          O(number of quads below the ray), at most width + depth
@@ -785,107 +795,22 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 
 /* ==== Atlas ============================================================== >>atlas */
 
-/* One rectangle to be packed. */
-typedef struct terrimp_pack_item {
-    terrimp_rect rect; /* width, height: in, > 0, reduced when SCALED; x, y: out */
-    uint32_t flags;    /* out: TERRIMP_PACK_... */
-} terrimp_pack_item;
+/* First-fit decreasing height: rectangles stand side by side on shelves, from the tallest on, each
+   on the lowest shelf with room for it. If they do not all fit, all are reduced alike, in steps of
+   6 %, until they do. For texels between two of them, ask for larger ones.
 
-enum {
-    TERRIMP_PACK_PLACED = 1 << 0, /* x and y are set */
-    TERRIMP_PACK_SCALED = 1 << 1  /* was larger than the atlas: both sides were reduced alike */
-};
-
-/* A row of rectangles side by side. */
-typedef struct terrimp_shelf {
-    uint32_t y, height; /* fixed by the first rectangle on the shelf */
-    uint32_t used;      /* from x = 0 */
-} terrimp_shelf;
-
-/* An atlas that is filled shelf by shelf and emptied as a whole. */
-typedef struct terrimp_shelves {
-    uint32_t width, height; /* of the atlas [texels] */
-    uint32_t padding;       /* texels kept free between two rectangles */
-    terrimp_shelf *items;   /* the caller's array; one entry a rectangle always suffices */
-    uint32_t capacity;
-    uint32_t count;
-    uint32_t top;           /* first row above the shelves */
-} terrimp_shelves;
-
-/* Empties an atlas. The array stays the caller's and outlives the shelves.
-   Errors: E_RANGE when a side or the capacity is 0 or a side exceeds 65536. */
-TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
-                                                uint32_t height, uint32_t padding,
-                                                terrimp_shelf *items, uint32_t capacity);
-
-/* First fit: puts a rectangle on the lowest shelf with room for it, or on a new shelf.
-
-   rect       in: width and height [Limits: > 0]; out: x and y
-   Errors     E_CAPACITY when it fits nowhere: nothing is changed
-   Cost       O(shelves) */
-TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect);
-
-/* First-fit decreasing height: packs rectangles into an empty or partly filled atlas.
-
-   items      [count] in and out; the order is kept
-   order      [count] out: the order of insertion, from the tallest
-   placed     out, how many were placed; may be NULL
-   Errors     E_RANGE for an empty rectangle (nothing is changed); E_CAPACITY when not all fit:
-              those that did are flagged PLACED
-   Cost       O(n^1.5 + n * shelves), no allocation
+   width, height  of the atlas [texels] [Limits: 1..65536]
+   rects      [count] in: sizes, as large as they may be; one of width or height 0 is passed over;
+              out: the sizes that fitted, and the places
+   order      [2 * count] out: the first half is the order of insertion; the rest is scratch
+   scale      out: what the sizes were multiplied by, 1 when they fitted; may be NULL
+   Errors     E_RANGE; E_CAPACITY when not even one texel each fits: only places and order may
+              have changed
+   Cost       O(n^1.5 + n * shelves) for each step, no allocation
    Source     Coffman, Garey, Johnson, Tarjan 1980, as Hess 2010 uses it, section 4.3: the height
               used is at most 1.7 times the optimum plus one rectangle */
-TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_pack_item *items,
-                                             uint32_t count, uint32_t *order, uint32_t *placed);
-
-/* Where one impostor stands in the two atlases of a pair. */
-typedef struct terrimp_pair_slot {
-    terrimp_rect rect[2];      /* its rectangle in each atlas, where assigned */
-    unsigned char assigned[2];
-    unsigned char filled[2];   /* a picture is there */
-} terrimp_pair_slot;
-
-/* The double-buffered scheme: pictures move from the outdated atlas to the newest one as they are
-   renewed; when all have moved, the outdated atlas is emptied, packed anew and becomes the newest
-   one. */
-typedef struct terrimp_atlas_pair {
-    terrimp_shelves shelves[2];
-    uint32_t newest;  /* 0 or 1 */
-    uint32_t repacks; /* so far */
-} terrimp_atlas_pair;
-
-/* Two empty atlases (Hess 2010, section 4.3); items [2 * capacity] is the caller's.
-   Errors: those of terrimp_shelves_init. */
-TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t width,
-                                             uint32_t height, terrimp_shelf *items,
-                                             uint32_t capacity);
-
-/* Empties the outdated atlas, packs a set of sizes into it and makes it the newest. Every slot of
-   `slots` loses what it had in that atlas; what it has in the other one stays.
-   If the sizes do not fit, all are reduced alike until they do.
-
-   slots      [count] in and out
-   items      [count] in: sizes, in the order of slots, an empty one for a slot that needs none;
-              out: rectangles
-   order      [count] scratch
-   scale      out, factor by which all sides were reduced, 1 when they fitted; may be NULL
-   Errors     E_CAPACITY when even one texel each does not fit: slots are left unassigned */
-TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
-                                               terrimp_pack_item *items, uint32_t count,
-                                               uint32_t *order, float *scale);
-
-/* Gives a slot a rectangle of the wanted size in the newest atlas, on a shelf with room for it.
-   Errors: those of terrimp_shelves_insert. */
-TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp_pair_slot *slot,
-                                               uint32_t width, uint32_t height);
-
-/* Notes that the picture has been rendered into the slot of the newest atlas: it has moved.
-   Errors: E_STATE when the slot has no rectangle there. */
-TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
-                                             terrimp_pair_slot *slot);
-
-/* The atlas that holds the slot's latest picture, 0 or 1, or -1 when it has none. */
-TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terrimp_pair_slot *slot);
+TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, terrimp_rect *rects,
+                                             uint32_t count, uint32_t *order, float *scale);
 
 /* An atlas whose slots are allocated and freed one by one, in any order, while the others stay
    where they are. */
@@ -897,28 +822,20 @@ typedef struct terrimp_live_atlas_desc {
 
 typedef struct terrimp_live_atlas {
     terrimp_live_atlas_desc desc;
-    terrimp_rect *slots; /* [max_slots] width 0: unused, x is the next unused one */
+    terrimp_rect *slots; /* [max_slots] where each lies; width 0: unused, x is the next unused */
     terrimp_rect *holes; /* [max_holes] the maximal free rectangles, which overlap each other */
     uint32_t hole_count, max_holes;
     uint32_t unused;     /* the first unused slot, max_slots for none */
     uint32_t slot_end;   /* above every slot that was ever used */
-    uint32_t slot_count, texels_used, failures;
+    uint32_t slot_count, texels_used; /* without padding */
+    uint32_t failures;   /* allocations that found no room, since init */
 } terrimp_live_atlas;
-
-typedef struct terrimp_live_atlas_stats {
-    uint32_t slots;          /* in use */
-    uint32_t texels_used;    /* within these, without padding */
-    uint32_t texels_free;    /* all others */
-    uint32_t largest_width;  /* of the free rectangle of most texels; */
-    uint32_t largest_height; /* 0 when nothing is free */
-    uint32_t failures;       /* allocations that found no room, since init or reset */
-} terrimp_live_atlas_stats;
 
 /* The size of the block of memory that an atlas needs beside its struct; 0 when init would refuse
    the descriptor, or for NULL. */
 TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc);
 
-/* An empty atlas.
+/* An empty atlas; also empties one.
 
    memory     the caller's, aligned to 8 bytes, in use until the atlas is forgotten
    bytes      at least terrimp_live_atlas_bytes(desc)
@@ -926,9 +843,6 @@ TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    const terrimp_live_atlas_desc *desc,
                                                    void *memory, size_t bytes);
-
-/* Frees all slots and sets the failures to 0. */
-TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas);
 
 /* Finds room for a rectangle and keeps it.
 
@@ -944,10 +858,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
-/* Where a slot lies. Errors: those of terrimp_live_atlas_free. */
-TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
-                                                   terrimp_rect *rect);
-
 /* The largest rectangle of a shape that could be allocated now, for hosts that take a smaller slot
    rather than none.
 
@@ -957,26 +867,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atl
    Cost       O(free rectangles) */
 TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                                    uint32_t height, uint32_t size[2]);
-
-/* Frees what costs least so that a rectangle fits, for an atlas that is full or fragmented: of the
-   places where it would border on slots or on free rectangles, the one whose slots have the lowest
-   sum of costs. It does not allocate: alloc will then find room.
-
-   costs      [max_slots] of losing each slot that is in use; one whose cost is negative, infinite
-              or NaN stays. Texels times how likely they are to be made again is a good cost
-   victims    [max_slots] out: the handles that were freed, none when it fitted as it was; one when
-              only handles were wanting. Scratch: it changes on E_CAPACITY too
-   count      out: how many
-   Errors     E_RANGE for an empty rectangle; E_CAPACITY when it is larger than the atlas or every
-              such place holds a slot that stays: nothing changes
-   Cost       O(slots * free rectangles) at worst, of which at most 512 are looked at */
-TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, const float *costs,
-                                                    uint32_t *victims, uint32_t *count);
-
-/* What the atlas holds. Cost: O(free rectangles). */
-TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
-                                                    terrimp_live_atlas_stats *stats);
 
 /* ==== Terrain ============================================================ >>terrain */
 
@@ -1188,6 +1078,102 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
                                                 const void *block, size_t bytes, void *memory,
                                                 size_t memory_bytes, terrimp_terrain **terrain);
 
+/* ==== Visibility ========================================================= >>visibility */
+
+/* What lies behind a ridge need be neither drawn nor captured. A horizon says which nodes do, from
+   bounds of the heights within each node, the walls: bytes that are built with the terrain (room
+   Visible sets) and lie beside it. It says so only of nodes of which nothing can be seen.
+
+   How to use it: begin with the camera, then ask for nodes, closest first for speed; or cull the
+   draws of terrimp_geomip_select. */
+
+/* Bytes of the walls of a tree: 0.18 a sample with chunks of 64 quads, 0.2 with 32, 0.3 with 16.
+   0 when tree is NULL. */
+TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree);
+
+enum {
+    TERRIMP_HORIZON_BINS = 64,   /* directions in each of four quarters of the circle */
+    TERRIMP_HORIZON_STEPS = 288, /* distances at which walls are looked at */
+    TERRIMP_HORIZON_KEPT = 4     /* heights of the horizon that a bin remembers */
+};
+
+/* Private: a column or row of samples that sight lines cross. */
+typedef struct terrimp_horizon_step {
+    float distance, inverse; /* [quads] from the eye, along the axis */
+    uint32_t line;           /* its column or row */
+    uint16_t node;           /* the same among the nodes of the walls' level */
+    uint8_t row;             /* among the walls of the node */
+    uint8_t level;           /* 0: the samples themselves; else 1 + the level of the walls */
+} terrimp_horizon_step;
+
+/* Private: the horizon in one direction, as far as it was needed. */
+typedef struct terrimp_horizon_bin {
+    float distance[TERRIMP_HORIZON_KEPT]; /* where it rises, the latest at `top` */
+    float slope[TERRIMP_HORIZON_KEPT];    /* to what */
+    uint16_t reached, top;                /* steps that were looked at */
+} terrimp_horizon_bin;
+
+/* The horizon of one eye, about 28 KiB. Begin fills it in; it holds for the life of the tree. */
+typedef struct terrimp_horizon {
+    const terrimp_quadtree *tree;
+    const unsigned char *walls;
+    uint32_t quads, cells, stride; /* private, all: how the walls are kept */
+    int blind;         /* nothing can be said to be hidden */
+    float eye;         /* [wu] its height */
+    uint32_t quad[2];  /* that it is over */
+    float within[2];   /* its place in that, 0..1 */
+    float error, low;  /* by which walls may lie below what is kept: per distance, [wu] */
+    float spread;      /* [wu] longest horizontal distance of a point at distance 1 on an axis */
+    float rounding;    /* [quads] of places */
+    float clipped[2];  /* [quads] to where z_near may clip ground */
+    float steepest;    /* slope of sight lines under which ground is clipped away */
+    float inverse[TERRIMP_HORIZON_BINS + 1];
+    uint32_t step_count[4];
+    terrimp_horizon_step steps[4][TERRIMP_HORIZON_STEPS]; /* towards +x, -x, +z, -z */
+    terrimp_horizon_bin bins[4][TERRIMP_HORIZON_BINS];
+} terrimp_horizon;
+
+/* Begins the horizon of a camera. Ground that z_near clips hides nothing. An eye below the ground
+   or beside the terrain has no horizon: nothing is hidden from it, and that is no error.
+
+   tree     built
+   walls    [terrimp_walls_bytes] built, aligned to 4
+   error    how far below its samples the ground in front may be drawn, over the distance to it:
+            0 for full resolution; a picture that is up to n pixels off its place: n / K
+            [Limits: 0..0.5]
+   low      [wu] the same whatever the distance [Limits: >= 0]
+   Errors   E_NULL; E_ALIGN; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
+   Cost     about 3 us */
+TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
+                                                 const terrimp_quadtree *tree, const void *walls,
+                                                 const terrimp_camera *camera, float error,
+                                                 float low);
+
+/* Whether all of a node lies below the horizon, as far as it lies between the left and the right
+   side of the camera's view. Sure when it says so; what it does not find is up to a tenth of what
+   is hidden in mountains, most of it in hills seen from above.
+
+   horizon    begun; it goes on to be filled in
+   node       [Limits: < node_count]
+   raised     [wu] how far above its samples the node is drawn
+   returns    nonzero: hidden; 0 also for bad arguments
+   Cost       0.5 to 2 us, the first ones more
+   Source     Lloyd and Egbert 2002, Horizon occlusion culling for real-time rendering of
+              hierarchical terrain: the idea; bounds, walls and their proof are our own */
+TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, float raised);
+
+/* Takes the draws out of a selection that lie below the horizon; what is left keeps its order.
+   Begins the horizon by itself, with the error of these draws.
+
+   view       from terrimp_geomip_select with the same camera: draws, draw_count and triangle_count
+              are changed
+   Errors     those of begin: the draws are unchanged
+   Cost       25 to 60 us in mountains */
+TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls,
+                                                const terrimp_camera *camera,
+                                                terrimp_geomip_view *view);
+
 /* ==== View =============================================================== >>view */
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
@@ -1345,7 +1331,7 @@ typedef struct terrimp_stats {
     uint32_t captures_due;       /* pictures that the tolerances wanted renewed */
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
-    uint32_t texels_used, texels_free; /* of all atlases */
+    uint64_t texels_used, texels_free; /* of all atlases */
     uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
@@ -1414,6 +1400,198 @@ TERRIMP_API terrimp_result terrimp_view_create(const terrimp_terrain *terrain,
 TERRIMP_API void terrimp_view_destroy(terrimp_view *view);
 
 #endif /* TERRIMP_NO_MALLOC */
+
+/* ==== Sorted ============================================================= >>sorted */
+
+/* Terrain for machines without a depth buffer: squares of two or more triangles, given out one
+   after the other in exact painter's order, or the other way round, with a level of detail that
+   changes without a pop. Endless if the field wraps. It needs no tree, no building and no memory
+   but one struct. After Finch and Bishop, with three differences that make it exact: the order;
+   levels that are a function of the place alone, so that both sides of an edge know each other's
+   without looking at what was drawn; and blending that is over before a finer level begins.
+
+   Pages are the extent of a texture, page_quads quads along a side. A page is cut into squares of
+   2^level quads, aligned to their size, the smaller the closer to the eye; where a square borders
+   on smaller ones, its triangles meet at the middle of that side.
+
+   How to use it: init once; each frame begin with the camera, then next until it returns 0. */
+
+/* Heights of vertices. With TERRIMP_FIXED, for machines without floats, next does not use any:
+   heights are 256ths of a step of a sample, before height_scale and height_offset. */
+#ifdef TERRIMP_FIXED
+typedef int32_t terrimp_sorted_height;
+typedef int32_t terrimp_sorted_int; /* private: squares of distances */
+#else
+typedef float terrimp_sorted_height; /* [wu] */
+typedef int64_t terrimp_sorted_int;
+#endif
+
+enum {
+    TERRIMP_SORTED_LEVELS = 11,  /* of pages of 1024 quads */
+    TERRIMP_SORTED_SIDES = 16,   /* of a footprint, at most */
+    TERRIMP_SORTED_ABSENT = 255  /* the level of a page of which nothing is here */
+};
+
+/* A page, for the callback that knows where its samples are. */
+typedef struct terrimp_sorted_page {
+    int32_t x, z;           /* which: column and row of pages, from the origin on, any sign */
+    int only_level;         /* nonzero: only level is asked for, of a page beside one to be drawn */
+    uint32_t level;         /* in: 0. out: the finest level that is here, which may be as coarse as
+                               the page: then it is drawn from its corners. ABSENT: not drawn */
+    const void *samples;    /* out: every 2^level-th sample of every 2^level-th row, as in field;
+                               the first and the last are those of the neighbours */
+    size_t row_bytes;       /* out */
+    uint32_t texture_level; /* in: wanted. out: to be drawn with */
+} terrimp_sorted_page;
+
+typedef struct terrimp_sorted_desc {
+    terrimp_heightfield field; /* (required) it wraps if its wrap is set, which wants whole pages:
+                                  width - 1 and depth - 1 are multiples of page_quads. With a page
+                                  callback width, depth, wrap and samples have no meaning, and
+                                  there is no end in any direction */
+    uint32_t page_quads;       /* along a page's side [Limits: a power of two, 2..1024]
+                                  [Default 0 -> 64] */
+    float low, high;           /* [wu] no height lies outside [Default 0, 0 -> those of the field:
+                                  init reads it once. Required with a page callback] */
+    float scale;               /* [quads] a square of level l is closer than scale * 2^(l + 1), so
+                                  that all look about equally large [Limits: >= 2]
+                                  [Default 0 -> 12] */
+    const float *table;        /* [page levels] instead of 2^l: level l, from 1 on, begins at
+                                  scale * table[l] quads. scale has to be so large that it rises
+                                  by 2 * 2^l from level l to the next. NULL: 2^l */
+    uint32_t max_triangles;    /* not 0: each frame's scale is the one that leads to 97 to 100 % of
+                                  so many, as far as there is one */
+    int front_to_back;         /* nonzero: the other way round */
+    float low_far;             /* [wu] z_far of an eye on the ground, for a horizon that comes in
+                                  as the eye sinks [Limits: >= 0] [Default 0 -> z_far] */
+    float low_height;          /* [wu] above the ground, from which on z_far is the camera's
+                                  [Limits: > 0] [Default 0 -> high - low] */
+    uint32_t page_texels;      /* along a side of a page's finest texture [Default 0 -> 256] */
+    uint32_t texture_level_count; /* [Limits: 1..16] [Default 0 -> 1] */
+    float texels_per_px;       /* [Limits: > 0] [Default 0 -> 1] */
+    uint8_t *texture_levels;   /* [texture_window^2] the caller's, 255 at first: remembered so that
+                                  a page at a level's border does not flicker. NULL: it may */
+    uint32_t texture_window;   /* pages remembered along each axis, a power of two: as many as
+                                  z_far spans, or distant ones forget [Default 0 -> 32] */
+    void *user;                /* first argument of page */
+    void (*page)(void *user, terrimp_sorted_page *page); /* where a page's samples are. Called by
+                                  next for each page and its neighbours. NULL: in field */
+} terrimp_sorted_desc;
+
+typedef struct terrimp_sorted_vertex {
+    int32_t x, z; /* column and row of samples, from the origin on, any sign */
+    terrimp_sorted_height height;
+} terrimp_sorted_vertex;
+
+/* What next gives out. */
+typedef struct terrimp_sorted_square {
+    int32_t page_x, page_z; /* column and row of its page, from the origin on, any sign */
+    uint8_t level;          /* 2^level quads along a side */
+    uint8_t texture_level;  /* of the page */
+    uint8_t vertex_count, triangle_count; /* up to 8 and 6 */
+    uint8_t indices[18];    /* of triangles, in order */
+    terrimp_sorted_vertex vertices[8]; /* its corners (0, 0), (1, 0), (0, 1), (1, 1); middles */
+} terrimp_sorted_square;
+
+/* The state of a terrain and of its frame. The caller's, 2 KiB; all but two are private. */
+typedef struct terrimp_sorted {
+    terrimp_sorted_desc desc; /* resolved */
+    float scale;              /* of this frame */
+    uint32_t triangle_count;  /* given out so far in this frame */
+
+    uint32_t top;                /* level of a page */
+    uint32_t pages[2];           /* of the field, along x and z */
+    float least_scale;
+    int row_axis;                /* along which rows lie: 0 x, 1 z */
+    int32_t eye_page[2];         /* what follows counts from this page's first sample on */
+    terrimp_sorted_int eye[2], unit[2], rise; /* units; units a sample; squared */
+    terrimp_sorted_int limit;    /* units that can be squared */
+    terrimp_sorted_int split[TERRIMP_SORTED_LEVELS + 1]; /* squared, as are these: a closer square
+                                    of this level is split */
+    terrimp_sorted_int whole[TERRIMP_SORTED_LEVELS]; /* up to here a vertex has its own height */
+    float fade[TERRIMP_SORTED_LEVELS]; /* 1 / (split of the next level - whole) */
+    terrimp_sorted_int texel_steps[3]; /* where the level after 0 begins; with less, with more */
+    uint32_t side_count;         /* of the footprint: sides[0] x + sides[1] z + sides[2] >= 0 */
+    terrimp_sorted_int sides[TERRIMP_SORTED_SIDES][3];
+    int32_t bounds[2][2];        /* of the footprint: first and last page along each axis */
+    int32_t rows, row, cols, col, first_col, page_row; /* pages that there are, and are done */
+    int32_t corner[2];           /* first sample of the page */
+    terrimp_sorted_page page;
+    int partial;                 /* not all of it is in the field, or here, or beside it */
+    uint8_t side_levels[4];      /* from which on heights along its sides are here */
+    int32_t last[2];             /* column and row of the page's last sample in the field */
+    int depth;                   /* of the stack; -1: empty */
+    struct {
+        int32_t at[2];
+        uint16_t sides;          /* of the footprint that cross it */
+        uint16_t child;
+    } stack[TERRIMP_SORTED_LEVELS + 1];
+    int32_t at[2];               /* the present square */
+    uint32_t level;
+} terrimp_sorted;
+
+/* Writes the effective descriptor; low and high stay. out may be in.
+   Errors: E_RANGE also for a table that does not rise enough, and for F32 with TERRIMP_FIXED. */
+TERRIMP_API terrimp_result terrimp_sorted_desc_resolve(const terrimp_sorted_desc *in,
+                                                       terrimp_sorted_desc *out);
+
+/* Makes the state ready for frames.
+
+   Errors     where the field is read for low and high, E_VOID, E_NOT_FINITE for such a sample
+   Cost       O(width * depth) if low and high are 0, else O(1) */
+TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
+                                               terrimp_sorted *sorted);
+
+/* Begins a frame: finds the footprint of the camera and, with max_triangles, the scale.
+
+   Errors     E_RANGE also when the eye is more than 2^23 samples from the origin, or when z_far
+              reaches over more than 1024 pages, with TERRIMP_FIXED also 2048 quads less three
+              pages. After any error next returns 0
+   Cost       about 2 us; with max_triangles one to two thirds of what next takes for the whole
+              frame, more for the first
+   Source     Finch and Bishop 1998, sections 4.3 and 4.10 */
+TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
+                                                const terrimp_camera *camera);
+
+/* Gives out the next squares. What stands on a square and does not reach over its sides may be
+   drawn right after it (front to back: right before it), and is hidden as it should be.
+
+   squares    [capacity] out
+   Returns    how many; less than capacity, or 0, at the end of the frame
+   Cost       less than 100 cycles a triangle, whatever came before
+   Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
+TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
+                                         uint32_t capacity);
+
+/* The max_triangles of the next frame from what this one took, for a host that measures: at most a
+   twentieth less or a fiftieth more, nothing within 3 % of the target. Where time rises with
+   triangles, and no faster than they do, it comes to rest without swinging; a pause of the machine
+   costs one step. No clock inside.
+
+   triangles   of this frame
+   ms          that the frame took; target_ms  that it should take */
+TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms);
+
+/* Makes the next coarser level of a map or of a page of it: every second texel, mixed with those
+   around it, 1 2 1 along each axis. Texels on the border are mixed along the border alone and so
+   need no neighbouring page: pages whose borders are the same texels keep that. Filter the whole
+   map and cut it then, which is better still, or filter its pages one by one; not a page together
+   with a border of its own invention.
+
+   texels      [height][width][channels]
+   width, height  [Limits: odd, 3..65537]
+   channels    [Limits: 1..4]
+   wrap        nonzero: the map repeats, its last column and row being the first ones
+   out         [height / 2 + 1][width / 2 + 1][channels]; must not overlap texels
+   Cost        O(width * height)
+   Source      Finch and Bishop 1998, section 4.8, asks for equal edges */
+TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
+                                                uint32_t height, uint32_t channels, int wrap,
+                                                uint8_t *out);
+
+/* The world position of a vertex [wu]. No pointer may be null. */
+TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
+                                         const terrimp_sorted_vertex *vertex, float position[3]);
 
 /* ==== stop here if you only draw what has been built ====================== */
 
@@ -1749,6 +1927,27 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes);
 
+/* ==== Visible sets ======================================================= >>visible-sets */
+
+/* --- walls: what a horizon is made of --- */
+
+/* Finds the walls of one node, from the samples at level 0, else from its children's: those have to
+   be built before. Different nodes of a level may be built at the same time by several threads.
+
+   walls      [terrimp_walls_bytes] out: the part of this node; aligned to 4
+   Errors     E_NULL; E_ALIGN; E_RANGE
+   Cost       about 20 us at level 0 with chunks of 64 quads, 3 us above */
+TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree, uint32_t node,
+                                                    void *walls);
+
+/* Finds those of all nodes that a rectangle of samples belongs to, after an edit or at first.
+
+   samples    NULL: all
+   Errors     E_NULL; E_ALIGN; E_RANGE for a rectangle that is empty or outside
+   Cost       that of build_node for each: 0.05 ms for a chunk and all nodes above it */
+TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
+                                               const terrimp_rect *samples, void *walls);
+
 /* ==== Layer builder ====================================================== >>layer-builder */
 
 /* From where layers are to be seen, and what they show. The cell is a box, or a shaft that opens
@@ -1856,18 +2055,142 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
 
-   shelves     in: where; empty or partly filled; out: its top is the height that was needed
+   atlas       [2] [texels] its width and height [Limits: 1..65536]
    quads       [count] in: texels; out: x and y
    gutter      [texels] [Limits: 0..64]
-   items       [count] scratch; out: PLACED in the flags of those that were
-   order       [count] scratch
+   rects       [count] out: the places, gutters included
+   order       [2 * count] scratch
    Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
-               fit: quads are unchanged, and the shelves hold what did
+               fit: quads are unchanged
    Cost        that of terrimp_pack_ffdh
    Source      Jeschke 2004, section 3.6, without his powers of two */
-TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
-                                              terrimp_pack_item *items, uint32_t *order);
+                                              terrimp_rect *rects, uint32_t *order);
+
+/* --- recording without gaps (Jeschke 3.3.2) --- */
+
+/* Cuts what lies between two depths out of a triangle, for hosts that draw layers by hardware: they
+   then draw it with its outline, each line in one direction, for instance from left to right. Cuts
+   of an edge depend on its two ends alone, not on their order: so the two layers that meet in a cut
+   get the same bits, and so do two triangles that share an edge.
+
+   vertices   [3][stride] any numbers that change linearly over the triangle
+   stride     [Limits: >= 1]
+   depths     [3] of the vertices [wu], finite
+   low, high  [wu] borders of the layer [Limits: low <= high]
+   out        [5][stride] the polygon, with the triangle's winding; not vertices
+   count      out: of its vertices; 0 when nothing is between
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE */
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count);
+
+/* Masks of all layers that are recorded together: [layers->count][height][words of width]. */
+typedef struct terrimp_layer_record {
+    const terrimp_layers *layers;    /* (required) */
+    const terrimp_capture *picture;  /* (required) as in terrimp_layer_corners */
+    uint32_t width, height;          /* (required) of the picture [texels] [Limits: 1..16384] */
+    uint32_t *masks;                 /* (required) begins as 0 */
+    int no_outline;                  /* nonzero: only texels whose centre is covered, for leaves and
+                                        the like: they are not fattened, and their gaps hide */
+} terrimp_layer_record;
+
+/* Sets in each layer the texels that a triangle touches between the layer's borders. What touches a
+   border is in both layers; what lies outside of the picture or of all layers is left out.
+
+   xyz        [3][3] [wu]
+   Errors     E_NULL; E_RANGE; E_NOT_FINITE for a vertex
+   Cost       O(rows that are touched, in all layers) */
+TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
+                                                  const float xyz[9]);
+
+/* The same for a picture with depth, such as one of a heightfield: each texel is in all layers that
+   its depths touch, from the least to the greatest at its corners. Neighbours share two corners: so
+   there is no gap between layers, and nothing is to be clipped.
+
+   depths     [height + 1][width + 1] of the corners of texels, row 0 the lowest [wu]; <= 0, NaN or
+              infinite where there is nothing. Texels without any depth stay empty
+   Errors     E_NULL; E_RANGE
+   Cost       O(width * height * log(count)) */
+TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
+                                                const float *depths);
+
+/* Closes what hardware leaves open between two layers: its lines go over corners. Where a block of
+   2 x 2 texels has one diagonal in both layers, and of the other one each texel in one layer only,
+   the one of the closer layer is wanted in the other as well.
+
+   front, back   [height][TERRIMP_MASK_WORDS(width)] layer k and layer k + 1
+   wanted        [height][TERRIMP_MASK_WORDS(width)] out: texels whose colours are to be copied from
+                 front to back; neither of the two
+   Errors        E_NULL; E_RANGE for an empty layer
+   Cost          O(width * height / 32) */
+TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
+                                                uint32_t width, uint32_t height,
+                                                uint32_t *wanted);
+
+/* ==== Placement ========================================================== >>placement */
+
+/* Which pictures to prepare, so that no view costs more than a budget and the pictures take little
+   memory. Views stand for all eyes of a cell that look into a range of directions: what a view
+   costs is what the frustum holds that encloses all of theirs. Clusters are what a picture can show
+   in place of geometry: the nodes of a hierarchy. Candidates are pictures that might be made: of a
+   cluster, for some cells. */
+
+/* What a candidate does for a view. */
+typedef struct terrimp_place_gain {
+    uint32_t view;
+    float saved;  /* cost of the cluster as geometry, less that of its picture [Limits: finite] */
+} terrimp_place_gain;
+
+typedef struct terrimp_place_candidate {
+    uint32_t cluster;
+    uint32_t first_gain, gain_count; /* its gains, which are no other's; one a view at most */
+    float memory;                    /* of the picture, in any unit [Limits: > 0] */
+} terrimp_place_candidate;
+
+typedef struct terrimp_place_desc {
+    const terrimp_place_candidate *candidates; /* (required) [candidate_count] */
+    const terrimp_place_gain *gains;           /* (required) [gain_count] */
+    const uint32_t *parents;                   /* (required) [cluster_count] the cluster that holds
+                                                  it, with a greater number; its own for a root */
+    const float *costs;                        /* (required) [view_count] without pictures
+                                                  [Limits: finite] */
+    uint32_t candidate_count, gain_count, cluster_count, view_count;
+    float budget;                              /* (required) of each view [Limits: finite] */
+} terrimp_place_desc;
+
+typedef struct terrimp_placement {
+    uint32_t chosen;   /* candidates */
+    uint32_t problems; /* views that cost more than the budget without pictures */
+    uint32_t unsolved; /* those that still do: make their cells smaller, or give more candidates */
+    float memory;      /* of the chosen ones */
+} terrimp_placement;
+
+/* Bytes of scratch memory that terrimp_place needs; 0 for NULL or when they overflow. */
+TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
+
+/* Chooses candidates: again and again the one that takes most off what views cost above the budget,
+   for its memory; a picture of a cluster takes the place of pictures of what is in it. Then those
+   are given back that others can stand in for. Small sets are gone through again and again, each
+   time without one of the chosen candidates or with another one to begin with, while that pays.
+   Costs count as within the budget to 1e-5 of it.
+
+   scratch    aligned to 8 bytes
+   shown      [gain_count] out: 1 where the candidate's picture is shown in that view, else 0. A
+              candidate is to be made if it is shown in any
+   costs      [view_count] out: what views cost then
+   placement  out
+   Errors     E_NULL; E_ALIGN; E_MEMORY; E_NOT_FINITE; E_RANGE for a number that points nowhere, a
+              parent that is not greater, memory that is not > 0, or a gain of two candidates.
+              Then shown, costs and placement are untouched
+   Cost       about O(gains + chosen * log(candidates)): scores only ever fall, so that only the
+              best one is scored anew until it stays the best. 2 s for 300,000 candidates with 2.2
+              million gains, 60 bytes of scratch memory for each of these
+   Source     Jeschke 2004, section 5.7; all after the choice is ours */
+TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
+                                         size_t bytes, uint8_t *shown, float *costs,
+                                         terrimp_placement *placement);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -2585,6 +2908,28 @@ static int terrimpi_quad_normal(const terrimpi_quad *quad, int side, float norma
     return 1;
 }
 
+/* [wu] after which a field that wraps repeats itself. */
+static float terrimpi_period(const terrimp_heightfield *f, int axis)
+{
+    return axis == 0 ? f->spacing_x * (float)(f->width - 1u)
+                     : f->spacing_z * (float)(f->depth - 1u);
+}
+
+/* Takes a coordinate to the repetition that the samples lie in; what it is moved by, in periods. */
+static float terrimpi_wrap(const terrimp_heightfield *f, int axis, float *at)
+{
+    float origin = axis == 0 ? f->origin_x : f->origin_z;
+    float spacing = axis == 0 ? f->spacing_x : f->spacing_z;
+    uint32_t last = (axis == 0 ? f->width : f->depth) - 1u;
+    float period = terrimpi_period(f, axis), away = (*at - origin) / period, whole;
+    if (!f->wrap || !(terrimpi_abs(away) < 8388608.0f))
+        return 0.0f;
+    whole = (float)(int32_t)away;
+    whole -= whole > away ? 1.0f : 0.0f;
+    *at = terrimpi_clamp(*at - whole * period, origin, terrimpi_line(origin, spacing, last));
+    return whole;
+}
+
 /* What height and normal share: the quad at a world position and the place in it. */
 static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x, float z,
                                        terrimpi_quad *quad, float *u, float *v)
@@ -2593,6 +2938,8 @@ static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x
     uint32_t i, j;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
+    (void)terrimpi_wrap(&f, 0, &x);
+    (void)terrimpi_wrap(&f, 1, &z);
     TERRIMPI_REFUSE(!terrimpi_locate(&f, x, z, &i, &j), TERRIMP_E_MISS);
     TERRIMPI_TRY(terrimpi_quad_load(&f, i, j, quad));
     *u = terrimpi_fraction(x, quad->x0, quad->x1);
@@ -2643,6 +2990,7 @@ typedef struct terrimpi_ray {
     float way[3];   /* unit length */
     float before;   /* [wu] from the caller's origin to start */
     float length;   /* [wu] from start to the end */
+    float periods[2]; /* of a field that wraps, from start to where the caller's origin is */
 } terrimpi_ray;
 
 /* Narrows [*t0, *t1] to where start + t * way is within [low, high]; 0 when nothing is left. */
@@ -2678,6 +3026,13 @@ static int terrimpi_ray_enter(const terrimp_heightfield *field, const float orig
     float last_x = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
     float last_z = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
     float t0 = 0.0f, t1 = max_distance;
+    memcpy(ray->start, origin, sizeof ray->start);
+    ray->periods[0] = terrimpi_wrap(field, 0, &ray->start[0]);
+    ray->periods[1] = terrimpi_wrap(field, 1, &ray->start[2]);
+    ray->before = 0.0f;
+    ray->length = max_distance;
+    if (field->wrap)
+        return 1;
     if (!terrimpi_ray_clip(origin[0], ray->way[0], field->origin_x, last_x, &t0, &t1) ||
         !terrimpi_ray_clip(origin[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
         return 0;
@@ -2760,23 +3115,36 @@ static float terrimpi_ray_leave(float start, float way, float low, float high)
     return ((way > 0.0f ? high : low) - start) / way;
 }
 
-static void terrimpi_ray_report(const terrimpi_ray *ray, const terrimpi_quad *quad, int side,
-                                float t, terrimp_ray_hit *hit)
+static void terrimpi_ray_report(const terrimp_heightfield *field, const terrimpi_ray *ray,
+                                const terrimpi_quad *quad, int side, float t,
+                                terrimp_ray_hit *hit)
 {
     terrimpi_ray_point point = terrimpi_ray_at(ray, quad, t);
     hit->distance = ray->before + t;
-    hit->position[0] = terrimpi_clamp(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
+    hit->position[0] = terrimpi_clamp(ray->start[0] + t * ray->way[0], quad->x0, quad->x1) +
+                       ray->periods[0] * terrimpi_period(field, 0);
     hit->position[1] = terrimpi_quad_height(quad, side, point.u, point.v);
-    hit->position[2] = terrimpi_clamp(ray->start[2] + t * ray->way[2], quad->z0, quad->z1);
+    hit->position[2] = terrimpi_clamp(ray->start[2] + t * ray->way[2], quad->z0, quad->z1) +
+                       ray->periods[1] * terrimpi_period(field, 1);
     if (!terrimpi_quad_normal(quad, side, hit->normal)) { /* steeper than float can say */
         hit->normal[0] = hit->normal[2] = 0.0f;
         hit->normal[1] = 1.0f;
     }
 }
 
+/* Takes the ray into the next repetition of the field, to its first or last quad. */
+static void terrimpi_ray_repeat(const terrimp_heightfield *field, terrimpi_ray *ray, int axis,
+                                uint32_t *index)
+{
+    float step = ray->way[2 * axis] > 0.0f ? 1.0f : -1.0f;
+    ray->start[2 * axis] -= step * terrimpi_period(field, axis);
+    ray->periods[axis] += step;
+    *index = step > 0.0f ? 0u : (axis == 0 ? field->width : field->depth) - 2u;
+}
+
 /* Walks from quad to quad until one is hit. Each turn takes a step along x or z and never back, so
-   there are at most width + depth turns. */
-static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const terrimpi_ray *ray,
+   there are at most width + depth turns, in a field that wraps as many as the ray crosses quads. */
+static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, terrimpi_ray *ray,
                                         uint32_t x, uint32_t z, terrimp_ray_hit *hit)
 {
     terrimpi_quad quad;
@@ -2792,19 +3160,23 @@ static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, const 
         terrimpi_ray_point leave =
             terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, enter.t, ray->length));
         float *across = along_x ? &leave.u : &leave.v;
+        int at_end = *index == (way > 0.0f ? last : 0u);
 
         if (!ends) /* the border is crossed at exactly 0 or 1, whatever the rounding */
             *across = way > 0.0f ? 1.0f : 0.0f;
         if (loaded == TERRIMP_OK && terrimpi_ray_quad(ray, &quad, &enter, &leave, &side, &t)) {
             if (hit != NULL) {
-                terrimpi_ray_report(ray, &quad, side, t, hit);
+                terrimpi_ray_report(field, ray, &quad, side, t, hit);
                 hit->x = x;
                 hit->z = z;
             }
             return TERRIMP_OK;
         }
-        TERRIMPI_REFUSE(ends || *index == (way > 0.0f ? last : 0u), TERRIMP_E_MISS);
-        *index = way > 0.0f ? *index + 1u : *index - 1u;
+        TERRIMPI_REFUSE(ends || (at_end && !field->wrap), TERRIMP_E_MISS);
+        if (at_end)
+            terrimpi_ray_repeat(field, ray, !along_x, index);
+        else
+            *index = way > 0.0f ? *index + 1u : *index - 1u;
         *across = 1.0f - *across;
         enter = leave;
         loaded = terrimpi_quad_load(field, x, z, &quad);
@@ -2823,8 +3195,9 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
     TERRIMPI_REFUSE(origin == NULL || direction == NULL, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
                     !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(max_distance > 0.0f) ||
-                    !terrimpi_ray_aim(direction, ray.way), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_ray_aim(direction, ray.way) ||
+                    (f.wrap && max_distance > 1048576.0f * terrimpi_max(f.spacing_x, f.spacing_z)),
+                    TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
                     !terrimpi_locate(&f, ray.start[0], ray.start[2], &x, &z), TERRIMP_E_MISS);
     return terrimpi_ray_walk(&f, &ray, x, z, hit);
@@ -4565,56 +4938,11 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
 /* ==== Atlas ============================================================== >>impl-atlas */
 /* Based on: Hess 2010, section 4.3. */
 
-TERRIMP_API terrimp_result terrimp_shelves_init(terrimp_shelves *shelves, uint32_t width,
-                                                uint32_t height, uint32_t padding,
-                                                terrimp_shelf *items, uint32_t capacity)
+/* Whether rectangle a comes after b: lower, or as high and narrower, or later. */
+static int terrimpi_pack_after(const void *rects, uint32_t a, uint32_t b)
 {
-    TERRIMPI_REFUSE(!shelves || !items, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) || padding > 65536u ||
-                    !terrimpi_within_u32(height, 1u, 65536u) || capacity < 1u, TERRIMP_E_RANGE);
-    shelves->width = width;
-    shelves->height = height;
-    shelves->padding = padding;
-    shelves->items = items;
-    shelves->capacity = capacity;
-    shelves->count = shelves->top = 0;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_shelves_insert(terrimp_shelves *shelves, terrimp_rect *rect)
-{
-    terrimp_shelf *shelf;
-    uint32_t i;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || !rect, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(rect->width < 1u || rect->height < 1u, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(rect->width > shelves->width ||
-                    rect->height > shelves->height, TERRIMP_E_CAPACITY);
-    for (i = 0; i < shelves->count; i++) {
-        shelf = &shelves->items[i];
-        if (rect->height <= shelf->height && shelf->used <= shelves->width - rect->width)
-            break;
-    }
-    if (i == shelves->count) {
-        if (i == shelves->capacity || shelves->top > shelves->height - rect->height)
-            return TERRIMP_E_CAPACITY;
-        shelf = &shelves->items[shelves->count++];
-        shelf->y = shelves->top;
-        shelf->height = rect->height;
-        shelf->used = 0;
-        shelves->top += rect->height + shelves->padding;
-    }
-    shelf = &shelves->items[i];
-    rect->x = shelf->used;
-    rect->y = shelf->y;
-    shelf->used += rect->width + shelves->padding;
-    return TERRIMP_OK;
-}
-
-/* Whether item a comes after item b: lower, or as high and narrower, or later. */
-static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
-{
-    const terrimp_pack_item *item = (const terrimp_pack_item *)items;
-    const terrimp_rect *p = &item[a].rect, *q = &item[b].rect;
+    const terrimp_rect *p = (const terrimp_rect *)rects + a;
+    const terrimp_rect *q = (const terrimp_rect *)rects + b;
     if (p->height != q->height)
         return p->height < q->height;
     if (p->width != q->width)
@@ -4622,157 +4950,69 @@ static int terrimpi_pack_after(const void *items, uint32_t a, uint32_t b)
     return a > b;
 }
 
-static void terrimpi_pack_sort(const terrimp_pack_item *items, uint32_t *order, uint32_t count)
+/* A side at a scale <= 1; whole at 1, since a float could round a huge one out of its type. */
+static uint32_t terrimpi_pack_side(uint32_t side, float scale)
 {
+    return scale < 1.0f && side ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
+}
+
+/* Finds places for all at a scale; returns whether there are. `shelves` lists the first rectangle
+   of each shelf, whose x meanwhile says how far the shelf is taken. */
+static int terrimpi_pack_try(uint32_t width, uint32_t height, terrimp_rect *rects, uint32_t count,
+                             const uint32_t *order, uint32_t *shelves, float scale)
+{
+    uint32_t i, k, shelf_count = 0, top = 0;
+    for (i = 0; i < count; i++) {
+        terrimp_rect *rect = &rects[order[i]], *first;
+        uint32_t wide = terrimpi_pack_side(rect->width, scale);
+        uint32_t high = terrimpi_pack_side(rect->height, scale);
+        if (wide == 0 || high == 0)
+            continue;
+        if (wide > width || high > height)
+            return 0;
+        for (k = 0; k < shelf_count && rects[shelves[k]].x > width - wide;)
+            k++;
+        if (k == shelf_count) {
+            if (top > height - high)
+                return 0;
+            shelves[shelf_count++] = order[i];
+            rect->x = 0;
+            rect->y = top;
+            top += high;
+        }
+        first = &rects[shelves[k]];
+        rect->y = first->y;
+        rect->x = first->x;
+        first->x += wide;
+    }
+    for (k = 0; k < shelf_count; k++)
+        rects[shelves[k]].x = 0;
+    return 1;
+}
+
+TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, terrimp_rect *rects,
+                                             uint32_t count, uint32_t *order, float *scale)
+{
+    float by = 1.0f;
     uint32_t i;
+    TERRIMPI_REFUSE(count && (!rects || !order), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < count; i++)
         order[i] = i;
-    terrimpi_sort(order, count, items, terrimpi_pack_after);
-}
-
-/* Reduces a rectangle that is larger than the atlas, keeping its shape; returns whether it was. */
-static int terrimpi_pack_reduce(const terrimp_shelves *shelves, terrimp_rect *rect)
-{
-    float x = (float)shelves->width / (float)rect->width;
-    float y = (float)shelves->height / (float)rect->height;
-    float scale = terrimpi_min(x, y);
-    if (rect->width <= shelves->width && rect->height <= shelves->height)
-        return 0;
-    rect->width = terrimpi_clamp_u32((uint32_t)((float)rect->width * scale), 1u, shelves->width);
-    rect->height = terrimpi_clamp_u32((uint32_t)((float)rect->height * scale), 1u, shelves->height);
-    return 1;
-}
-
-TERRIMP_API terrimp_result terrimp_pack_ffdh(terrimp_shelves *shelves, terrimp_pack_item *items,
-                                             uint32_t count, uint32_t *order, uint32_t *placed)
-{
-    uint32_t i, done = 0;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || (count && (!items || !order)), TERRIMP_E_NULL);
-    for (i = 0; i < count; i++)
-        TERRIMPI_REFUSE(items[i].rect.width < 1u || items[i].rect.height < 1u, TERRIMP_E_RANGE);
-    for (i = 0; i < count; i++)
-        items[i].flags =
-            terrimpi_pack_reduce(shelves, &items[i].rect) ? (uint32_t)TERRIMP_PACK_SCALED : 0u;
-    terrimpi_pack_sort(items, order, count);
-    for (i = 0; i < count; i++) {
-        terrimp_pack_item *item = &items[order[i]];
-        if (terrimp_shelves_insert(shelves, &item->rect) != TERRIMP_OK)
-            continue;
-        item->flags |= (uint32_t)TERRIMP_PACK_PLACED;
-        done++;
-    }
-    if (placed)
-        *placed = done;
-    return done == count ? TERRIMP_OK : TERRIMP_E_CAPACITY;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_init(terrimp_atlas_pair *pair, uint32_t width,
-                                             uint32_t height, terrimp_shelf *items,
-                                             uint32_t capacity)
-{
-    TERRIMPI_REFUSE(!pair || !items, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimp_shelves_init(&pair->shelves[0], width, height, 0, items, capacity));
-    terrimp_shelves_init(&pair->shelves[1], width, height, 0, items + capacity, capacity);
-    pair->newest = 0;
-    pair->repacks = 0;
-    return TERRIMP_OK;
-}
-
-/* A side at a scale <= 1; whole at 1, since a float could round a huge one out of its type. */
-static uint32_t terrimpi_pair_side(uint32_t side, float scale)
-{
-    return scale < 1.0f ? terrimpi_max_u32(1u, (uint32_t)((float)side * scale)) : side;
-}
-
-/* Inserts the non-empty items, tallest first, at a scale, into emptied shelves; returns whether all
-   of them fitted. The sizes of `items` stay as asked for; rectangles go to the slots. */
-static int terrimpi_pair_try(terrimp_shelves *shelves, uint32_t atlas, terrimp_pair_slot *slots,
-                             const terrimp_pack_item *items, uint32_t count, const uint32_t *order,
-                             float scale)
-{
-    uint32_t i;
-    shelves->count = shelves->top = 0;
-    for (i = 0; i < count; i++) {
-        uint32_t k = order[i];
-        terrimp_rect *rect = &slots[k].rect[atlas];
-        if (items[k].rect.width < 1u || items[k].rect.height < 1u)
-            continue;
-        rect->width = terrimpi_pair_side(items[k].rect.width, scale);
-        rect->height = terrimpi_pair_side(items[k].rect.height, scale);
-        if (terrimp_shelves_insert(shelves, rect) != TERRIMP_OK)
-            return 0;
-    }
-    return 1;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_repack(terrimp_atlas_pair *pair, terrimp_pair_slot *slots,
-                                               terrimp_pack_item *items, uint32_t count,
-                                               uint32_t *order, float *scale)
-{
-    uint32_t i, atlas;
-    float by = 1.0f;
-    int fits;
-    TERRIMPI_REFUSE(!pair || !pair->shelves[0].items ||
-                    (count && (!slots || !items || !order)), TERRIMP_E_NULL);
-    atlas = 1u - pair->newest;
-    for (i = 0; i < count; i++)
-        slots[i].assigned[atlas] = slots[i].filled[atlas] = 0;
-    terrimpi_pack_sort(items, order, count);
-    /* Steps of 6 %: at most about 190 of them from the largest atlas down to one texel. */
-    while (!(fits = terrimpi_pair_try(&pair->shelves[atlas], atlas, slots, items, count, order,
-                                      by)) &&
-           by > 1e-5f)
+    terrimpi_sort(order, count, rects, terrimpi_pack_after);
+    /* at most 360 steps, from 2^32 texels down to one */
+    while (!terrimpi_pack_try(width, height, rects, count, order, order + count, by)) {
+        TERRIMPI_REFUSE(by < 2e-10f, TERRIMP_E_CAPACITY);
         by *= 0.94f;
-    pair->newest = atlas;
-    pair->repacks++;
+    }
+    for (i = 0; i < count; i++) {
+        rects[i].width = terrimpi_pack_side(rects[i].width, by);
+        rects[i].height = terrimpi_pack_side(rects[i].height, by);
+    }
     if (scale)
         *scale = by;
-    if (!fits) {
-        pair->shelves[atlas].count = pair->shelves[atlas].top = 0;
-        return TERRIMP_E_CAPACITY;
-    }
-    for (i = 0; i < count; i++)
-        if (items[i].rect.width >= 1u && items[i].rect.height >= 1u) {
-            slots[i].assigned[atlas] = 1;
-            items[i].rect = slots[i].rect[atlas];
-            items[i].flags = (uint32_t)TERRIMP_PACK_PLACED |
-                             (by < 1.0f ? (uint32_t)TERRIMP_PACK_SCALED : 0u);
-        }
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_assign(terrimp_atlas_pair *pair, terrimp_pair_slot *slot,
-                                               uint32_t width, uint32_t height)
-{
-    terrimp_rect rect;
-    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
-    rect.x = rect.y = 0;
-    rect.width = width;
-    rect.height = height;
-    TERRIMPI_TRY(terrimp_shelves_insert(&pair->shelves[pair->newest], &rect));
-    slot->rect[pair->newest] = rect;
-    slot->assigned[pair->newest] = 1;
-    slot->filled[pair->newest] = 0;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_pair_fill(const terrimp_atlas_pair *pair,
-                                             terrimp_pair_slot *slot)
-{
-    TERRIMPI_REFUSE(!pair || !slot, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!slot->assigned[pair->newest], TERRIMP_E_STATE);
-    slot->filled[pair->newest] = 1;
-    slot->assigned[1u - pair->newest] = slot->filled[1u - pair->newest] = 0;
-    return TERRIMP_OK;
-}
-
-TERRIMP_API int terrimp_pair_picture(const terrimp_atlas_pair *pair, const terrimp_pair_slot *slot)
-{
-    if (!pair || !slot)
-        return -1;
-    if (slot->filled[pair->newest])
-        return (int)pair->newest;
-    return slot->filled[1u - pair->newest] ? (int)(1u - pair->newest) : -1;
 }
 
 /* ---- the live atlas ----
@@ -4957,14 +5197,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_reset(terrimp_live_atlas *atlas)
-{
-    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    terrimpi_live_reset(atlas);
-    return TERRIMP_OK;
-}
-
 /* The smallest hole that a size fits into, the first of equals; hole_count for none. */
 static uint32_t terrimpi_live_find(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
 {
@@ -5064,15 +5296,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     return terrimpi_live_alloc(atlas, width, height, slot);
 }
 
-/* E_NULL, E_STATE and E_RANGE of the functions that take a slot. */
-static terrimp_result terrimpi_live_check(const terrimp_live_atlas *atlas, uint32_t slot)
-{
-    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
-    return atlas->slots[slot].width > 0 ? TERRIMP_OK : TERRIMP_E_STATE;
-}
-
 /* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
    contain, which touch it. */
 static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
@@ -5097,22 +5320,16 @@ static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
 {
     terrimp_rect freed;
-    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
+    TERRIMPI_REFUSE(!atlas, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(atlas->slots[slot].width == 0, TERRIMP_E_STATE);
     freed = terrimpi_live_padded(atlas, slot);
     atlas->texels_used -= atlas->slots[slot].width * atlas->slots[slot].height;
     atlas->slot_count--;
     atlas->slots[slot] = terrimpi_rect(atlas->unused, 0, 0, 0);
     atlas->unused = slot;
     terrimpi_live_reclaim(atlas, &freed);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_rect(const terrimp_live_atlas *atlas, uint32_t slot,
-                                                   terrimp_rect *rect)
-{
-    TERRIMPI_REFUSE(!rect, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_live_check(atlas, slot));
-    *rect = atlas->slots[slot];
     return TERRIMP_OK;
 }
 
@@ -5152,180 +5369,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
     TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
                     !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     terrimpi_live_room(atlas, width, height, size);
-    return TERRIMP_OK;
-}
-
-/* The search for the place whose slots cost least. */
-typedef struct terrimpi_live_search {
-    const terrimp_live_atlas *atlas;
-    const float *costs;
-    uint32_t *by_x;    /* the slots in use from left to right */
-    uint32_t count;
-    uint32_t widest;   /* of these, with padding */
-    terrimp_rect best; /* its size is the one that is searched for */
-    float best_cost;
-} terrimpi_live_search;
-
-static int terrimpi_live_right_of(const void *slots, uint32_t a, uint32_t b)
-{
-    return ((const terrimp_rect *)slots)[a].x > ((const terrimp_rect *)slots)[b].x;
-}
-
-/* Lists the slots in use from left to right. */
-static void terrimpi_live_list(terrimpi_live_search *s)
-{
-    const terrimp_rect *slots = s->atlas->slots;
-    uint32_t i;
-    s->count = s->widest = 0;
-    for (i = 0; i < s->atlas->slot_end; i++)
-        if (slots[i].width > 0) {
-            s->by_x[s->count++] = i;
-            s->widest = terrimpi_max_u32(s->widest, slots[i].width + s->atlas->desc.padding);
-        }
-    terrimpi_sort(s->by_x, s->count, slots, terrimpi_live_right_of);
-}
-
-/* The first in the list of slots that may reach over a column. */
-static uint32_t terrimpi_live_reaching(const terrimpi_live_search *s, uint32_t x)
-{
-    uint32_t low = 0, high = s->count;
-    while (low < high) {
-        uint32_t middle = (low + high) / 2u;
-        if (s->atlas->slots[s->by_x[middle]].x + s->widest <= x)
-            low = middle + 1u;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-/* Takes a place if its slots cost less than those of the best one so far. */
-static void terrimpi_live_weigh(terrimpi_live_search *s, const terrimp_rect *place)
-{
-    float cost = 0.0f;
-    uint32_t i;
-    for (i = terrimpi_live_reaching(s, place->x); i < s->count; i++) {
-        uint32_t slot = s->by_x[i];
-        terrimp_rect taken = terrimpi_live_padded(s->atlas, slot);
-        if (taken.x >= place->x + place->width)
-            break;
-        if (!terrimpi_rects_overlap(place, &taken))
-            continue;
-        cost += s->costs[slot];
-        if (!(s->costs[slot] >= 0.0f && cost < s->best_cost))
-            return;
-    }
-    if (cost < s->best_cost) {
-        s->best_cost = cost;
-        s->best = *place;
-    }
-}
-
-/* Tries a place at the four corners of a rectangle, shifted into the atlas. */
-static void terrimpi_live_try(terrimpi_live_search *s, const terrimp_rect *at)
-{
-    terrimp_rect whole = terrimpi_live_whole(s->atlas);
-    uint32_t corner, right = at->x + at->width, top = at->y + at->height;
-    for (corner = 0; corner < 4u; corner++) {
-        terrimp_rect place = s->best;
-        place.x = corner & 1u ? right - terrimpi_min_u32(right, place.width) : at->x;
-        place.y = corner & 2u ? top - terrimpi_min_u32(top, place.height) : at->y;
-        place.x = terrimpi_min_u32(place.x, whole.width - place.width);
-        place.y = terrimpi_min_u32(place.y, whole.height - place.height);
-        terrimpi_live_weigh(s, &place);
-    }
-}
-
-/* Searches at the corners of holes and slots; where these are very many, of every n-th. */
-static void terrimpi_live_cheapest(terrimpi_live_search *s, uint32_t width, uint32_t height)
-{
-    const terrimp_live_atlas *atlas = s->atlas;
-    uint32_t i, step = 1u + (atlas->hole_count + atlas->slot_count) / 512u;
-    s->best = terrimpi_rect(0, 0, width + atlas->desc.padding, height + atlas->desc.padding);
-    terrimpi_live_list(s);
-    for (i = 0; i < atlas->hole_count; i += step)
-        terrimpi_live_try(s, &atlas->holes[i]);
-    for (i = 0; i < s->count; i += step) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, s->by_x[i]);
-        terrimpi_live_try(s, &slot);
-    }
-}
-
-/* The same for a mere handle: the slot that costs least. */
-static void terrimpi_live_cheapest_slot(terrimpi_live_search *s)
-{
-    uint32_t i;
-    for (i = 0; i < s->atlas->slot_end; i++)
-        if (s->atlas->slots[i].width > 0 && s->costs[i] >= 0.0f && s->costs[i] < s->best_cost) {
-            s->best_cost = s->costs[i];
-            s->best = terrimpi_live_padded(s->atlas, i);
-        }
-}
-
-/* Frees the slots that overlap a place; returns how many. */
-static uint32_t terrimpi_live_clear(terrimp_live_atlas *atlas, const terrimp_rect *place,
-                                    uint32_t *victims)
-{
-    uint32_t i, count = 0;
-    for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
-        if (atlas->slots[i].width == 0 || !terrimpi_rects_overlap(place, &slot))
-            continue;
-        terrimp_live_atlas_free(atlas, i);
-        victims[count++] = i;
-    }
-    return count;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_evict(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, const float *costs,
-                                                    uint32_t *victims, uint32_t *count)
-{
-    terrimpi_live_search search;
-    int fits;
-    TERRIMPI_REFUSE(!atlas || !costs || !victims || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(width > atlas->desc.width || height > atlas->desc.height, TERRIMP_E_CAPACITY);
-    fits = terrimpi_live_find(atlas, width, height) < atlas->hole_count;
-    if (fits && atlas->unused < atlas->desc.max_slots) {
-        *count = 0;
-        return TERRIMP_OK;
-    }
-    search.atlas = atlas;
-    search.costs = costs;
-    search.by_x = victims;
-    search.best_cost = TERRIMPI_FLOAT_MAX;
-    if (fits)
-        terrimpi_live_cheapest_slot(&search);
-    else
-        terrimpi_live_cheapest(&search, width, height);
-    TERRIMPI_REFUSE(!(search.best_cost < TERRIMPI_FLOAT_MAX), TERRIMP_E_CAPACITY);
-    *count = terrimpi_live_clear(atlas, &search.best, victims);
-    return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_query(const terrimp_live_atlas *atlas,
-                                                    terrimp_live_atlas_stats *stats)
-{
-    uint32_t i, padding;
-    TERRIMPI_REFUSE(!atlas || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    padding = atlas->desc.padding;
-    stats->slots = atlas->slot_count;
-    stats->texels_used = atlas->texels_used;
-    stats->texels_free = atlas->desc.width * atlas->desc.height - atlas->texels_used;
-    stats->largest_width = stats->largest_height = 0;
-    stats->failures = atlas->failures;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        if (hole->width > padding && hole->height > padding &&
-            (hole->width - padding) * (hole->height - padding) >
-                stats->largest_width * stats->largest_height) {
-            stats->largest_width = hole->width - padding;
-            stats->largest_height = hole->height - padding;
-        }
-    }
     return TERRIMP_OK;
 }
 
@@ -6372,6 +6415,617 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
     t.begun = t.built = t.baked = 1;
     *(terrimp_terrain *)memory = t;
     *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+/* ==== Visibility ========================================================= >>impl-visibility */
+/* Based on: Lloyd and Egbert 2002, the horizon of a hierarchical terrain; the rest is our own.
+
+   Sight lines are told by the axis that they follow most, so that their direction is t = -1..1, how
+   far they go to the side with each quad that they go ahead, and distances count along that axis,
+   in quads. Then a column x = i is crossed at one distance f by all sight lines of a quarter, and
+   the slope (h - eye) / f of what stands there is linear in its height: over the directions of a
+   bin [t1, t2] the ground is nowhere lower than the lowest of its heights at both ends and of the
+   samples between them. So what a bin sees of a column is exact, and the horizon is raised by no
+   more than is really there. Farther away the heights of 2^k samples of every 2^k-th column are
+   kept by their minimum: the walls.
+
+   A point is hidden when the slope of its sight line is below that of a wall before it: the line
+   starts above the ground, is below it at the wall, and so has gone through it. What it went
+   through is drawn, or is hidden itself by what it went through first. That takes three things: the
+   eye is above the ground; nothing of this is clipped by z_near (walls within its reach do not
+   count, and no line counts that is below the ground where it becomes visible); and walls hold for
+   what is drawn. Drawn triangles of a coarser level run along the edges of finer ones, so above a
+   quad they are between the lowest and the highest of its four samples, give or take their
+   error. */
+
+#define TERRIMPI_WALL_TOPS 4u      /* along a node's side: squares of which the height is kept */
+#define TERRIMPI_WALL_FINE 20.0f   /* quads of distance for each quad between walls */
+#define TERRIMPI_HORIZON_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
+#define TERRIMPI_HORIZON_NONE -1e30f
+#define TERRIMPI_HORIZON_ALL 1e30f
+#define TERRIMPI_HORIZON_CLOSEST 0.25f /* [quads] of a wall: closer by, places are too rough */
+
+/* How the walls of a node are kept: the height of code 0 and the step of the codes, as floats;
+   [2 axes][cells lines][cells] codes of lowest heights, rounded down; and those of the highest of
+   each of 4 x 4 squares, rounded up. */
+typedef struct terrimpi_wall_form {
+    uint32_t quads, cells; /* of a cell at level 0, a power of two; along a side of a node */
+    uint32_t stride;       /* [bytes] from node to node */
+} terrimpi_wall_form;
+
+static terrimpi_wall_form terrimpi_wall_form_of(const terrimp_quadtree *tree)
+{
+    terrimpi_wall_form form;
+    form.quads = tree->chunk_quads % 4u == 0 ? 4u : 2u;
+    form.cells = tree->chunk_quads / form.quads;
+    form.stride = 2u * (uint32_t)sizeof(float) + 2u * form.cells * form.cells +
+                  TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS;
+    form.stride = (form.stride + 3u) / 4u * 4u;
+    return form;
+}
+
+TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
+{
+    size_t bytes;
+    int ok = 1;
+    if (!tree)
+        return 0;
+    bytes = terrimpi_mul(tree->node_count, terrimpi_wall_form_of(tree).stride, &ok);
+    return ok ? bytes : 0;
+}
+
+static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const void *walls)
+{
+    TERRIMPI_REFUSE(!tree || !walls || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
+    return TERRIMP_OK;
+}
+
+/* The codes of a node's walls and the two floats before them. */
+static const unsigned char *terrimpi_wall_codes(const unsigned char *walls, uint32_t stride,
+                                                uint32_t node, float scale[2])
+{
+    const unsigned char *at = walls + (size_t)node * stride;
+    memcpy(scale, at, 2u * sizeof(float));
+    return at + 2u * sizeof(float);
+}
+
+/* ---- walls as an eye sees them ---- */
+
+/* The last column, or row. */
+static uint32_t terrimpi_horizon_last(const terrimp_quadtree *tree, uint32_t axis)
+{
+    return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
+}
+
+/* The sample where line `line` of an axis crosses line `other` of the other one. */
+static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
+                                     uint32_t other)
+{
+    return axis == 0 ? terrimpi_sample(&h->tree->field, line, other)
+                     : terrimpi_sample(&h->tree->field, other, line);
+}
+
+/* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
+static float terrimpi_horizon_ground(const terrimp_horizon *h, uint32_t axis, uint32_t line,
+                                     uint32_t i, float from, uint32_t j, float to)
+{
+    float a = terrimpi_horizon_sample(h, axis, line, i);
+    float b = terrimpi_horizon_sample(h, axis, line, i + 1u);
+    float lowest = a + (b - a) * from;
+    for (; i < j; i++) {
+        lowest = terrimpi_min(lowest, b);
+        a = b;
+        b = terrimpi_horizon_sample(h, axis, line, i + 2u);
+    }
+    return terrimpi_min(lowest, a + (b - a) * to);
+}
+
+/* The same from walls, of the cells that quads i to j are in. */
+static float terrimpi_horizon_walls(const terrimp_horizon *h, uint32_t axis,
+                                    const terrimp_horizon_step *step, uint32_t i, uint32_t j)
+{
+    uint32_t level = step->level - 1u, shift = level + h->quads / 2u; /* quads are 2 or 4 */
+    uint32_t cell = i >> shift, last = j >> shift, node = cell / h->cells;
+    uint32_t row = (axis * h->cells + step->row) * h->cells;
+    float lowest = TERRIMPI_HORIZON_ALL, scale[2];
+    while (cell <= last) {
+        uint32_t end = terrimpi_min_u32(last + 1u, (node + 1u) * h->cells), lowest_code = 255u;
+        const unsigned char *codes = terrimpi_wall_codes(
+            h->walls, h->stride,
+            h->tree->level_first[level] +
+                (axis == 0 ? node * h->tree->level_x[level] + step->node
+                           : step->node * h->tree->level_x[level] + node), scale);
+        for (; cell < end; cell++)
+            lowest_code = terrimpi_min_u32(lowest_code, codes[row + cell - node * h->cells]);
+        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)lowest_code);
+        node++;
+    }
+    return lowest;
+}
+
+/* What integer a float is at or above. */
+static int32_t terrimpi_horizon_floor(float value)
+{
+    int32_t whole = (int32_t)value;
+    return (float)whole > value ? whole - 1 : whole;
+}
+
+/* The least slope of what stands at a step, over the directions of a bin; NONE when a part of them
+   has left the terrain. */
+static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, uint32_t bin,
+                                    const terrimp_horizon_step *step)
+{
+    const float width = 2.0f / (float)TERRIMP_HORIZON_BINS;
+    uint32_t axis = quarter / 2u, other = 1u - axis, i, j;
+    uint32_t quads = terrimpi_horizon_last(h->tree, other);
+    float t = (float)bin * width - 1.0f, lowest, slope;
+    float from = h->within[other] + t * step->distance - h->rounding;
+    float to = h->within[other] + (t + width) * step->distance + h->rounding;
+    int32_t first = terrimpi_horizon_floor(from), last = terrimpi_horizon_floor(to);
+    i = h->quad[other] + (uint32_t)first; /* below 0 it becomes large */
+    j = h->quad[other] + (uint32_t)last;
+    if (i >= quads || j >= quads)
+        return TERRIMPI_HORIZON_NONE;
+    lowest = step->level == 0 ? terrimpi_horizon_ground(h, axis, step->line, i, from - (float)first,
+                                                        j, to - (float)last)
+                              : terrimpi_horizon_walls(h, axis, step, i, j);
+    slope = (lowest - h->low - h->eye) * step->inverse;
+    return slope - h->error * (h->spread + terrimpi_abs(slope)) -
+           h->rounding * step->inverse * terrimpi_abs(slope);
+}
+
+/* Whether the horizon of a bin, made of what stands before a distance, is above what has a height
+   ([wu] over the eye) at that distance or another one. It is looked for step by step and no farther
+   than it takes. */
+static int terrimpi_horizon_above(terrimp_horizon *h, uint32_t quarter, uint32_t bin,
+                                  float distance, float height, float at)
+{
+    terrimp_horizon_bin *b = &h->bins[quarter][bin];
+    uint32_t k;
+    for (k = 0; k < TERRIMP_HORIZON_KEPT; k++) {
+        uint32_t entry = (b->top - k) % TERRIMP_HORIZON_KEPT; /* a power of two */
+        if (b->distance[entry] < distance) {
+            if (b->slope[entry] * at > height)
+                return 1;
+            break;
+        }
+    }
+    while (b->reached < h->step_count[quarter] &&
+           h->steps[quarter][b->reached].distance < distance) {
+        const terrimp_horizon_step *step = &h->steps[quarter][b->reached++];
+        float slope = terrimpi_horizon_slope(h, quarter, bin, step);
+        if (slope == TERRIMPI_HORIZON_NONE)
+            b->reached = (uint16_t)h->step_count[quarter]; /* it does not come back */
+        if (slope <= b->slope[b->top])
+            continue;
+        b->top = (uint16_t)((b->top + 1u) % TERRIMP_HORIZON_KEPT);
+        b->slope[b->top] = slope;
+        b->distance[b->top] = step->distance;
+        if (slope * at > height)
+            return 1;
+    }
+    return 0;
+}
+
+/* ---- what is below it ---- */
+
+/* A box as a quarter sees it: [quads] ahead of the eye, [quads] to the side, [wu] above it. */
+typedef struct terrimpi_horizon_box {
+    float ahead[2], beside[2];
+    float height;
+} terrimpi_horizon_box;
+
+/* The distances at which the directions of a bin may enter and leave a box. */
+static void terrimpi_horizon_span(const terrimp_horizon *h, const terrimpi_horizon_box *box,
+                                  uint32_t bin, float *enter, float *leave)
+{
+    const float *inverse = &h->inverse[bin];
+    const int right = bin >= TERRIMP_HORIZON_BINS / 2; /* of the middle: t >= 0 */
+    *enter = box->ahead[0];
+    *leave = box->ahead[1];
+    if (box->beside[0] > 0.0f)
+        *enter = terrimpi_max(*enter, box->beside[0] * inverse[1]);
+    if (box->beside[1] < 0.0f)
+        *enter = terrimpi_max(*enter, box->beside[1] * inverse[0]);
+    if (right && box->beside[1] > 0.0f)
+        *leave = terrimpi_min(*leave, box->beside[1] * inverse[0]);
+    if (!right && box->beside[0] < 0.0f)
+        *leave = terrimpi_min(*leave, box->beside[0] * inverse[1]);
+    *enter = terrimpi_max(*enter - 2.0f * h->rounding, 0.0f);
+    *leave = terrimpi_max(*leave + 2.0f * h->rounding, *enter);
+}
+
+/* Whether the part of a box that one quarter sees is hidden. */
+static int terrimpi_horizon_hides_quarter(terrimp_horizon *h, uint32_t quarter,
+                                          const terrimpi_horizon_box *box)
+{
+    const float half = (float)TERRIMP_HORIZON_BINS * 0.5f;
+    float a0 = box->ahead[0], a1 = box->ahead[1], o0 = box->beside[0], o1 = box->beside[1];
+    float t0, t1, enter, leave, at;
+    uint32_t bin, last;
+    if (a1 <= 0.0f || o0 > a1 || o1 < -a1)
+        return 1;
+    t0 = o0 >= 0.0f ? o0 / a1 : a0 > 0.0f ? o0 / a0 : -1.0f;
+    t1 = o1 <= 0.0f ? o1 / a1 : a0 > 0.0f ? o1 / a0 : 1.0f;
+    if (t0 > 1.0f || t1 < -1.0f)
+        return 1;
+    bin = (uint32_t)terrimpi_clamp((t0 + 1.0f) * half - 0.01f, 0.0f, 2.0f * half - 1.0f);
+    last = (uint32_t)terrimpi_clamp((t1 + 1.0f) * half + 0.01f, 0.0f, 2.0f * half - 1.0f);
+    for (; bin <= last; bin++) {
+        terrimpi_horizon_span(h, box, bin, &enter, &leave);
+        at = box->height > 0.0f ? enter : leave; /* where its slope is largest */
+        if (!(enter > 0.0f) || !terrimpi_horizon_above(h, quarter, bin, enter, box->height, at))
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether all four quarters hide a box: from corner (x, z), with sides of `size` [quads], up to a
+   height [wu] over the eye. */
+static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, float size,
+                                      float height)
+{
+    terrimpi_horizon_box box;
+    float low[2], high[2];
+    uint32_t quarter;
+    low[0] = x;
+    low[1] = z;
+    high[0] = x + size;
+    high[1] = z + size;
+    box.height = height;
+    if (low[0] <= 0.0f && high[0] >= 0.0f && low[1] <= 0.0f && high[1] >= 0.0f)
+        return 0;
+    for (quarter = 0; quarter < 4u; quarter++) {
+        uint32_t axis = quarter / 2u, other = 1u - axis;
+        int back = quarter & 1;
+        box.ahead[0] = terrimpi_max(back ? -high[axis] : low[axis], 0.0f);
+        box.ahead[1] = back ? -low[axis] : high[axis];
+        box.beside[0] = low[other];
+        box.beside[1] = high[other];
+        if (!terrimpi_horizon_hides_quarter(h, quarter, &box))
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether sight lines to a node whose lowest height is given could run below the ground where
+   z_near lets them begin. */
+static int terrimpi_horizon_under(const terrimp_horizon *h, float x, float z, float size, float low)
+{
+    float beside_x = terrimpi_max(terrimpi_max(x, -x - size), 0.0f);
+    float beside_z = terrimpi_max(terrimpi_max(z, -z - size), 0.0f);
+    return low - h->eye <= h->steepest * terrimpi_max(beside_x, beside_z);
+}
+
+/* First the node as a whole; then, since its summit is seldom at its border, its squares, from the
+   one that is closest to the eye. */
+static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
+{
+    const terrimp_geomip_node *heights = &h->tree->nodes[node->number];
+    uint32_t quads = h->tree->chunk_quads << node->level, k, first;
+    float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
+    float x = (float)((int32_t)(node->x * quads) - (int32_t)h->quad[0]) - h->within[0];
+    float z = (float)((int32_t)(node->z * quads) - (int32_t)h->quad[1]) - h->within[1];
+    const unsigned char *tops;
+    if (h->blind || terrimpi_horizon_under(h, x, z, size, heights->low - raised))
+        return 0;
+    if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->eye))
+        return 1;
+    tops = terrimpi_wall_codes(h->walls, h->stride, node->number, scale) +
+           2u * h->cells * h->cells;
+    first = (x + 0.5f * size < 0.0f ? 3u : 0u) | (z + 0.5f * size < 0.0f ? 12u : 0u);
+    for (k = 0; k < TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
+        uint32_t i = k ^ first;
+        float top = scale[0] + scale[1] * (float)tops[i] + raised + h->low;
+        if (!terrimpi_horizon_hides_box(h, x + part * (float)(i % TERRIMPI_WALL_TOPS),
+                                        z + part * (float)(i / TERRIMPI_WALL_TOPS), part,
+                                        terrimpi_min(top, heights->high) - h->eye))
+            return 0;
+    }
+    return 1;
+}
+
+TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, float raised)
+{
+    terrimp_node n;
+    if (!horizon || !horizon->tree || node >= horizon->tree->node_count || !(raised >= 0.0f))
+        return 0;
+    n = terrimpi_tree_node(horizon->tree, node);
+    return terrimpi_horizon_hides_node(horizon, &n, raised);
+}
+
+/* ---- the beginning of a frame ---- */
+
+/* Lays out the steps of a quarter: every column at first, then every 2^k-th, as far apart as the
+   distance allows. */
+static void terrimpi_horizon_lay_steps(terrimp_horizon *h, uint32_t quarter)
+{
+    uint32_t axis = quarter / 2u, back = quarter & 1u, count = 0, apart = 1, level = 0;
+    uint32_t end = terrimpi_horizon_last(h->tree, axis); /* behind the last one there is nothing */
+    uint32_t line = h->quad[axis] + (back ? 0u : 1u);
+    while (line < end && count < TERRIMP_HORIZON_STEPS) {
+        terrimp_horizon_step *step = &h->steps[quarter][count];
+        float ahead = (float)(back ? h->quad[axis] - line : line - h->quad[axis]);
+        step->distance = back ? ahead + h->within[axis] : ahead - h->within[axis];
+        step->line = line;
+        step->level = (uint8_t)level;
+        if (level > 0) {
+            uint32_t row = line / apart;
+            step->node = (uint16_t)(row / h->cells);
+            step->row = (uint8_t)(row % h->cells);
+        }
+        if (step->distance >= TERRIMPI_HORIZON_CLOSEST && step->distance >= h->clipped[axis]) {
+            step->inverse = 1.0f / step->distance;
+            count++;
+        }
+        while ((float)(2u * apart) * TERRIMPI_WALL_FINE <= step->distance &&
+               line % (2u * apart) == 0 && level < h->tree->level_count) {
+            apart *= 2u;
+            level += apart >= h->quads ? 1u : 0u;
+        }
+        line = back ? line - apart : line + apart; /* from 0 it becomes large */
+    }
+    h->step_count[quarter] = count;
+}
+
+/* On which side of what the camera sees a direction is: bits for behind, left and right. */
+static int terrimpi_horizon_beside(const float to[2], const float ahead[2], const float cone[2])
+{
+    float forward = to[0] * ahead[0] + to[1] * ahead[1];
+    float side = to[1] * ahead[0] - to[0] * ahead[1];
+    if (forward <= 0.0f)
+        return 1;
+    return (side < cone[0] * forward ? 2 : 0) | (side > cone[1] * forward ? 4 : 0);
+}
+
+/* Empties the bins of a quarter. Those that the camera does not see hide everything. */
+static void terrimpi_horizon_empty(terrimp_horizon *h, uint32_t quarter, const float ahead[2],
+                                   const float cone[2])
+{
+    uint32_t axis = quarter / 2u, bin, k, seen = 0;
+    int before = 0, behind;
+    for (bin = 0; bin <= TERRIMP_HORIZON_BINS; bin++, before = behind) {
+        terrimp_horizon_bin *b = &h->bins[quarter][bin == 0 ? 0 : bin - 1u];
+        float to[2];
+        to[axis] = quarter & 1u ? -1.0f : 1.0f;
+        to[1u - axis] = (float)bin * (2.0f / (float)TERRIMP_HORIZON_BINS) - 1.0f;
+        behind = cone[0] < cone[1] ? terrimpi_horizon_beside(to, ahead, cone) : 0;
+        if (bin == 0)
+            continue;
+        memset(b, 0, sizeof *b);
+        for (k = 0; k < TERRIMP_HORIZON_KEPT; k++)
+            b->slope[k] = before & behind ? TERRIMPI_HORIZON_ALL : TERRIMPI_HORIZON_NONE;
+        seen |= !(before & behind);
+    }
+    h->step_count[quarter] = 0;
+    if (seen)
+        terrimpi_horizon_lay_steps(h, quarter);
+}
+
+/* The directions between which a camera sees ground, as tangents to the side of `ahead`; none
+   (cone[0] = cone[1]) when it sees round about. */
+static void terrimpi_horizon_cone(const terrimp_horizon *h, const terrimp_capture *c,
+                                  float ahead[2], float cone[2])
+{
+    const terrimp_heightfield *field = &h->tree->field;
+    uint32_t i;
+    ahead[0] = c->forward[0] / field->spacing_x;
+    ahead[1] = c->forward[2] / field->spacing_z;
+    cone[0] = 1e9f;
+    cone[1] = -1e9f;
+    for (i = 0; i < 4u; i++) {
+        float x = i & 1u ? c->tan_right : c->tan_left, y = i & 2u ? c->tan_up : c->tan_down;
+        float to_x = (c->forward[0] + x * c->right[0] + y * c->up[0]) / field->spacing_x;
+        float to_z = (c->forward[2] + x * c->right[2] + y * c->up[2]) / field->spacing_z;
+        float forward = to_x * ahead[0] + to_z * ahead[1];
+        float side = to_z * ahead[0] - to_x * ahead[1];
+        if (forward <= 1e-3f * terrimpi_abs(side) || !(forward > 0.0f)) {
+            cone[0] = cone[1] = 0.0f;
+            return;
+        }
+        cone[0] = terrimpi_min(cone[0], side / forward);
+        cone[1] = terrimpi_max(cone[1], side / forward);
+    }
+    cone[0] -= 1e-4f * (1.0f + terrimpi_abs(cone[0]));
+    cone[1] += 1e-4f * (1.0f + terrimpi_abs(cone[1]));
+}
+
+/* The highest that the ground can be within so many quads of the eye: of each quad the highest
+   corner or, if that is less, how far its triangles rise there. */
+static float terrimpi_horizon_ground_top(const terrimp_horizon *h, const float reach[2])
+{
+    uint32_t from[2], to[2], k, i, j;
+    float top = TERRIMPI_HORIZON_NONE;
+    for (k = 0; k < 2u; k++) {
+        uint32_t last = terrimpi_horizon_last(h->tree, k) - 1u;
+        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + h->rounding, 1e6f));
+        if (wide > TERRIMPI_HORIZON_CLIPPED)
+            return TERRIMPI_HORIZON_ALL;
+        from[k] = h->quad[k] - terrimpi_min_u32(wide, h->quad[k]);
+        to[k] = terrimpi_min_u32(h->quad[k] + wide, last);
+    }
+    for (j = from[1]; j <= to[1]; j++)
+        for (i = from[0]; i <= to[0]; i++) {
+            float a = terrimpi_sample(&h->tree->field, i, j), u, v, low, high;
+            float b = terrimpi_sample(&h->tree->field, i + 1u, j);
+            float c = terrimpi_sample(&h->tree->field, i, j + 1u);
+            float d = terrimpi_sample(&h->tree->field, i + 1u, j + 1u);
+            u = (float)((int32_t)h->quad[0] - (int32_t)i) + h->within[0];
+            v = (float)((int32_t)h->quad[1] - (int32_t)j) + h->within[1];
+            low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
+                  terrimpi_abs(d - b) * reach[1];
+            high = a + (d - c) * u + (c - a) * v + terrimpi_abs(d - c) * reach[0] +
+                   terrimpi_abs(c - a) * reach[1];
+            high = terrimpi_min(terrimpi_max(low, high),
+                                terrimpi_max(terrimpi_max(a, b), terrimpi_max(c, d)));
+            top = terrimpi_max(top, high);
+        }
+    return top;
+}
+
+/* Finds which sight lines may begin below the ground, for what is closer than z_near is not drawn.
+   Returns 0 when they all may. */
+static int terrimpi_horizon_clip(terrimp_horizon *h, const terrimp_capture *c)
+{
+    const terrimp_heightfield *field = &h->tree->field;
+    float x = terrimpi_max(c->tan_right, -c->tan_left), y = terrimpi_max(c->tan_up, -c->tan_down);
+    float reach = c->z_near * TERRIMP_SQRTF(1.0f + x * x + y * y), top = h->low, quads[2];
+    h->clipped[0] = quads[0] = reach / field->spacing_x;
+    h->clipped[1] = quads[1] = reach / field->spacing_z;
+    h->steepest = TERRIMPI_HORIZON_NONE;
+    if (h->tree->nodes[h->tree->node_count - 1u].high < h->eye - 2.0f * reach)
+        return 1;
+    top += terrimpi_horizon_ground_top(h, quads) + 2.0f * h->error * reach;
+    if (top >= h->eye)
+        return 0;
+    if (top > h->eye - reach)
+        h->steepest = (top - h->eye) * terrimpi_min(field->spacing_x, field->spacing_z) / reach;
+    return 1;
+}
+
+/* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
+static int terrimpi_horizon_stand(terrimp_horizon *h, const float eye[3])
+{
+    const terrimp_heightfield *field = &h->tree->field;
+    float x, z, right, down;
+    if (!terrimpi_locate(field, eye[0], eye[2], &h->quad[0], &h->quad[1]))
+        return 0;
+    x = terrimpi_line(field->origin_x, field->spacing_x, h->quad[0]);
+    z = terrimpi_line(field->origin_z, field->spacing_z, h->quad[1]);
+    right = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
+    down = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
+    h->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
+    h->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
+    x = terrimpi_max(terrimpi_abs(field->origin_x), terrimpi_abs(right)) / field->spacing_x;
+    z = terrimpi_max(terrimpi_abs(field->origin_z), terrimpi_abs(down)) / field->spacing_z;
+    h->rounding = 1e-6f + 1.2e-7f * terrimpi_max(x, z); /* two roundings of a float */
+    return 1;
+}
+
+static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *tree,
+                                   const void *walls, const terrimp_camera *camera, float error,
+                                   float low)
+{
+    const terrimpi_wall_form form = terrimpi_wall_form_of(tree);
+    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    terrimp_capture capture;
+    float ahead[2], cone[2], ground;
+    uint32_t i;
+    h->tree = tree;
+    h->walls = (const unsigned char *)walls;
+    h->quads = form.quads;
+    h->cells = form.cells;
+    h->stride = form.stride;
+    h->eye = camera->eye[1];
+    h->error = error;
+    h->low = low + 4e-7f * (terrimpi_abs(h->eye) +
+                            terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
+    h->spread = TERRIMP_SQRTF(tree->field.spacing_x * tree->field.spacing_x +
+                              tree->field.spacing_z * tree->field.spacing_z);
+    terrimpi_camera_capture(camera, &capture);
+    h->blind = !terrimpi_horizon_stand(h, camera->eye) ||
+               terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) !=
+                   TERRIMP_OK || h->eye <= ground + h->low || !terrimpi_horizon_clip(h, &capture);
+    if (h->blind)
+        return;
+    for (i = 0; i <= TERRIMP_HORIZON_BINS; i++)
+        h->inverse[i] = 1.0f / ((float)i * (2.0f / (float)TERRIMP_HORIZON_BINS) - 1.0f);
+    terrimpi_horizon_cone(h, &capture, ahead, cone);
+    for (i = 0; i < 4u; i++)
+        terrimpi_horizon_empty(h, i, ahead, cone);
+}
+
+TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
+                                                 const terrimp_quadtree *tree, const void *walls,
+                                                 const terrimp_camera *camera, float error,
+                                                 float low)
+{
+    terrimp_camera c;
+    TERRIMPI_REFUSE(!horizon, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_REFUSE(!terrimpi_finite2(error, low), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_within(error, 0.0f, 0.5f) || !(low >= 0.0f), TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    terrimpi_horizon_begin(horizon, tree, walls, &c, error, low);
+    return TERRIMP_OK;
+}
+
+/* ---- a selection without what is hidden ---- */
+
+/* How far a draw may be off its samples: it is drawn as its node, as the parent when it morphs, and
+   at coarse borders as those beside it. At the far edges drawn triangles may cross those of the
+   samples: there it can be anything between the heights of the node. */
+static float terrimpi_draw_error(const terrimp_quadtree *tree, const terrimp_geomip_draw *draw,
+                                 int morphs)
+{
+    terrimp_node n = draw->node, beyond;
+    const terrimp_geomip_node *nodes = tree->nodes;
+    uint32_t ends[2], part = (1u << n.level) - 1u;
+    float error = nodes[n.number].error;
+    int side;
+    ends[0] = (n.x + 1u) * (tree->chunk_quads << n.level) >= tree->field.width - 1u;
+    ends[1] = (n.z + 1u) * (tree->chunk_quads << n.level) >= tree->field.depth - 1u;
+    if ((ends[0] && ((tree->field.width - 1u) & part)) ||
+        (ends[1] && ((tree->field.depth - 1u) & part)))
+        return nodes[n.number].high - nodes[n.number].low;
+    if (morphs && n.level + 1u < tree->level_count)
+        error = terrimpi_max(error, nodes[terrimpi_tree_parent(tree, &n).number].error);
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        if (!(draw->pattern >> side & 1u) || !terrimpi_tree_beyond(tree, &n, side, &beyond))
+            continue;
+        beyond = terrimpi_tree_parent(tree, &beyond);
+        error = terrimpi_max(error, nodes[beyond.number].error);
+        if (morphs && beyond.level + 1u < tree->level_count)
+            error = terrimpi_max(error, nodes[terrimpi_tree_parent(tree, &beyond).number].error);
+    }
+    return error;
+}
+
+/* The two bounds that a horizon wants: close to the eye one of height, else one over distance. */
+static void terrimpi_draws_error(const terrimp_quadtree *tree, const terrimp_geomip_view *view,
+                                 const float eye[3], float *error, float *low)
+{
+    float side = (float)tree->chunk_quads *
+                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
+    uint32_t i;
+    *error = *low = 0.0f;
+    for (i = 0; i < view->draw_count; i++) {
+        float off = terrimpi_draw_error(tree, &view->draws[i], view->morph_ratio > 1.0f), distance;
+        terrimp_box box;
+        terrimpi_mip_box(tree, &view->draws[i].node, &box);
+        distance = terrimp_box_distance(&box, eye);
+        if (distance < side)
+            *low = terrimpi_max(*low, off);
+        else
+            *error = terrimpi_max(*error, off / distance);
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls,
+                                                const terrimp_camera *camera,
+                                                terrimp_geomip_view *view)
+{
+    terrimp_camera c;
+    float error, low;
+    uint32_t i, count = 0;
+    TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    terrimpi_draws_error(tree, view, c.eye, &error, &low);
+    terrimpi_horizon_begin(horizon, tree, walls, &c, terrimpi_min(error, 0.5f), low);
+    horizon->blind |= error > 0.5f;
+    for (i = 0; i < view->draw_count; i++) {
+        const terrimp_geomip_draw *draw = &view->draws[i];
+        float off = terrimpi_draw_error(tree, draw, view->morph_ratio > 1.0f);
+        if (terrimpi_horizon_hides_node(horizon, &draw->node, off))
+            view->triangle_count -= terrimpi_mip_triangles(tree->chunk_quads, draw->pattern);
+        else
+            view->draws[count++] = *draw;
+    }
+    view->draw_count = count;
     return TERRIMP_OK;
 }
 
@@ -7884,7 +8538,7 @@ static void terrimpi_count_frame(terrimp_view *v)
     s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
         s->texels_used += v->atlases[i].texels_used;
-    s->texels_free = v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
                      s->texels_used;
 }
 
@@ -8150,6 +8804,1032 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
 }
 
 #endif /* TERRIMP_NO_MALLOC */
+
+/* ==== Sorted ============================================================= >>impl-sorted */
+
+/* Based on: Finch and Bishop 1998.
+
+   Order. Rows of pages, the pages of a row, the quarters of a square, its two halves and the
+   triangles of a half are each told apart by vertical planes, and of two things on different sides
+   of a plane only the one on the eye's side can hide the other: whatever meets the plane's other
+   side first has passed the eye's. So all that is needed is to draw, at each such cut, the side
+   first that the eye is not on; and rows and columns from both ends towards the eye's. (The paper
+   draws a strip from one end to the other, through the eye's column: that is no painter's order.)
+
+   Levels. A square of level l is split when its closest point, in plan, is closer than split[l],
+   the place where level l begins. A square that is not split touches only squares of its level,
+   the next finer or the next coarser one: for one of two levels less, its parent, of half the
+   square's side, is closer than split[l - 1]; all of that parent is within half a side of the
+   square, which is then closer than split[l - 1] plus half a side; and split[l] is more than that.
+   Whether the square at a side is split is asked of the same function: no T-junction can be. The
+   paper's five quads and its fill-in strips are what this gives along a row.
+
+   Heights. A vertex that is on the grid of level a but not of a + 1 comes and goes when a square
+   of level a + 1 is split. All of the square is at least split[a + 1] away then, and so is the
+   vertex: from there on it lies on the straight line between its two neighbours on the coarser
+   grid. There are none of finer levels on which they could rest in turn: a vertex is less than
+   sqrt(5) sides of its own level farther away than split[a + 1] while it is there, its neighbours
+   less than sqrt(2) sides more, 1.83 sides of theirs, and up to 1.875 of them beyond the place
+   where their level begins vertices have their own height. So a height is a function of the place
+   and of the eye alone, for both pages at a border too, and a continuous one of the eye.
+
+   All distances are whole numbers of units of 1/8 sample or less: the same on every machine. */
+
+#ifdef TERRIMP_FIXED
+#define TERRIMPI_SORTED_LIMIT 16384.0f        /* 3 squares of it are within 31 bits */
+#define TERRIMPI_SORTED_NEVER 0x7fffffff
+#else
+#define TERRIMPI_SORTED_LIMIT 1073741824.0f   /* of 63 bits */
+#define TERRIMPI_SORTED_NEVER ((terrimp_sorted_int)0x7fffffff << 31)
+#endif
+
+/* ---- the descriptor ---- */
+
+/* The least scale at which a table keeps the distance that blending needs; 0: there is none. */
+static float terrimpi_sorted_least_scale(const float *table, uint32_t top)
+{
+    float least = 2.0f, below = 0.0f;
+    uint32_t level;
+    for (level = 1; table && level <= top; level++) {
+        float step = table[level] - below;
+        if (!(step > 0.0f) || !terrimpi_finite(table[level]))
+            return 0.0f;
+        least = terrimpi_max(level == 1 ? 0.0f : least, (float)(1u << level) / step);
+        below = table[level];
+    }
+    return terrimpi_finite(least) ? least : 0.0f;
+}
+
+static uint32_t terrimpi_sorted_top(uint32_t page_quads)
+{
+    uint32_t top = 0;
+    while (2u << top <= page_quads)
+        top++;
+    return top;
+}
+
+static int terrimpi_is_power(uint32_t value, uint32_t low, uint32_t high)
+{
+    return terrimpi_within_u32(value, low, high) && (value & (value - 1u)) == 0;
+}
+
+/* With a page callback the field says only what a sample is and where. */
+static terrimp_result terrimpi_sorted_resolve_field(const terrimp_sorted_desc *desc,
+                                                    terrimp_heightfield *field)
+{
+    static const float none = 0.0f;
+    if (desc->page) {
+        field->samples = &none;
+        field->width = field->depth = desc->page_quads + 1u;
+        field->row_bytes = 0;
+    }
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, field));
+    TERRIMPI_REFUSE(field->wrap && ((field->width - 1u) % desc->page_quads != 0 ||
+                    (field->depth - 1u) % desc->page_quads != 0), TERRIMP_E_RANGE);
+#ifdef TERRIMP_FIXED
+    TERRIMPI_REFUSE(field->format == TERRIMP_FORMAT_F32, TERRIMP_E_RANGE);
+#endif
+    return TERRIMP_OK;
+}
+
+static int terrimpi_sorted_numbers_ok(const terrimp_sorted_desc *d)
+{
+    float least = terrimpi_sorted_least_scale(d->table, terrimpi_sorted_top(d->page_quads));
+    return d->low <= d->high && least > 0.0f && d->scale >= least && d->low_far >= 0.0f &&
+           d->low_height >= 0.0f && d->texels_per_px > 0.0f &&
+           terrimpi_is_power(d->page_texels, 1u, 65536u) &&
+           terrimpi_within_u32(d->texture_level_count, 1u, 16u) &&
+           terrimpi_is_power(d->texture_window, 1u, 32768u);
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_desc_resolve(const terrimp_sorted_desc *in,
+                                                       terrimp_sorted_desc *out)
+{
+    terrimp_sorted_desc d;
+    TERRIMPI_REFUSE(!in || !out, TERRIMP_E_NULL);
+    d = *in;
+    TERRIMPI_DEFAULT(d.page_quads, 64u);
+    TERRIMPI_DEFAULT(d.scale, 12.0f);
+    TERRIMPI_DEFAULT(d.page_texels, 256u);
+    TERRIMPI_DEFAULT(d.texture_level_count, 1u);
+    TERRIMPI_DEFAULT(d.texels_per_px, 1.0f);
+    TERRIMPI_DEFAULT(d.texture_window, 32u);
+    TERRIMPI_REFUSE(!terrimpi_finite2(d.low, d.high) || !terrimpi_finite2(d.scale, d.low_far) ||
+                    !terrimpi_finite2(d.low_height, d.texels_per_px), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_is_power(d.page_quads, 2u, 1u << (TERRIMP_SORTED_LEVELS - 1)) ||
+                    !terrimpi_sorted_numbers_ok(&d), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(d.page && !(d.low < d.high || d.low > 0.0f || d.low < 0.0f), TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_sorted_resolve_field(&d, &d.field));
+    *out = d;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
+                                               terrimp_sorted *sorted)
+{
+    terrimp_sorted_desc d;
+    TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_sorted_desc_resolve(desc, &d));
+    if (d.low == 0.0f && d.high == 0.0f) {
+        TERRIMPI_TRY(terrimp_heightfield_validate(&d.field, NULL, NULL));
+        TERRIMPI_TRY(terrimp_heightfield_bounds(&d.field, 0, 0, d.field.width, d.field.depth,
+                                                &d.low, &d.high));
+    }
+    memset(sorted, 0, sizeof *sorted);
+    sorted->desc = d;
+    sorted->scale = d.scale;
+    sorted->top = terrimpi_sorted_top(d.page_quads);
+    sorted->least_scale = terrimpi_sorted_least_scale(d.table, sorted->top);
+    sorted->pages[0] = (d.field.width - 2u) / d.page_quads + 1u;
+    sorted->pages[1] = (d.field.depth - 2u) / d.page_quads + 1u;
+    sorted->depth = -1;
+    return TERRIMP_OK;
+}
+
+/* ---- the footprint ---- */
+
+/* Points in plan, in samples from the corner of the eye's page. */
+typedef struct terrimpi_hull {
+    float at[16][2];
+    int count;
+    float farthest; /* from the corner, along an axis */
+} terrimpi_hull;
+
+static void terrimpi_hull_add(terrimpi_hull *hull, const float a[3], const float b[3], float part)
+{
+    float *at = hull->at[hull->count++];
+    at[0] = a[0] + (b[0] - a[0]) * part;
+    at[1] = a[2] + (b[2] - a[2]) * part;
+    hull->farthest = terrimpi_max(hull->farthest, terrimpi_max(terrimpi_abs(at[0]),
+                                                               terrimpi_abs(at[1])));
+}
+
+/* Adds where an edge of the frustum ends or leaves the heights that there are. */
+static void terrimpi_hull_edge(terrimpi_hull *hull, const float a[3], const float b[3], float low,
+                               float high)
+{
+    if (terrimpi_within(a[1], low, high))
+        terrimpi_hull_add(hull, a, b, 0.0f);
+    if ((a[1] < low) != (b[1] < low))
+        terrimpi_hull_add(hull, a, b, (low - a[1]) / (b[1] - a[1]));
+    if ((a[1] > high) != (b[1] > high))
+        terrimpi_hull_add(hull, a, b, (high - a[1]) / (b[1] - a[1]));
+}
+
+/* The corners, in plan, of what of the frustum lies between the lowest and the highest height:
+   edges from the eye to the corners at z_far, and from each of these to the next. */
+static void terrimpi_hull_frustum(const terrimp_sorted_desc *d, const terrimp_camera *camera,
+                                  float z_far, const float eye[3], terrimpi_hull *hull)
+{
+    float corner[4][3];
+    terrimp_capture c;
+    int i, k;
+    terrimpi_camera_capture(camera, &c);
+    for (i = 0; i < 4; i++)
+        for (k = 0; k < 3; k++) {
+            float across = i == 0 || i == 3 ? c.tan_left : c.tan_right;
+            float way = c.forward[k] + c.right[k] * across +
+                        c.up[k] * (i < 2 ? c.tan_down : c.tan_up);
+            float size = k == 0 ? d->field.spacing_x : k == 2 ? d->field.spacing_z : 1.0f;
+            corner[i][k] = eye[k] + way * z_far / size;
+        }
+    hull->count = 0;
+    hull->farthest = 0.0f;
+    for (i = 0; i < 4; i++) {
+        terrimpi_hull_edge(hull, eye, corner[i], d->low, d->high);
+        terrimpi_hull_edge(hull, corner[i], corner[(i + 1) & 3], d->low, d->high);
+    }
+}
+
+/* Which of the points lies farthest to the right of the way from one of them in a direction: the
+   next corner of the convex hull, counter-clockwise with x to the right and z up. */
+static int terrimpi_hull_next(const terrimpi_hull *hull, int from)
+{
+    int i, best = from;
+    float x = 0.0f, z = 0.0f;
+    for (i = 0; i < hull->count; i++) {
+        float to_x = hull->at[i][0] - hull->at[from][0], to_z = hull->at[i][1] - hull->at[from][1];
+        float turn = x * to_z - z * to_x;
+        int farther = to_x * to_x + to_z * to_z > x * x + z * z;
+        if (turn < 0.0f || (turn == 0.0f && farther)) {
+            best = i;
+            x = to_x;
+            z = to_z;
+        }
+    }
+    return best;
+}
+
+/* A side of the footprint: its direction is rounded, but none of the points is left outside, nor
+   what is within a sample of them. */
+static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_hull *hull, float x, float z)
+{
+    float size = 8192.0f / terrimpi_max(terrimpi_abs(x), terrimpi_abs(z)), least = 0.0f;
+    terrimp_sorted_int *side = s->sides[s->side_count++];
+    int i;
+    side[0] = (terrimp_sorted_int)(-z * size);
+    side[1] = (terrimp_sorted_int)(x * size);
+    for (i = 0; i < hull->count; i++) {
+        float at = (float)side[0] * hull->at[i][0] + (float)side[1] * hull->at[i][1];
+        least = i == 0 ? at : terrimpi_min(least, at);
+    }
+    side[2] = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
+}
+
+static int32_t terrimpi_floor(float value)
+{
+    int32_t whole = (int32_t)value;
+    return (float)whole > value ? whole - 1 : whole;
+}
+
+/* The convex hull of the points, and the pages between its ends along each axis. Of a hull with
+   more sides than can be kept the last ones are left out: what is drawn too much does not show. */
+static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_hull *hull)
+{
+    float page = (float)s->desc.page_quads;
+    int i, k, first = 0, from, to, least[2] = { 0, 0 }, most[2] = { 0, 0 };
+    s->side_count = 0;
+    for (i = 0; i < hull->count; i++)
+        for (k = 0; k < 2; k++) {
+            const float *p = hull->at[i], *q = hull->at[least[k]];
+            least[k] = p[k] < q[k] || (p[k] == q[k] && p[1 - k] < q[1 - k]) ? i : least[k];
+            most[k] = hull->at[i][k] > hull->at[most[k]][k] ? i : most[k];
+        }
+    for (k = 0; k < 2; k++) {
+        s->bounds[k][0] = terrimpi_floor((hull->at[least[k]][k] - 1.0f) / page);
+        s->bounds[k][1] = terrimpi_floor((hull->at[most[k]][k] + 1.0f) / page);
+    }
+    for (from = first = least[0]; s->side_count < TERRIMP_SORTED_SIDES; from = to) {
+        float x, z;
+        to = terrimpi_hull_next(hull, from);
+        x = hull->at[to][0] - hull->at[from][0];
+        z = hull->at[to][1] - hull->at[from][1];
+        if (to == from || !(x * x + z * z > 0.0f))
+            return;
+        terrimpi_sorted_side(s, hull, x, z);
+        if (to == first)
+            return;
+    }
+}
+
+/* Which of the sides of a mask cross a square; -1: it is outside of one. */
+static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], int32_t size,
+                                 uint32_t mask)
+{
+    uint32_t i, crossing = 0;
+    for (i = 0; mask >> i; i++) {
+        const terrimp_sorted_int *n = s->sides[i];
+        terrimp_sorted_int here, most, least;
+        if (!(mask >> i & 1u))
+            continue;
+        here = n[0] * at[0] + n[1] * at[1] + n[2];
+        most = here + (n[0] > 0 ? n[0] : 0) * size + (n[1] > 0 ? n[1] : 0) * size;
+        least = here + (n[0] < 0 ? n[0] : 0) * size + (n[1] < 0 ? n[1] : 0) * size;
+        if (most < 0)
+            return -1;
+        if (least < 0)
+            crossing |= 1u << i;
+    }
+    return (int)crossing;
+}
+
+/* First and last page of a row that the footprint can touch. */
+static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *first,
+                                int32_t *last)
+{
+    int along = s->row_axis, across = 1 - along;
+    float page = (float)s->desc.page_quads, low = (float)row * page;
+    uint32_t i;
+    *first = s->bounds[along][0];
+    *last = s->bounds[along][1];
+    for (i = 0; i < s->side_count; i++) {
+        float n = (float)s->sides[i][along], m = (float)s->sides[i][across];
+        float at = -((float)s->sides[i][2] + m * (m > 0.0f ? low + page : low)) / n;
+        if (n > 0.0f && at > (float)*first * page)
+            *first = terrimpi_floor(at / page - 0.01f);
+        else if (n < 0.0f && at < (float)*last * page)
+            *last = terrimpi_floor(at / page + 0.01f);
+    }
+}
+
+/* ---- levels ---- */
+
+/* The square of the distance, along an axis, from the eye to an interval of samples. */
+static terrimp_sorted_int terrimpi_sorted_away(const terrimp_sorted *s, int axis, int32_t low,
+                                               int32_t size)
+{
+    terrimp_sorted_int before = low * s->unit[axis] - s->eye[axis];
+    terrimp_sorted_int beyond = before + size * s->unit[axis];
+    terrimp_sorted_int away = before > 0 ? before : beyond < 0 ? beyond : 0;
+    return away * away;
+}
+
+/* The square of a number of units, or more than any distance. */
+static terrimp_sorted_int terrimpi_sorted_square(const terrimp_sorted *s, float units)
+{
+    terrimp_sorted_int whole;
+    if (!(units < (float)s->limit))
+        return TERRIMPI_SORTED_NEVER;
+    whole = (terrimp_sorted_int)units;
+    return whole * whole;
+}
+
+static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
+{
+    float unit = (float)(s->unit[0] > s->unit[1] ? s->unit[0] : s->unit[1]), begins = 0.0f;
+    uint32_t level;
+    s->scale = scale;
+    for (level = 0; level <= s->top; level++) {
+        float size = unit * (float)(1u << level), range;
+        s->split[level] = terrimpi_sorted_square(s, begins);
+        s->whole[level] = terrimpi_sorted_square(s, begins + 1.875f * size);
+        begins = scale * (s->desc.table && level < s->top ? s->desc.table[level + 1] * unit
+                                                           : 2.0f * size);
+        begins = (float)terrimpi_floor(terrimpi_min(begins, (float)s->limit));
+        range = (float)(terrimpi_sorted_square(s, begins) - s->whole[level]);
+        s->fade[level] = range > 1.0f ? 1.0f / range : 1.0f;
+    }
+    s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
+}
+
+/* Which sides of a square are split, for its neighbours are: bits as in the patterns of nodes. */
+static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s, const int32_t at[2],
+                                        uint32_t level)
+{
+    int32_t size = 1 << level;
+    terrimp_sorted_int x, z, split = s->split[level] - s->rise;
+    if (level == 0)
+        return 0;
+    x = terrimpi_sorted_away(s, 0, at[0], size);
+    z = terrimpi_sorted_away(s, 1, at[1], size);
+    return (uint32_t)(x + terrimpi_sorted_away(s, 1, at[1] - size, size) < split) |
+           (uint32_t)(x + terrimpi_sorted_away(s, 1, at[1] + size, size) < split) << 1 |
+           (uint32_t)(z + terrimpi_sorted_away(s, 0, at[0] - size, size) < split) << 2 |
+           (uint32_t)(z + terrimpi_sorted_away(s, 0, at[0] + size, size) < split) << 3;
+}
+
+/* ---- the order ---- */
+
+/* The k-th of count places from first on, from both ends towards that of the eye, or away from
+   it. */
+static int32_t terrimpi_outside_in(int32_t first, int32_t count, int32_t eye, int32_t k, int away)
+{
+    int32_t last = first + count - 1;
+    eye = eye < first ? first : eye > last ? last : eye;
+    k = away ? count - 1 - k : k;
+    return k < last - eye ? last - k : first + (k - (last - eye));
+}
+
+static void terrimpi_sorted_restart(terrimp_sorted *s)
+{
+    s->rows = s->bounds[1 - s->row_axis][1] - s->bounds[1 - s->row_axis][0] + 1;
+    s->row = s->col = s->cols = 0;
+    s->depth = -1;
+    s->triangle_count = 0;
+}
+
+/* Pushes a square on the stack, or makes it the present one: then it returns 1. */
+static int terrimpi_sorted_visit(terrimp_sorted *s, const int32_t at[2], uint32_t level,
+                                 uint32_t mask)
+{
+    int sides = terrimpi_sorted_sides(s, at, 1 << level, mask);
+    if (sides < 0 || at[0] - s->corner[0] >= s->last[0] || at[1] - s->corner[1] >= s->last[1])
+        return 0;
+    s->at[0] = at[0];
+    s->at[1] = at[1];
+    s->level = level;
+    if (!(terrimpi_sorted_away(s, 0, at[0], 1 << level) +
+          terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise < s->split[level]))
+        return 1;
+    s->depth++;
+    s->stack[s->depth].at[0] = at[0];
+    s->stack[s->depth].at[1] = at[1];
+    s->stack[s->depth].sides = (uint16_t)sides;
+    s->stack[s->depth].child = 0;
+    return 0;
+}
+
+/* Looks at the next quarter of the square on top of the stack. Rows come before columns. */
+static int terrimpi_sorted_quarter(terrimp_sorted *s)
+{
+    uint32_t k = s->stack[s->depth].child++, level = s->top - (uint32_t)s->depth - 1u;
+    int32_t half = 1 << level, at[2];
+    int axis;
+    if (k == 4u) {
+        s->depth--;
+        return 0;
+    }
+    k = s->desc.front_to_back ? 3u - k : k;
+    for (axis = 0; axis < 2; axis++) {
+        int32_t begin = s->stack[s->depth].at[axis];
+        int eye_beyond = s->eye[axis] >= (begin + half) * s->unit[axis];
+        uint32_t closer = axis == s->row_axis ? k & 1u : k >> 1;
+        at[axis] = begin + ((int)closer == eye_beyond ? half : 0);
+    }
+    return terrimpi_sorted_visit(s, at, level, s->stack[s->depth].sides);
+}
+
+/* ---- pages ---- */
+
+/* The level at which a page's texels are no smaller than pixels at its closest point. One that was
+   left is entered again only a tenth farther on. */
+static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int32_t page[2])
+{
+    const terrimp_sorted_desc *d = &s->desc;
+    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0], (int32_t)d->page_quads) +
+                              terrimpi_sorted_away(s, 1, s->corner[1], (int32_t)d->page_quads) +
+                              s->rise;
+    uint32_t window = d->texture_window - 1u, level = 0;
+    uint8_t *kept = d->texture_levels;
+    if (kept)
+        kept += ((uint32_t)page[1] & window) * d->texture_window + ((uint32_t)page[0] & window);
+    if (kept && *kept < d->texture_level_count) {
+        level = *kept;
+        while (level > 0 && away >> 2u * (level - 1u) < s->texel_steps[1])
+            level--;
+    }
+    while (level + 1u < d->texture_level_count &&
+           away >> 2u * level >= s->texel_steps[kept && *kept <= level ? 2 : 0])
+        level++;
+    if (kept)
+        *kept = (uint8_t)level;
+    return level;
+}
+
+/* A page's column or row in a field that wraps. */
+static uint32_t terrimpi_sorted_tile(int32_t page, uint32_t count)
+{
+    int32_t tile = page % (int32_t)count;
+    return (uint32_t)(tile < 0 ? tile + (int32_t)count : tile);
+}
+
+/* Where the field has a page's samples. */
+static void terrimpi_sorted_field_page(terrimp_sorted *s, terrimp_sorted_page *page)
+{
+    const terrimp_heightfield *f = &s->desc.field;
+    uint32_t quads = s->desc.page_quads, x = terrimpi_sorted_tile(page->x, s->pages[0]) * quads;
+    uint32_t z = terrimpi_sorted_tile(page->z, s->pages[1]) * quads;
+    page->samples = (const char *)terrimpi_row(f, z) + x * terrimpi_sample_bytes(f->format);
+    page->row_bytes = f->row_bytes;
+    s->last[0] = (int32_t)terrimpi_min_u32(quads, f->width - 1u - x);
+    s->last[1] = (int32_t)terrimpi_min_u32(quads, f->depth - 1u - z);
+    s->partial = s->last[0] < (int32_t)quads || s->last[1] < (int32_t)quads;
+}
+
+/* Asks the host for a page and for how much of those beside it is here: along a side heights are
+   those that both have. Returns 0 when it is not to be drawn. */
+static int terrimpi_sorted_ask(terrimp_sorted *s, terrimp_sorted_page *page)
+{
+    int i;
+    s->partial = 0;
+    s->desc.page(s->desc.user, page);
+    if (page->level > s->top || !page->samples)
+        return 0;
+    for (i = 0; i < 4; i++) {
+        terrimp_sorted_page beside = *page;
+        beside.x += (i == TERRIMP_SIDE_X1) - (i == TERRIMP_SIDE_X0);
+        beside.z += (i == TERRIMP_SIDE_Z1) - (i == TERRIMP_SIDE_Z0);
+        beside.only_level = 1;
+        beside.level = 0;
+        s->desc.page(s->desc.user, &beside);
+        if (beside.level > s->top)
+            beside.level = 0;
+        s->side_levels[i] = (uint8_t)terrimpi_max_u32(page->level, beside.level);
+        s->partial |= s->side_levels[i] > 0;
+    }
+    return 1;
+}
+
+/* Goes to a page, counted from the eye's. to_count: only its squares are of interest. */
+static int terrimpi_sorted_enter(terrimp_sorted *s, const int32_t place[2], int to_count)
+{
+    int32_t page[2], quads = (int32_t)s->desc.page_quads;
+    int axis;
+    for (axis = 0; axis < 2; axis++) {
+        page[axis] = place[axis] + s->eye_page[axis];
+        s->corner[axis] = place[axis] * quads;
+        s->last[axis] = quads;
+    }
+    memset(&s->page, 0, sizeof s->page);
+    s->page.x = page[0];
+    s->page.z = page[1];
+    if (!s->desc.page)
+        terrimpi_sorted_field_page(s, &s->page);
+    if (!to_count) {
+        s->page.texture_level = terrimpi_sorted_texture_level(s, page);
+        if (s->desc.page && !terrimpi_sorted_ask(s, &s->page))
+            return 0;
+    }
+    return terrimpi_sorted_visit(s, s->corner, s->top, (1u << s->side_count) - 1u);
+}
+
+/* Goes to the next page of the frame. Returns 1 when it is the present square, 0 when it is to be
+   looked into, -1 when there is none. */
+static int terrimpi_sorted_next_page(terrimp_sorted *s, int to_count)
+{
+    int along = s->row_axis, across = 1 - along;
+    int32_t place[2];
+    while (s->col >= s->cols) {
+        int32_t last;
+        if (s->row >= s->rows)
+            return -1;
+        s->page_row = terrimpi_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
+                                          s->desc.front_to_back);
+        terrimpi_sorted_row(s, s->page_row, &s->first_col, &last);
+        s->cols = last - s->first_col + 1;
+        s->col = 0;
+    }
+    place[across] = s->page_row;
+    place[along] = terrimpi_outside_in(s->first_col, s->cols, 0, s->col++,
+                                       s->desc.front_to_back);
+    return terrimpi_sorted_enter(s, place, to_count);
+}
+
+/* Goes to the next square; 0: there is none. */
+static int terrimpi_sorted_step(terrimp_sorted *s, int to_count)
+{
+    for (;;) {
+        int found = s->depth < 0 ? terrimpi_sorted_next_page(s, to_count)
+                                 : terrimpi_sorted_quarter(s);
+        if (found != 0)
+            return found > 0;
+    }
+}
+
+/* ---- heights ---- */
+
+static uint32_t terrimpi_sorted_alignment(const terrimp_sorted *s, int32_t x, int32_t z,
+                                          uint32_t least)
+{
+    uint32_t bits = (uint32_t)x | (uint32_t)z;
+    while (least < s->top && !(bits >> least & 1u))
+        least++;
+    return least;
+}
+
+static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t at)
+{
+    return at < s->last[axis] ? at : s->last[axis];
+}
+
+/* A sample of the page as it is stored; column and row are of those that are here. */
+static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    const void *row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
+    const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
+    switch (s->desc.field.format) {
+    case TERRIMP_FORMAT_U8: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
+    case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
+    case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
+    default: return (terrimp_sorted_height)((const float *)row)[x];
+    }
+}
+
+/* From which level on the heights at a place of the page are here. */
+static uint32_t terrimpi_sorted_here(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    int32_t quads = (int32_t)s->desc.page_quads;
+    uint32_t level = s->page.level;
+    if (z == 0)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z0]);
+    if (z == quads)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z1]);
+    if (x == 0)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X0]);
+    if (x == quads)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X1]);
+    return level;
+}
+
+static terrimp_sorted_height terrimpi_sorted_solid(const terrimp_sorted *s, int32_t x, int32_t z);
+
+/* from + (to - from) * part / whole. Halves are exact, so that an edge is the same for both. */
+static terrimp_sorted_height terrimpi_sorted_mix(terrimp_sorted_height from,
+                                                 terrimp_sorted_height to, int32_t part,
+                                                 int32_t whole)
+{
+    if (part * 2 == whole)
+        return (from + to) / 2;
+#ifdef TERRIMP_FIXED
+    return from + (to - from) / 16 * part / whole * 16;
+#else
+    return from + (to - from) * ((float)part / (float)whole);
+#endif
+}
+
+/* The height at a place of the page when only every step-th sample is there. */
+static terrimp_sorted_height terrimpi_sorted_flat(const terrimp_sorted *s, int32_t x, int32_t z,
+                                                  int32_t step)
+{
+    int32_t quads = (int32_t)s->desc.page_quads;
+    int32_t x0 = x == quads ? x - step : x - x % step, z0 = z == quads ? z - step : z - z % step;
+    int32_t left = terrimpi_sorted_clamp(s, 0, x0), back = terrimpi_sorted_clamp(s, 1, z0);
+    int32_t u = terrimpi_sorted_clamp(s, 0, x) - left, v = terrimpi_sorted_clamp(s, 1, z) - back;
+    int32_t width = terrimpi_sorted_clamp(s, 0, x0 + step) - left;
+    int32_t depth = terrimpi_sorted_clamp(s, 1, z0 + step) - back;
+    int on_right = u == width && u > 0, on_front = v == depth && v > 0;
+    terrimp_sorted_height from, corner;
+    if (u == 0 || on_right) {
+        x0 += on_right ? step : 0;
+        from = terrimpi_sorted_solid(s, x0, z0 + (on_front ? step : 0));
+        return v == 0 || on_front ? from : terrimpi_sorted_mix(
+            from, terrimpi_sorted_solid(s, x0, z0 + step), v, depth);
+    }
+    if (v == 0 || on_front) {
+        z0 += on_front ? step : 0;
+        return terrimpi_sorted_mix(terrimpi_sorted_solid(s, x0, z0),
+                                   terrimpi_sorted_solid(s, x0 + step, z0), u, width);
+    }
+    from = terrimpi_sorted_solid(s, x0, z0);
+    if (u * depth == v * width)
+        return terrimpi_sorted_mix(from, terrimpi_sorted_solid(s, x0 + step, z0 + step), v, depth);
+    if (u * depth > v * width) {
+        corner = terrimpi_sorted_solid(s, x0 + step, z0);
+        return terrimpi_sorted_mix(from, corner, u, width) - corner + terrimpi_sorted_mix(
+            corner, terrimpi_sorted_solid(s, x0 + step, z0 + step), v, depth);
+    }
+    corner = terrimpi_sorted_solid(s, x0, z0 + step);
+    return terrimpi_sorted_mix(from, corner, v, depth) - corner + terrimpi_sorted_mix(
+        corner, terrimpi_sorted_solid(s, x0 + step, z0 + step), u, width);
+}
+
+/* The height of a place without blending. Of a page that is not all here, the place may lie in a
+   square of samples that are, these on a side that is shared with a page of which less is here:
+   three times round at most. */
+static terrimp_sorted_height terrimpi_sorted_solid(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    uint32_t here = s->partial ? terrimpi_sorted_here(s, x, z) : 0;
+    if (here == 0 || terrimpi_sorted_alignment(s, x, z, 0) >= here)
+        return terrimpi_sorted_sample(s, terrimpi_sorted_clamp(s, 0, x) >> s->page.level,
+                                      terrimpi_sorted_clamp(s, 1, z) >> s->page.level);
+    return terrimpi_sorted_flat(s, x, z, 1 << here);
+}
+
+/* What a vertex on the grid of a level rests on where that of the next one begins: mostly the
+   middle between two others, at its sides or on the diagonal. */
+static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s, int32_t x, int32_t z,
+                                                  uint32_t level)
+{
+    int32_t step_x = x & 1 << level, step_z = z & 1 << level;
+    if (s->partial)
+        return terrimpi_sorted_flat(s, x, z, 2 << level);
+    return (terrimpi_sorted_sample(s, x - step_x, z - step_z) +
+            terrimpi_sorted_sample(s, x + step_x, z + step_z)) / 2;
+}
+
+/* The height of a vertex on the grid of a level, on which others no longer rest. */
+static terrimp_sorted_height terrimpi_sorted_blend(const terrimp_sorted *s, int32_t x, int32_t z,
+                                                   uint32_t level, terrimp_sorted_int away)
+{
+    terrimp_sorted_height rest = terrimpi_sorted_rest(s, x, z, level);
+    terrimp_sorted_int left = s->split[level + 1u] - away;
+    if (left <= 0)
+        return rest;
+#ifdef TERRIMP_FIXED
+    {
+        terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
+        int shift = range < 1 << 16 ? 0 : 15;
+        return rest + (terrimpi_sorted_solid(s, x, z) - rest) / 64 *
+                      ((left >> shift) * 64 / ((range >> shift) + 1));
+    }
+#else
+    return rest + (terrimpi_sorted_solid(s, x, z) - rest) *
+                  terrimpi_min((float)left * s->fade[level], 1.0f);
+#endif
+}
+
+/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. */
+static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *out, int32_t x,
+                                int32_t z, uint32_t level)
+{
+    terrimp_sorted_vertex *v = &out->vertices[out->vertex_count++];
+    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0] + x, 0) +
+                              terrimpi_sorted_away(s, 1, s->corner[1] + z, 0) + s->rise;
+    terrimp_sorted_height height;
+    v->x = s->page.x * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 0, x);
+    v->z = s->page.z * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 1, z);
+    if (away > s->whole[level])
+        level = terrimpi_sorted_alignment(s, x, z, level);
+    if (away > s->whole[level])
+        height = terrimpi_sorted_blend(s, x, z, level, away);
+    else
+        height = terrimpi_sorted_solid(s, x, z);
+#ifdef TERRIMP_FIXED
+    v->height = height;
+#else
+    v->height = terrimpi_world_height(&s->desc.field, height);
+#endif
+}
+
+/* ---- triangles ---- */
+
+/* Appends a triangle; the other half's turn the other way. */
+static void terrimpi_sorted_triangle(terrimp_sorted_square *out, int a, int b, int c, int turned)
+{
+    uint8_t *indices = out->indices + 3 * out->triangle_count++;
+    indices[0] = (uint8_t)a;
+    indices[1] = (uint8_t)(turned ? c : b);
+    indices[2] = (uint8_t)(turned ? b : c);
+}
+
+/* Whether of the two sides of the plane through a and b the one with the half's corner comes first
+   in the order. In the half that is not turned it is to the right of the way from a to b. */
+static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_sorted_square *out,
+                                        int a, int b, int turned)
+{
+    const terrimp_sorted_vertex *from = &out->vertices[a], *to = &out->vertices[b];
+    int32_t quads = (int32_t)s->desc.page_quads;
+    terrimp_sorted_int x = (from->x - s->eye_page[0] * quads) * s->unit[0] - s->eye[0];
+    terrimp_sorted_int z = (from->z - s->eye_page[1] * quads) * s->unit[1] - s->eye[1];
+    terrimp_sorted_int way_x = (to->x - from->x) * s->unit[0];
+    terrimp_sorted_int way_z = (to->z - from->z) * s->unit[1];
+    int eye_left = way_z * x - way_x * z > 0;
+    return (eye_left != turned) != (s->desc.front_to_back != 0);
+}
+
+/* The two pieces of the half that the plane through a and b cuts: one of the triangle (a, b, apex)
+   on the side of the corner, one of (b, a, rest). */
+static void terrimpi_sorted_cut(const terrimp_sorted *s, terrimp_sorted_square *out, int a, int b,
+                                int corner, int rest, int turned)
+{
+    int first = terrimpi_sorted_corner_first(s, out, a, b, turned);
+    if (first)
+        terrimpi_sorted_triangle(out, a, b, corner, turned);
+    terrimpi_sorted_triangle(out, b, a, rest, turned);
+    if (!first)
+        terrimpi_sorted_triangle(out, a, b, corner, turned);
+}
+
+/* Half of a square: the triangle of vertices 0, 3 and corner, whose sides that meet in the corner
+   may have vertices in the middle (0: none), begin towards 0, end towards 3. */
+static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out, int corner,
+                                 int begin, int end, int turned)
+{
+    int first;
+    if (begin && end) {
+        first = terrimpi_sorted_corner_first(s, out, begin, end, turned);
+        if (first)
+            terrimpi_sorted_triangle(out, begin, end, corner, turned);
+        terrimpi_sorted_cut(s, out, 0, end, begin, 3, turned);
+        if (!first)
+            terrimpi_sorted_triangle(out, begin, end, corner, turned);
+    } else if (begin) {
+        terrimpi_sorted_cut(s, out, begin, 3, corner, 0, turned);
+    } else if (end) {
+        terrimpi_sorted_cut(s, out, 0, end, corner, 3, turned);
+    } else {
+        terrimpi_sorted_triangle(out, 0, 3, corner, turned);
+    }
+}
+
+/* The triangles of a square, of whose sides some have a vertex in the middle. */
+static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_square *out,
+                                      const int middle[4])
+{
+    static const uint8_t plain[2][6] = { { 0, 2, 3, 0, 3, 1 }, { 0, 3, 1, 0, 2, 3 } };
+    int first = terrimpi_sorted_corner_first(s, out, 0, 3, 0), i;
+    if (out->vertex_count == 4) {
+        memcpy(out->indices, plain[first], sizeof plain[0]);
+        out->triangle_count = 2;
+        return;
+    }
+    out->triangle_count = 0;
+    for (i = 0; i < 2; i++)
+        if (i != first)
+            terrimpi_sorted_half(s, out, 1, middle[TERRIMP_SIDE_Z0], middle[TERRIMP_SIDE_X1], 0);
+        else
+            terrimpi_sorted_half(s, out, 2, middle[TERRIMP_SIDE_X0], middle[TERRIMP_SIDE_Z1], 1);
+}
+
+/* Writes the present square. */
+static void terrimpi_sorted_emit(const terrimp_sorted *s, terrimp_sorted_square *out)
+{
+    uint32_t pattern = terrimpi_sorted_pattern(s, s->at, s->level);
+    int32_t x = s->at[0] - s->corner[0], z = s->at[1] - s->corner[1], size = 1 << s->level;
+    int32_t half = size / 2;
+    int i, middle[4] = { 0, 0, 0, 0 };
+    out->page_x = s->page.x;
+    out->page_z = s->page.z;
+    out->level = (uint8_t)s->level;
+    out->texture_level = (uint8_t)s->page.texture_level;
+    out->vertex_count = 0;
+    for (i = 0; i < 4; i++)
+        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level);
+    for (i = 0; pattern >> i; i++)
+        if (pattern >> i & 1u) {
+            middle[i] = out->vertex_count;
+            terrimpi_sorted_put(s, out, x + (i < 2 ? half : (i & 1) * size),
+                                z + (i < 2 ? (i & 1) * size : half), s->level - 1u);
+        }
+    terrimpi_sorted_triangles(s, out, middle);
+}
+
+TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
+                                         uint32_t capacity)
+{
+    uint32_t count = 0;
+    while (sorted && squares && count < capacity && terrimpi_sorted_step(sorted, 0)) {
+        terrimpi_sorted_emit(sorted, &squares[count]);
+        sorted->triangle_count += squares[count++].triangle_count;
+    }
+    return count;
+}
+
+TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
+                                         const terrimp_sorted_vertex *vertex, float position[3])
+{
+    const terrimp_heightfield *f = &sorted->desc.field;
+    position[0] = terrimpi_float(f->origin_x + (float)vertex->x * f->spacing_x);
+    position[2] = terrimpi_float(f->origin_z + (float)vertex->z * f->spacing_z);
+#ifdef TERRIMP_FIXED
+    position[1] = terrimpi_world_height(f, (float)vertex->height * (1.0f / 256.0f));
+#else
+    position[1] = vertex->height;
+#endif
+}
+
+TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
+{
+    float ratio = target_ms / ms, next;
+    if (!terrimpi_finite2(ms, target_ms) || !(ms > 0.0f) || !(target_ms > 0.0f) ||
+        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+        return triangles;
+    next = (float)triangles * terrimpi_clamp(ratio, 0.95f, 1.02f);
+    if (next >= 4294967040.0f)
+        return triangles;
+    return ratio > 1.0f ? triangles + (uint32_t)(next - (float)triangles) + 1u : (uint32_t)next;
+}
+
+/* The three texels of a line that are mixed at one of them: before, itself, after. At an end where
+   nothing is repeated it is but itself. */
+static void terrimpi_sorted_taps(uint32_t at, uint32_t count, int wrap, uint32_t taps[3])
+{
+    int inside = at > 0 && at + 1u < count;
+    taps[0] = inside ? at - 1u : wrap ? count - 2u : at;
+    taps[1] = at;
+    taps[2] = inside ? at + 1u : wrap ? 1u : at;
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
+                                                uint32_t height, uint32_t channels, int wrap,
+                                                uint8_t *out)
+{
+    static const uint32_t weights[3] = { 1, 2, 1 };
+    uint32_t x, y, c, i, k, across[3], down[3];
+    TERRIMPI_REFUSE(!texels || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 3, TERRIMP_MAX_DIM) || width % 2u == 0 ||
+                    !terrimpi_within_u32(height, 3, TERRIMP_MAX_DIM) || height % 2u == 0 ||
+                    !terrimpi_within_u32(channels, 1, 4), TERRIMP_E_RANGE);
+    for (y = 0; y < height; y += 2u) {
+        terrimpi_sorted_taps(y, height, wrap, down);
+        for (x = 0; x < width; x += 2u) {
+            terrimpi_sorted_taps(x, width, wrap, across);
+            for (c = 0; c < channels; c++) {
+                uint32_t sum = 8;
+                for (i = 0; i < 9u; i++) {
+                    k = i / 3u;
+                    sum += weights[k] * weights[i % 3u] *
+                           texels[((size_t)down[k] * width + across[i % 3u]) * channels + c];
+                }
+                *out++ = (uint8_t)(sum / 16u);
+            }
+        }
+    }
+    return TERRIMP_OK;
+}
+
+/* ---- the frame ---- */
+
+/* The triangles of the frame at a scale. */
+static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
+{
+    uint32_t count = 0;
+    terrimpi_sorted_set_scale(s, scale);
+    terrimpi_sorted_restart(s);
+    while (terrimpi_sorted_step(s, 1))
+        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s, s->at, s->level));
+    terrimpi_sorted_restart(s);
+    return count;
+}
+
+/* Finds the scale whose triangles are 97 to 100 % of max_triangles, or the largest that does not
+   pass it. It begins with that of the frame before and asks for the count of the frame that is to
+   come: so nothing swings. Triangles go about with the square of the scale; where that guess leaves
+   what is known to be too small and too large, the next one is between. */
+static void terrimpi_sorted_solve(terrimp_sorted *s)
+{
+    const float most = (float)s->desc.max_triangles, largest = 65536.0f;
+    float low = s->least_scale, high = largest, scale = s->scale;
+    int i;
+    for (i = 0; i < 16 && low < high; i++) {
+        float count = (float)terrimpi_sorted_count(s, scale);
+        if (count <= most && (count >= 0.97f * most || scale >= largest))
+            return;
+        *(count > most ? &high : &low) = scale;
+        scale *= TERRIMP_SQRTF(0.985f * most / terrimpi_max(count, 1.0f));
+        if (!(scale > low && scale < high))
+            scale = i == 0 ? terrimpi_clamp(scale, low, high) : TERRIMP_SQRTF(low * high);
+    }
+    terrimpi_sorted_set_scale(s, low);
+}
+
+/* How far the frame reaches: the lower the eye, the closer. */
+static float terrimpi_sorted_z_far(const terrimp_sorted_desc *d, const terrimp_camera *camera)
+{
+    float span = d->low_height > 0.0f ? d->low_height : d->high - d->low, ground, part;
+    if (!(d->low_far > 0.0f) || !(d->low_far < camera->z_far) || !(span > 0.0f))
+        return camera->z_far;
+    if (d->page || terrimp_heightfield_height(&d->field, camera->eye[0], camera->eye[2], &ground))
+        ground = d->low;
+    part = terrimpi_clamp((camera->eye[1] - ground) / span, 0.0f, 1.0f);
+    return d->low_far + (camera->z_far - d->low_far) * part;
+}
+
+/* Chooses units, as fine as the squares of all distances allow, and puts the eye in its page. */
+static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3], float reach)
+{
+    const terrimp_sorted_desc *d = &s->desc;
+    float spacing[2], larger, unit = 4096.0f, rise;
+    int k;
+    spacing[0] = d->field.spacing_x;
+    spacing[1] = d->field.spacing_z;
+    larger = terrimpi_max(spacing[0], spacing[1]);
+    if (!(reach < 1024.0f * (float)d->page_quads))
+        return 0;
+    while (unit > 8.0f && !((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
+        unit *= 0.5f;
+    if (!((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
+        return 0;
+    for (k = 0; k < 2; k++) {
+        s->unit[k] = (terrimp_sorted_int)terrimpi_max(spacing[k] / larger * unit + 0.5f, 1.0f);
+        s->eye[k] = (terrimp_sorted_int)terrimpi_floor(eye[2 * k] * (float)s->unit[k]);
+    }
+    rise = terrimpi_max(terrimpi_max(eye[1] - d->high, d->low - eye[1]), 0.0f) / larger * unit;
+    s->limit = (terrimp_sorted_int)(TERRIMPI_SORTED_LIMIT - unit);
+    s->rise = terrimpi_sorted_square(s, terrimpi_min(rise, (float)(s->limit - 1)));
+    return 1;
+}
+
+/* Where texture levels begin: a texel of level 0 at distance d covers K texel / d pixels. */
+static void terrimpi_sorted_texels(terrimp_sorted *s, const terrimp_camera *camera)
+{
+    const terrimp_sorted_desc *d = &s->desc;
+    float unit = (float)(s->unit[0] > s->unit[1] ? s->unit[0] : s->unit[1]);
+    float at = 2.0f * unit * terrimpi_camera_pixel_factor(camera) * d->texels_per_px *
+               (float)d->page_quads / (float)d->page_texels;
+    s->texel_steps[0] = terrimpi_sorted_square(s, at);
+    s->texel_steps[1] = terrimpi_sorted_square(s, at / 1.1f);
+    s->texel_steps[2] = terrimpi_sorted_square(s, at * 1.1f);
+}
+
+/* Rows across the view come before columns; beyond the last page of a field there is nothing. */
+static void terrimpi_sorted_arrange(terrimp_sorted *s, const terrimp_camera *camera)
+{
+    int k;
+    s->row_axis = terrimpi_abs(camera->forward[0]) > terrimpi_abs(camera->forward[2]);
+    for (k = 0; k < 2 && !s->desc.page && !s->desc.field.wrap; k++) {
+        int32_t first = -s->eye_page[k], last = first + (int32_t)s->pages[k] - 1;
+        s->bounds[k][0] = s->bounds[k][0] > first ? s->bounds[k][0] : first;
+        s->bounds[k][1] = s->bounds[k][1] < last ? s->bounds[k][1] : last;
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
+                                                const terrimp_camera *camera)
+{
+    terrimp_camera c;
+    terrimpi_hull hull;
+    float eye[3];
+    int k;
+    TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
+    sorted->depth = -1;
+    sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
+    TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    for (k = 0; k < 3; k++) {
+        const terrimp_heightfield *f = &sorted->desc.field;
+        float quads = (float)sorted->desc.page_quads;
+        eye[k] = k == 1 ? c.eye[1] : k == 0 ? (c.eye[0] - f->origin_x) / f->spacing_x
+                                            : (c.eye[2] - f->origin_z) / f->spacing_z;
+        if (k == 1)
+            continue;
+        TERRIMPI_REFUSE(!(terrimpi_abs(eye[k]) < 8388608.0f), TERRIMP_E_RANGE);
+        sorted->eye_page[k / 2] = terrimpi_floor(eye[k] / quads);
+        eye[k] -= (float)sorted->eye_page[k / 2] * quads;
+    }
+    terrimpi_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye, &hull);
+    TERRIMPI_REFUSE(!terrimpi_sorted_units(sorted, eye, hull.farthest), TERRIMP_E_RANGE);
+    if (hull.count == 0)
+        return TERRIMP_OK;
+    terrimpi_sorted_footprint(sorted, &hull);
+    terrimpi_sorted_arrange(sorted, &c);
+    terrimpi_sorted_texels(sorted, &c);
+    if (sorted->desc.max_triangles)
+        terrimpi_sorted_solve(sorted);
+    else
+        terrimpi_sorted_set_scale(sorted, sorted->desc.scale);
+    terrimpi_sorted_restart(sorted);
+    return TERRIMP_OK;
+}
 
 /* ==== stop here if you only draw what has been built ====================== */
 
@@ -11220,6 +12900,192 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     return TERRIMP_OK;
 }
 
+/* ==== Visible sets ======================================================= >>impl-visible-sets */
+
+/* ---- walls ---- */
+
+/* A node whose walls are built. */
+typedef struct terrimpi_wall_site {
+    const terrimp_quadtree *tree;
+    const unsigned char *walls;
+    terrimpi_wall_form form;
+    terrimp_node node;
+} terrimpi_wall_site;
+
+/* The lowest sample of a cell of a line, at level 0. */
+static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
+                                  uint32_t cell)
+{
+    const terrimp_heightfield *field = &s->tree->field;
+    uint32_t quads = s->tree->chunk_quads, k;
+    uint32_t line = (axis == 0 ? s->node.x : s->node.z) * quads + row * s->form.quads;
+    uint32_t from = (axis == 0 ? s->node.z : s->node.x) * quads + cell * s->form.quads;
+    uint32_t last = (axis == 0 ? field->depth : field->width) - 1u;
+    float lowest = TERRIMPI_FLOAT_MAX;
+    line = terrimpi_min_u32(line, (axis == 0 ? field->width : field->depth) - 1u);
+    for (k = 0; k <= s->form.quads; k++) {
+        uint32_t at = terrimpi_min_u32(from + k, last);
+        lowest = terrimpi_min(lowest, axis == 0 ? terrimpi_sample(field, line, at)
+                                                : terrimpi_sample(field, at, line));
+    }
+    return lowest;
+}
+
+/* The lowest height of a cell: above level 0 of the two that its children have there; FLOAT_MAX
+   where there is no child. */
+static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
+                               uint32_t cell)
+{
+    const uint32_t cells = s->form.cells;
+    uint32_t line = 2u * row, k;
+    float lowest = TERRIMPI_FLOAT_MAX;
+    if (s->node.level == 0)
+        return terrimpi_wall_lowest(s, axis, row, cell);
+    for (k = 2u * cell; k <= 2u * cell + 1u; k++) {
+        uint32_t x = 2u * s->node.x + (axis == 0 ? line : k) / cells;
+        uint32_t z = 2u * s->node.z + (axis == 0 ? k : line) / cells;
+        const unsigned char *codes;
+        float scale[2];
+        if (!terrimpi_tree_has(s->tree, s->node.level - 1u, x, z))
+            continue;
+        codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
+                                        s->tree, s->node.level - 1u, x, z).number, scale);
+        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)codes[(axis * cells +
+                                              line % cells) * cells + k % cells]);
+    }
+    return lowest;
+}
+
+/* The highest sample of one of the 4 x 4 squares of a node at level 0. */
+static float terrimpi_wall_highest(const terrimpi_wall_site *s, uint32_t x, uint32_t z)
+{
+    const terrimp_heightfield *field = &s->tree->field;
+    uint32_t quads = s->tree->chunk_quads, i, j;
+    uint32_t i0 = s->node.x * quads + x * quads / TERRIMPI_WALL_TOPS;
+    uint32_t j0 = s->node.z * quads + z * quads / TERRIMPI_WALL_TOPS;
+    uint32_t size = (quads + TERRIMPI_WALL_TOPS - 1u) / TERRIMPI_WALL_TOPS + 1u;
+    float highest = -TERRIMPI_FLOAT_MAX;
+    for (j = j0; j < j0 + size; j++)
+        for (i = i0; i < i0 + size; i++)
+            highest = terrimpi_max(highest,
+                                   terrimpi_sample(field, terrimpi_min_u32(i, field->width - 1u),
+                                                   terrimpi_min_u32(j, field->depth - 1u)));
+    return highest;
+}
+
+/* The highest height of a square; -FLOAT_MAX where there is no child. */
+static float terrimpi_wall_top(const terrimpi_wall_site *s, uint32_t square)
+{
+    uint32_t x = square % TERRIMPI_WALL_TOPS, z = square / TERRIMPI_WALL_TOPS, k;
+    uint32_t child_x = 2u * s->node.x + x / 2u, child_z = 2u * s->node.z + z / 2u;
+    const unsigned char *codes;
+    float scale[2];
+    uint8_t highest = 0;
+    if (s->node.level == 0)
+        return terrimpi_wall_highest(s, x, z);
+    if (!terrimpi_tree_has(s->tree, s->node.level - 1u, child_x, child_z))
+        return -TERRIMPI_FLOAT_MAX;
+    codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
+                                    s->tree, s->node.level - 1u, child_x, child_z).number, scale) +
+            2u * s->form.cells * s->form.cells;
+    for (k = 0; k < 4u; k++) {
+        uint32_t i = (x % 2u) * 2u + k % 2u, j = (z % 2u) * 2u + k / 2u;
+        if (codes[j * TERRIMPI_WALL_TOPS + i] > highest)
+            highest = codes[j * TERRIMPI_WALL_TOPS + i];
+    }
+    return scale[0] + scale[1] * (float)highest;
+}
+
+/* Code k of a node as a height: first the walls, then the squares. */
+static float terrimpi_wall_value(const terrimpi_wall_site *s, uint32_t k)
+{
+    const uint32_t cells = s->form.cells;
+    if (k >= 2u * cells * cells)
+        return terrimpi_wall_top(s, k - 2u * cells * cells);
+    return terrimpi_wall_low(s, k / (cells * cells), k / cells % cells, k % cells);
+}
+
+/* The code of a height, rounded down for walls and up for squares. */
+static unsigned char terrimpi_wall_code(float value, const float scale[2], int up)
+{
+    float steps = scale[1] > 0.0f ? (value - scale[0]) / scale[1] : 0.0f;
+    uint32_t code = (uint32_t)terrimpi_clamp(steps, 0.0f, 255.0f);
+    while (!up && code > 0 && scale[0] + scale[1] * (float)code > value)
+        code--;
+    while (up && code < 255u && scale[0] + scale[1] * (float)code < value)
+        code++;
+    return (unsigned char)code;
+}
+
+static void terrimpi_wall_build(const terrimp_quadtree *tree, terrimp_node node,
+                                unsigned char *walls)
+{
+    terrimpi_wall_site s;
+    unsigned char *codes;
+    uint32_t k, count;
+    float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, scale[2];
+    s.tree = tree;
+    s.walls = walls;
+    s.form = terrimpi_wall_form_of(tree);
+    s.node = node;
+    codes = walls + (size_t)node.number * s.form.stride;
+    memset(codes, 0, s.form.stride);
+    count = 2u * s.form.cells * s.form.cells;
+    for (k = 0; k < count + TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
+        float value = terrimpi_wall_value(&s, k);
+        if (k < count)
+            low = terrimpi_min(low, value);
+        if (terrimpi_abs(value) < TERRIMPI_FLOAT_MAX)
+            high = terrimpi_max(high, value);
+    }
+    scale[0] = low;
+    scale[1] = high * (1.0f / 255.0f) - low * (1.0f / 255.0f);
+    memcpy(codes, scale, sizeof scale);
+    codes += sizeof scale;
+    for (k = 0; k < count + TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++)
+        codes[k] = terrimpi_wall_code(terrimpi_wall_value(&s, k), scale, k >= count);
+}
+
+TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree, uint32_t node,
+                                                    void *walls)
+{
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
+    terrimpi_wall_build(tree, terrimpi_tree_node(tree, node), (unsigned char *)walls);
+    return TERRIMP_OK;
+}
+
+/* The nodes of a level that samples from `at` on belong to: those at a border belong to both. */
+static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uint32_t nodes,
+                                uint32_t range[2])
+{
+    range[0] = terrimpi_min_u32((at > 0 ? at - 1u : 0u) / quads, nodes - 1u);
+    range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
+}
+
+TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
+                                               const terrimp_rect *samples, void *walls)
+{
+    terrimp_rect all;
+    uint32_t level, x[2], z[2], i, j;
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    all = samples ? *samples : terrimpi_rect(0, 0, tree->field.width, tree->field.depth);
+    TERRIMPI_REFUSE(all.width < 1u || all.height < 1u || all.x >= tree->field.width ||
+                    all.y >= tree->field.depth, TERRIMP_E_RANGE);
+    all.width = terrimpi_min_u32(all.width, tree->field.width - all.x);
+    all.height = terrimpi_min_u32(all.height, tree->field.depth - all.y);
+    for (level = 0; level < tree->level_count; level++) {
+        uint32_t quads = tree->chunk_quads << level;
+        terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
+        terrimpi_wall_range(all.y, all.height, quads, tree->level_z[level], z);
+        for (j = z[0]; j <= z[1]; j++)
+            for (i = x[0]; i <= x[1]; i++)
+                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
+                                    (unsigned char *)walls);
+    }
+    return TERRIMP_OK;
+}
+
 /* ==== Layer builder ====================================================== >>impl-layer-builder */
 /* Based on: Jeschke 2004, chapters 3 and 4. What is said without a source is derived here.
 
@@ -12086,29 +13952,674 @@ TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, ui
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_layer_pack(terrimp_shelves *shelves, terrimp_layer_quad *quads,
+TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
                                               uint32_t count, uint32_t gutter,
-                                              terrimp_pack_item *items, uint32_t *order)
+                                              terrimp_rect *rects, uint32_t *order)
 {
     uint32_t i;
-    TERRIMPI_REFUSE(!shelves || !shelves->items || !quads || !items || !order, TERRIMP_E_NULL);
+    float scale;
+    TERRIMPI_REFUSE(!atlas || !quads || !rects || !order, TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
                             !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
                         TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
-        items[i].rect = quads[i].texels;
-        items[i].rect.width += 2u * gutter;
-        items[i].rect.height += 2u * gutter;
-        TERRIMPI_REFUSE(items[i].rect.width > shelves->width ||
-                            items[i].rect.height > shelves->height,
-                        TERRIMP_E_CAPACITY); /* or it would be scaled */
+        rects[i] = quads[i].texels;
+        rects[i].width += 2u * gutter;
+        rects[i].height += 2u * gutter;
     }
-    TERRIMPI_TRY(terrimp_pack_ffdh(shelves, items, count, order, NULL));
+    TERRIMPI_TRY(terrimp_pack_ffdh(atlas[0], atlas[1], rects, count, order, &scale));
+    TERRIMPI_REFUSE(scale < 1.0f, TERRIMP_E_CAPACITY);
     for (i = 0; i < count; i++) {
-        quads[i].x = items[i].rect.x + gutter;
-        quads[i].y = items[i].rect.y + gutter;
+        quads[i].x = rects[i].x + gutter;
+        quads[i].y = rects[i].y + gutter;
     }
+    return TERRIMP_OK;
+}
+
+/* --- recording without gaps --- */
+
+/* Appends the point of edge a-b at a depth between those of its ends. */
+static void terrimpi_clip_cut(const float *vertices, uint32_t stride, const float depths[3],
+                              uint32_t a, uint32_t b, float depth, float *out)
+{
+    uint32_t low = depths[a] < depths[b] ? a : b, high = low == a ? b : a, i;
+    float part = (depth - depths[low]) / (depths[high] - depths[low]);
+    for (i = 0; i < stride; i++) {
+        float from = vertices[(size_t)low * stride + i];
+        out[i] = from + part * (vertices[(size_t)high * stride + i] - from);
+    }
+}
+
+/* A polygon between two parallel planes has the vertices of the triangle that lie there, and those
+   where its edges pass the planes: so no polygon is clipped twice. */
+static uint32_t terrimpi_layer_clip(const float *vertices, uint32_t stride, const float depths[3],
+                                    float low, float high, float *out)
+{
+    uint32_t a, k, count = 0;
+    for (a = 0; a < 3u; a++) {
+        uint32_t b = a == 2u ? 0u : a + 1u;
+        int rises = depths[b] > depths[a];
+        if (depths[a] >= low && depths[a] <= high)
+            memcpy(out + (size_t)count++ * stride, vertices + (size_t)a * stride,
+                   stride * sizeof *out);
+        for (k = 0; k < 2u; k++) {
+            float plane = (k == 0) == rises ? low : high;
+            if ((depths[a] < plane && plane < depths[b]) ||
+                (depths[b] < plane && plane < depths[a]))
+                terrimpi_clip_cut(vertices, stride, depths, a, b, plane,
+                                  out + (size_t)count++ * stride);
+        }
+    }
+    return count;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count)
+{
+    TERRIMPI_REFUSE(!vertices || !depths || !out || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(depths), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!stride || !(low <= high), TERRIMP_E_RANGE);
+    *count = terrimpi_layer_clip(vertices, stride, depths, low, high, out);
+    return TERRIMP_OK;
+}
+
+static terrimp_result terrimpi_record_check(const terrimp_layer_record *r)
+{
+    TERRIMPI_REFUSE(!r || !r->layers || !r->picture || !r->masks, TERRIMP_E_NULL);
+    return terrimpi_within_u32(r->width, 1, 16384) && terrimpi_within_u32(r->height, 1, 16384) &&
+                   r->layers->count
+               ? TERRIMP_OK
+               : TERRIMP_E_RANGE;
+}
+
+static uint32_t *terrimpi_record_row(const terrimp_layer_record *r, uint32_t layer, uint32_t y)
+{
+    return r->masks + ((size_t)layer * r->height + y) * TERRIMP_MASK_WORDS(r->width);
+}
+
+/* Sets the texels of a row from column x to column end - 1. */
+static void terrimpi_mask_fill(uint32_t *row, uint32_t x, uint32_t end)
+{
+    uint32_t word;
+    for (word = x / 32u; x < end && word <= (end - 1u) / 32u; word++)
+        row[word] |= (word == x / 32u ? 0xffffffffu << x % 32u : 0xffffffffu) &
+                     (word == (end - 1u) / 32u ? terrimpi_mask_tail(end) : 0xffffffffu);
+}
+
+/* The part of a convex polygon [count][2] between two heights, in columns; 0 when there is none. */
+static int terrimpi_polygon_row(const float *uv, uint32_t count, float bottom, float top,
+                                float *left, float *right)
+{
+    uint32_t a, k;
+    *left = TERRIMPI_FLOAT_MAX;
+    *right = -TERRIMPI_FLOAT_MAX;
+    for (a = 0; a < count; a++) {
+        const float *p = uv + 2u * a, *q = uv + 2u * (a + 1u == count ? 0u : a + 1u);
+        if (p[1] >= bottom && p[1] <= top) {
+            *left = terrimpi_min(*left, p[0]);
+            *right = terrimpi_max(*right, p[0]);
+        }
+        if (q[1] < p[1]) { /* an edge crosses a row at one place, from whichever side it is seen */
+            const float *swap = p;
+            p = q;
+            q = swap;
+        }
+        for (k = 0; k < 2u; k++) {
+            float y = k ? top : bottom, x;
+            if (!(p[1] < y && y < q[1]))
+                continue;
+            x = p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1]));
+            *left = terrimpi_min(*left, x);
+            *right = terrimpi_max(*right, x);
+        }
+    }
+    return *left <= *right;
+}
+
+/* The least column or row from which texels count, for a coordinate; within 0..size. */
+static uint32_t terrimpi_texel(float at, uint32_t size)
+{
+    return !(at > 0.0f) ? 0u : at >= (float)size ? size : (uint32_t)at;
+}
+
+/* Sets the texels that a convex polygon [count][2] touches, or those whose centres it holds. */
+static void terrimpi_record_polygon(const terrimp_layer_record *r, uint32_t layer, const float *uv,
+                                    uint32_t count)
+{
+    float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, left, right;
+    uint32_t i, y, end;
+    for (i = 0; i < count; i++) {
+        low = terrimpi_min(low, uv[2u * i + 1u]);
+        high = terrimpi_max(high, uv[2u * i + 1u]);
+    }
+    if (!count || high < 0.0f)
+        return;
+    end = terrimpi_min_u32(terrimpi_texel(high, r->height) + 1u, r->height);
+    for (y = terrimpi_texel(low, r->height); y < end; y++) {
+        float bottom = (float)y + (r->no_outline ? 0.5f : 0.0f);
+        float top = (float)y + (r->no_outline ? 0.5f : 1.0f);
+        if (!terrimpi_polygon_row(uv, count, bottom, top, &left, &right) || right < 0.0f)
+            continue;
+        if (r->no_outline)
+            terrimpi_mask_fill(terrimpi_record_row(r, layer, y),
+                               terrimpi_texel(left + 0.5f, r->width),
+                               terrimpi_texel(right + 0.5f, r->width));
+        else
+            terrimpi_mask_fill(
+                terrimpi_record_row(r, layer, y), terrimpi_texel(left, r->width),
+                terrimpi_min_u32(terrimpi_texel(right, r->width) + 1u, r->width));
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
+                                                  const float xyz[9])
+{
+    float seen[9], depths[3], polygon[15], uv[10], low, high;
+    uint32_t layer, last, count, i;
+    TERRIMPI_TRY(terrimpi_record_check(record));
+    TERRIMPI_REFUSE(!xyz, TERRIMP_E_NULL);
+    for (i = 0; i < 3u; i++) {
+        const terrimp_capture *p = record->picture;
+        float to[3];
+        TERRIMPI_REFUSE(!terrimpi_finite3(xyz + 3u * i), TERRIMP_E_NOT_FINITE);
+        terrimpi_sub(xyz + 3u * i, p->eye, to);
+        depths[i] = seen[3u * i + 2u] = terrimpi_dot(to, p->forward);
+        seen[3u * i] = terrimpi_dot(to, p->right) - p->tan_left * depths[i];
+        seen[3u * i + 1u] = terrimpi_dot(to, p->up) - p->tan_down * depths[i];
+    }
+    low = terrimpi_min(depths[0], terrimpi_min(depths[1], depths[2]));
+    high = terrimpi_max(depths[0], terrimpi_max(depths[1], depths[2]));
+    if (!(high >= record->layers->start) || !(low <= record->layers->end))
+        return TERRIMP_OK;
+    layer = terrimp_layer_of(record->layers, low);
+    if (layer && low <= terrimp_layer_border(record->layers, layer))
+        layer--; /* what touches a border is in both */
+    last = terrimp_layer_of(record->layers, high);
+    for (; layer <= last; layer++) {
+        count = terrimpi_layer_clip(seen, 3, depths, terrimp_layer_border(record->layers, layer),
+                                    terrimp_layer_border(record->layers, layer + 1u), polygon);
+        for (i = 0; i < count; i++) {
+            float texel = record->layers->texel * polygon[3u * i + 2u];
+            uv[2u * i] = polygon[3u * i] / texel;
+            uv[2u * i + 1u] = polygon[3u * i + 1u] / texel;
+        }
+        terrimpi_record_polygon(record, layer, uv, count);
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
+                                                const float *depths)
+{
+    uint32_t x, y, k, layer, last;
+    TERRIMPI_TRY(terrimpi_record_check(record));
+    TERRIMPI_REFUSE(!depths, TERRIMP_E_NULL);
+    for (y = 0; y < record->height; y++)
+        for (x = 0; x < record->width; x++) {
+            float low = TERRIMPI_FLOAT_MAX, high = 0.0f;
+            for (k = 0; k < 4u; k++) {
+                float d = depths[(size_t)(y + (k >> 1)) * (record->width + 1u) + x + (k & 1u)];
+                if (!(d > 0.0f) || !terrimpi_finite(d))
+                    continue;
+                low = terrimpi_min(low, d);
+                high = terrimpi_max(high, d);
+            }
+            if (!(high >= record->layers->start) || !(low <= record->layers->end))
+                continue;
+            layer = terrimp_layer_of(record->layers, low);
+            last = terrimp_layer_of(record->layers, high);
+            for (; layer <= last; layer++)
+                terrimpi_record_row(record, layer, y)[x / 32u] |= 1u << x % 32u;
+        }
+    return TERRIMP_OK;
+}
+
+/* A word of a row's bits, each moved to the place of its neighbour before it (dx = 1: of the bit at
+   x + 1), without what lies beyond the width. */
+static uint32_t terrimpi_mask_at(const uint32_t *row, uint32_t width, uint32_t word, int dx)
+{
+    uint32_t words = TERRIMP_MASK_WORDS(width), here = row[word], next = 0;
+    if (word + 1u == words)
+        here &= terrimpi_mask_tail(width);
+    if (!dx)
+        return here;
+    if (word + 2u == words)
+        next = row[word + 1u] & terrimpi_mask_tail(width);
+    else if (word + 1u < words)
+        next = row[word + 1u];
+    return here >> 1 | next << 31;
+}
+
+TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
+                                                uint32_t width, uint32_t height,
+                                                uint32_t *wanted)
+{
+    size_t words = TERRIMP_MASK_WORDS(width), y;
+    uint32_t word, k;
+    TERRIMPI_REFUSE(!front || !back || !wanted, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!width || !height, TERRIMP_E_RANGE);
+    memset(wanted, 0, height * words * sizeof *wanted);
+    for (y = 0; y + 1u < height; y++)
+        for (word = 0; word < words; word++) {
+            uint32_t f[4], both[4], one[4], missing[4]; /* of the block's corner at dx + 2 dy */
+            for (k = 0; k < 4u; k++) {
+                size_t row = (y + (k >> 1)) * words;
+                uint32_t b = terrimpi_mask_at(back + row, width, word, (int)(k & 1u));
+                f[k] = terrimpi_mask_at(front + row, width, word, (int)(k & 1u));
+                both[k] = f[k] & b;
+                one[k] = f[k] ^ b;
+                missing[k] = f[k] & ~b;
+            }
+            for (k = 0; k < 4u; k++) {
+                uint32_t want = both[k ^ 1u] & both[k ^ 2u] & one[k] & one[k ^ 3u] & missing[k];
+                uint32_t *to = wanted + (y + (k >> 1)) * words + word;
+                to[0] |= k & 1u ? want << 1 : want;
+                if ((k & 1u) && want >> 31)
+                    to[1] |= 1u; /* inside: the bit beyond the last column is never set */
+            }
+        }
+    return TERRIMP_OK;
+}
+
+/* ==== Placement ========================================================== >>impl-placement */
+/* Based on: Jeschke 2004, chapter 5. */
+
+#define TERRIMPI_PLACE_NONE 0xffffffffu
+enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
+#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+
+typedef struct terrimpi_placing {
+    const terrimp_place_desc *desc;
+    float *costs;       /* [view_count] as they are now */
+    uint8_t *shown;     /* [gain_count] */
+    float *scores;      /* [candidate_count] gain for memory when it was last looked at */
+    uint32_t *heap;     /* [candidate_count] the best score first */
+    uint32_t *owner;    /* [gain_count] candidate */
+    uint32_t *first;    /* [view_count] gains shown in each view, as a list */
+    uint32_t *next;     /* [gain_count] */
+    uint32_t heap_count;
+    uint8_t *wish;      /* [candidate_count] TERRIMPI_PLACE_... */
+    uint8_t *best;      /* [gain_count] what the best attempt shows */
+    uint8_t *made;      /* [candidate_count] its memory is paid for */
+    uint32_t *spare;    /* [view_count] gains of those, as a list: */
+    uint32_t *another;  /* [gain_count] */
+    uint32_t *log;      /* [3 * gain_count] gains that were shown or hidden, to be undone */
+    uint32_t log_count;
+} terrimpi_placing;
+
+static size_t terrimpi_place_layout(const terrimp_place_desc *d, void *base, terrimpi_placing *p)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    p->desc = d;
+    p->scores = (float *)terrimpi_take(&arena, d->candidate_count, sizeof *p->scores);
+    p->heap = (uint32_t *)terrimpi_take(&arena, d->candidate_count, sizeof *p->heap);
+    p->owner = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->owner);
+    p->first = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->first);
+    p->next = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->next);
+    p->wish = (uint8_t *)terrimpi_take(&arena, d->candidate_count, 1);
+    p->best = (uint8_t *)terrimpi_take(&arena, d->gain_count, 1);
+    p->made = (uint8_t *)terrimpi_take(&arena, d->candidate_count, 1);
+    p->spare = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->spare);
+    p->another = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->another);
+    p->log = (uint32_t *)terrimpi_take(&arena, d->gain_count, 3 * sizeof *p->log);
+    return arena.ok ? arena.bytes + TERRIMPI_ALIGN : 0;
+}
+
+TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc)
+{
+    terrimpi_placing p;
+    return desc ? terrimpi_place_layout(desc, NULL, &p) : 0;
+}
+
+/* Whether a cluster is another one or lies within it: parents have greater numbers. */
+static int terrimpi_place_within(const terrimpi_placing *p, uint32_t cluster, uint32_t other)
+{
+    while (cluster < other && p->desc->parents[cluster] != cluster)
+        cluster = p->desc->parents[cluster];
+    return cluster == other;
+}
+
+/* What a picture would take off a view's cost: less what pictures of its parts have, whose place
+   it takes; nothing when one already shows all of it. */
+static float terrimpi_place_net(const terrimpi_placing *p, uint32_t gain)
+{
+    const terrimp_place_gain *g = &p->desc->gains[gain];
+    uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i;
+    float net = g->saved;
+    for (i = p->first[g->view]; i != TERRIMPI_PLACE_NONE; i = p->next[i]) {
+        uint32_t other = p->desc->candidates[p->owner[i]].cluster;
+        if (terrimpi_place_within(p, cluster, other))
+            return 0.0f;
+        if (terrimpi_place_within(p, other, cluster))
+            net -= p->desc->gains[i].saved;
+    }
+    return net;
+}
+
+/* But for rounding: costs are added to and taken from many times. */
+static int terrimpi_place_solved(const terrimpi_placing *p, float cost)
+{
+    return cost <= p->desc->budget + 1e-5f * terrimpi_abs(p->desc->budget);
+}
+
+/* What of that counts: nothing below the budget does (his equation 5.4). */
+static float terrimpi_place_useful(const terrimpi_placing *p, uint32_t gain)
+{
+    float cost = p->costs[p->desc->gains[gain].view], over = cost - p->desc->budget;
+    return !terrimpi_place_solved(p, cost) && p->desc->gains[gain].saved > 0.0f
+               ? terrimpi_max(0.0f, terrimpi_min(over, terrimpi_place_net(p, gain)))
+               : 0.0f;
+}
+
+static float terrimpi_place_score(const terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    float sum = 0.0f;
+    uint32_t i;
+    for (i = 0; i < c->gain_count; i++)
+        sum += terrimpi_place_useful(p, c->first_gain + i);
+    return sum / c->memory;
+}
+
+static int terrimpi_place_better(const terrimpi_placing *p, uint32_t a, uint32_t b)
+{
+    return p->scores[a] > p->scores[b] || (!(p->scores[a] < p->scores[b]) && a < b);
+}
+
+static void terrimpi_place_sink(terrimpi_placing *p, uint32_t at)
+{
+    uint32_t item = p->heap[at];
+    for (;;) {
+        uint32_t child = 2u * at + 1u;
+        if (child + 1u < p->heap_count &&
+            terrimpi_place_better(p, p->heap[child + 1u], p->heap[child]))
+            child++;
+        if (child >= p->heap_count || !terrimpi_place_better(p, p->heap[child], item))
+            break;
+        p->heap[at] = p->heap[child];
+        at = child;
+    }
+    p->heap[at] = item;
+}
+
+/* Shows a gain in its view that was not shown, or the reverse. */
+static void terrimpi_place_toggle(terrimpi_placing *p, uint32_t gain)
+{
+    const terrimp_place_gain *g = &p->desc->gains[gain];
+    uint32_t *at = &p->first[g->view];
+    p->log[p->log_count++] = gain;
+    p->shown[gain] = !p->shown[gain];
+    if (p->shown[gain]) {
+        p->next[gain] = *at;
+        *at = gain;
+        p->costs[g->view] -= g->saved;
+        return;
+    }
+    while (*at != gain)
+        at = &p->next[*at];
+    *at = p->next[gain];
+    p->costs[g->view] += g->saved;
+}
+
+/* Shows a picture in a view, in place of the pictures of its parts. */
+static void terrimpi_place_show(terrimpi_placing *p, uint32_t gain)
+{
+    uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i, after;
+    for (i = p->first[p->desc->gains[gain].view]; i != TERRIMPI_PLACE_NONE; i = after) {
+        after = p->next[i];
+        if (terrimpi_place_within(p, p->desc->candidates[p->owner[i]].cluster, cluster))
+            terrimpi_place_toggle(p, i);
+    }
+    terrimpi_place_toggle(p, gain);
+}
+
+/* Shows a candidate wherever it is of use. */
+static void terrimpi_place_choose(terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    uint32_t i;
+    p->log_count = 0;
+    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++)
+        if (terrimpi_place_useful(p, i) > 0.0f)
+            terrimpi_place_show(p, i);
+}
+
+static void terrimpi_place_greedily(terrimpi_placing *p)
+{
+    uint32_t i;
+    for (i = 0; i < p->desc->candidate_count; i++)
+        if (p->wish[i] == TERRIMPI_PLACE_FIRST)
+            terrimpi_place_choose(p, i);
+    p->heap_count = 0;
+    for (i = 0; i < p->desc->candidate_count; i++) {
+        p->scores[i] = p->wish[i] ? 0.0f : terrimpi_place_score(p, i);
+        if (p->scores[i] > 0.0f)
+            p->heap[p->heap_count++] = i;
+    }
+    for (i = p->heap_count / 2u; i-- > 0;)
+        terrimpi_place_sink(p, i);
+    while (p->heap_count) {
+        uint32_t best = p->heap[0];
+        float score = terrimpi_place_score(p, best);
+        int fell = score < p->scores[best];
+        p->scores[best] = score;
+        if (!fell)
+            terrimpi_place_choose(p, best);
+        if (!fell || !(score > 0.0f))
+            p->heap[0] = p->heap[--p->heap_count];
+        if (p->heap_count)
+            terrimpi_place_sink(p, 0);
+    }
+}
+
+static int terrimpi_place_is_shown(const terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    uint32_t i;
+    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++)
+        if (p->shown[i])
+            return 1;
+    return 0;
+}
+
+/* Brings a view back to a cost, with pictures that are paid for; returns whether that worked. */
+static int terrimpi_place_stand_in(terrimpi_placing *p, uint32_t view, float cost)
+{
+    while (!terrimpi_place_solved(p, p->costs[view]) && p->costs[view] > cost) {
+        uint32_t i, best = TERRIMPI_PLACE_NONE;
+        float most = 0.0f;
+        for (i = p->spare[view]; i != TERRIMPI_PLACE_NONE; i = p->another[i]) {
+            float useful = terrimpi_place_useful(p, i);
+            if (useful > most && p->made[p->owner[i]] && !p->shown[i]) {
+                most = useful;
+                best = i;
+            }
+        }
+        if (best == TERRIMPI_PLACE_NONE)
+            return 0;
+        terrimpi_place_show(p, best);
+    }
+    return 1;
+}
+
+/* Does without a candidate, if no view comes to cost more than the budget by that. */
+static void terrimpi_place_drop(terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    uint32_t i;
+    p->log_count = 0;
+    p->made[candidate] = 0;
+    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++) {
+        uint32_t view = p->desc->gains[i].view;
+        float cost = p->costs[view];
+        if (!p->shown[i])
+            continue;
+        terrimpi_place_toggle(p, i);
+        if (terrimpi_place_stand_in(p, view, cost))
+            continue;
+        for (i = p->log_count; i-- > 0;) {
+            p->log_count = i; /* where undoing is noted, and forgotten */
+            terrimpi_place_toggle(p, p->log[i]);
+        }
+        p->made[candidate] = 1;
+        return;
+    }
+}
+
+/* Lists, view by view, what pictures that are paid for could do. */
+static void terrimpi_place_spares(terrimpi_placing *p)
+{
+    uint32_t i;
+    for (i = 0; i < p->desc->candidate_count; i++)
+        p->made[i] = (uint8_t)terrimpi_place_is_shown(p, i);
+    for (i = 0; i < p->desc->view_count; i++)
+        p->spare[i] = TERRIMPI_PLACE_NONE;
+    for (i = p->desc->gain_count; i-- > 0;) {
+        uint32_t view = p->desc->gains[i].view;
+        if (p->owner[i] == TERRIMPI_PLACE_NONE || !p->made[p->owner[i]])
+            continue;
+        p->another[i] = p->spare[view];
+        p->spare[view] = i;
+    }
+}
+
+/* Gives back what others can stand in for, the largest first. */
+static void terrimpi_place_give_back(terrimpi_placing *p)
+{
+    uint32_t i;
+    terrimpi_place_spares(p);
+    p->heap_count = 0;
+    for (i = 0; i < p->desc->candidate_count; i++) {
+        p->scores[i] = p->desc->candidates[i].memory;
+        if (p->made[i])
+            p->heap[p->heap_count++] = i;
+    }
+    for (i = p->heap_count / 2u; i-- > 0;)
+        terrimpi_place_sink(p, i);
+    while (p->heap_count) {
+        uint32_t largest = p->heap[0];
+        p->heap[0] = p->heap[--p->heap_count];
+        if (p->heap_count)
+            terrimpi_place_sink(p, 0);
+        terrimpi_place_drop(p, largest);
+    }
+}
+
+static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!terrimpi_finite(d->budget), TERRIMP_E_NOT_FINITE);
+    for (i = 0; i < d->cluster_count; i++)
+        TERRIMPI_REFUSE(d->parents[i] < i || d->parents[i] >= d->cluster_count, TERRIMP_E_RANGE);
+    for (i = 0; i < d->view_count; i++)
+        TERRIMPI_REFUSE(!terrimpi_finite(d->costs[i]), TERRIMP_E_NOT_FINITE);
+    for (i = 0; i < d->gain_count; i++) {
+        TERRIMPI_REFUSE(!terrimpi_finite(d->gains[i].saved), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(d->gains[i].view >= d->view_count, TERRIMP_E_RANGE);
+    }
+    for (i = 0; i < d->candidate_count; i++) {
+        const terrimp_place_candidate *c = &d->candidates[i];
+        TERRIMPI_REFUSE(!terrimpi_finite(c->memory), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!(c->memory > 0.0f) || c->cluster >= d->cluster_count ||
+                            c->first_gain > d->gain_count ||
+                            c->gain_count > d->gain_count - c->first_gain,
+                        TERRIMP_E_RANGE);
+    }
+    return TERRIMP_OK;
+}
+
+static void terrimpi_place_sum(const terrimpi_placing *p, terrimp_placement *out)
+{
+    uint32_t i;
+    memset(out, 0, sizeof *out);
+    for (i = 0; i < p->desc->view_count; i++) {
+        out->problems += !terrimpi_place_solved(p, p->desc->costs[i]);
+        out->unsolved += !terrimpi_place_solved(p, p->costs[i]);
+    }
+    for (i = 0; i < p->desc->candidate_count; i++)
+        if (terrimpi_place_is_shown(p, i)) {
+            out->chosen++;
+            out->memory += p->desc->candidates[i].memory;
+        }
+}
+
+/* Places from the beginning, as wished. */
+static void terrimpi_place_attempt(terrimpi_placing *p, terrimp_placement *out)
+{
+    uint32_t i;
+    memcpy(p->costs, p->desc->costs, p->desc->view_count * sizeof *p->costs);
+    memset(p->shown, 0, p->desc->gain_count);
+    for (i = 0; i < p->desc->view_count; i++)
+        p->first[i] = TERRIMPI_PLACE_NONE;
+    terrimpi_place_greedily(p);
+    terrimpi_place_give_back(p);
+    terrimpi_place_sum(p, out);
+}
+
+static int terrimpi_place_uses(const terrimpi_placing *p, uint32_t candidate)
+{
+    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
+    return c->gain_count && memchr(p->best + c->first_gain, 1, c->gain_count) != NULL;
+}
+
+/* Attempts to do without each chosen candidate, and to begin with each other one, as long as that
+   pays and work is left to spend. */
+static void terrimpi_place_improve(terrimpi_placing *p, terrimp_placement *best)
+{
+    uint32_t n = p->desc->candidate_count, i = 0, since = 0;
+    uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
+    for (; since < n && tries > 0; i = i + 1u < n ? i + 1u : 0u, since++) {
+        terrimp_placement attempt;
+        uint8_t wish = p->wish[i];
+        p->wish[i] = terrimpi_place_uses(p, i) ? TERRIMPI_PLACE_NEVER : TERRIMPI_PLACE_FIRST;
+        if (p->wish[i] == wish)
+            continue;
+        terrimpi_place_attempt(p, &attempt);
+        tries--;
+        if (attempt.unsolved < best->unsolved ||
+            (attempt.unsolved == best->unsolved && attempt.memory < best->memory)) {
+            *best = attempt;
+            memcpy(p->best, p->shown, p->desc->gain_count);
+            since = 0;
+        } else
+            p->wish[i] = wish;
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
+                                         size_t bytes, uint8_t *shown, float *costs,
+                                         terrimp_placement *placement)
+{
+    terrimpi_placing p;
+    uint32_t i, k;
+    TERRIMPI_REFUSE(!desc || !scratch || !shown || !costs || !placement, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!desc->candidates || !desc->gains || !desc->parents || !desc->costs,
+                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_place_check(desc));
+    TERRIMPI_REFUSE(bytes < terrimp_place_scratch_bytes(desc) ||
+                        !terrimpi_place_layout(desc, scratch, &p),
+                    TERRIMP_E_MEMORY);
+    p.costs = costs;
+    p.shown = shown;
+    memset(p.wish, 0, desc->candidate_count);
+    memset(p.owner, 0xff, desc->gain_count * sizeof *p.owner); /* gains may be nobody's */
+    for (i = 0; i < desc->candidate_count; i++)
+        for (k = 0; k < desc->candidates[i].gain_count; k++) {
+            uint32_t *owner = &p.owner[desc->candidates[i].first_gain + k];
+            TERRIMPI_REFUSE(*owner != TERRIMPI_PLACE_NONE, TERRIMP_E_RANGE);
+            *owner = i;
+        }
+    terrimpi_place_attempt(&p, placement);
+    memcpy(p.best, shown, desc->gain_count);
+    terrimpi_place_improve(&p, placement);
+    memcpy(shown, p.best, desc->gain_count);
+    memcpy(costs, desc->costs, desc->view_count * sizeof *costs);
+    for (i = 0; i < desc->gain_count; i++)
+        if (shown[i])
+            costs[desc->gains[i].view] -= desc->gains[i].saved;
     return TERRIMP_OK;
 }
 

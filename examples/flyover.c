@@ -288,7 +288,7 @@ static void note_frame(flyover *f, size_t frame, double ms, double full_ms)
     f->captured_triangles += s->captured_triangles;
     f->triangles += s->triangles;
     f->draws += s->draws;
-    f->texels_used += s->texels_used;
+    f->texels_used += (double)s->texels_used;
     if (s->worst_parallax_px > f->worst_parallax_px)
         f->worst_parallax_px = s->worst_parallax_px;
     if (!f->table)

@@ -17,6 +17,7 @@
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
+#include "atlas_pair.h"
 #include "bench_say.h"
 
 #include "examples/host/tour.h"
@@ -252,7 +253,6 @@ typedef struct live_scheme {
     void *memory;
     float *costs;      /* [max_slots] */
     uint32_t *owners;  /* [max_slots] nodes */
-    uint32_t *victims; /* [max_slots] */
 } live_scheme;
 
 static void open_live(live_scheme *s, uint32_t width, uint32_t height, uint32_t max_slots)
@@ -265,7 +265,6 @@ static void open_live(live_scheme *s, uint32_t width, uint32_t height, uint32_t 
     s->memory = allocate(terrimp_live_atlas_bytes(&desc));
     s->costs = (float *)allocate(max_slots * sizeof *s->costs);
     s->owners = (uint32_t *)allocate(max_slots * sizeof *s->owners);
-    s->victims = (uint32_t *)allocate(max_slots * sizeof *s->victims);
     terrimp_live_atlas_init(&s->atlas, &desc, s->memory, terrimp_live_atlas_bytes(&desc));
 }
 
@@ -274,7 +273,6 @@ static void close_live(live_scheme *s)
     free(s->memory);
     free(s->costs);
     free(s->owners);
-    free(s->victims);
 }
 
 /* What a picture is worth: nothing when it has not been seen for long; when it is visible, the
@@ -291,21 +289,36 @@ static float worth(const replay *p, uint32_t node)
     return texels * (1.1f - terrimpi_min(angle / MAX_ANGLE, 1.0f));
 }
 
-/* Makes room for a size. Visible pictures that have to go join the queue. */
-static int make_room(replay *p, live_scheme *s, const uint32_t size[2])
+/* Frees the slot that costs least; returns it, or max_slots when none may go. */
+static uint32_t free_cheapest(live_scheme *s)
 {
-    uint32_t i, count;
-    for (i = 0; i < s->atlas.desc.max_slots; i++)
+    uint32_t i, slot = s->atlas.desc.max_slots;
+    for (i = 0; i < s->atlas.slot_end; i++)
+        if (s->atlas.slots[i].width > 0 && s->costs[i] >= 0.0f &&
+            (slot == s->atlas.desc.max_slots || s->costs[i] < s->costs[slot]))
+            slot = i;
+    if (slot < s->atlas.desc.max_slots)
+        terrimp_live_atlas_free(&s->atlas, slot);
+    return slot;
+}
+
+/* Allocates; makes room first by freeing what is cheapest, as views free the oldest. Visible
+   pictures that have to go join the queue. */
+static int alloc_live(replay *p, live_scheme *s, const uint32_t size[2], uint32_t *slot)
+{
+    uint32_t i, freed;
+    if (terrimp_live_atlas_alloc(&s->atlas, size[0], size[1], slot) == TERRIMP_OK)
+        return 1;
+    for (i = 0; i < s->atlas.slot_end; i++)
         s->costs[i] = worth(p, s->owners[i]);
-    if (terrimp_live_atlas_evict(&s->atlas, size[0], size[1], s->costs, s->victims, &count) !=
-        TERRIMP_OK)
-        return 0;
-    for (i = 0; i < count; i++) {
-        uint32_t node = s->owners[s->victims[i]];
-        p->pictures[node].size[0] = 0;
-        if (p->pictures[node].seen == p->number)
-            enqueue(p, node);
-    }
+    do {
+        freed = free_cheapest(s);
+        if (freed == s->atlas.desc.max_slots)
+            return 0;
+        p->pictures[s->owners[freed]].size[0] = 0;
+        if (p->pictures[s->owners[freed]].seen == p->number)
+            enqueue(p, s->owners[freed]);
+    } while (terrimp_live_atlas_alloc(&s->atlas, size[0], size[1], slot) != TERRIMP_OK);
     return 1;
 }
 
@@ -340,9 +353,7 @@ static void renew_live(replay *p, void *scheme)
         if (to->size[0] > 0)
             terrimp_live_atlas_free(&s->atlas, to->slot);
         to->size[0] = 0;
-        if (terrimp_live_atlas_alloc(&s->atlas, size[0], size[1], &to->slot) != TERRIMP_OK &&
-            (!make_room(p, s, size) ||
-             terrimp_live_atlas_alloc(&s->atlas, size[0], size[1], &to->slot) != TERRIMP_OK)) {
+        if (!alloc_live(p, s, size, &to->slot)) {
             p->sum.lacking++;
             continue;
         }
@@ -351,14 +362,14 @@ static void renew_live(replay *p, void *scheme)
     }
 }
 
-/* ---- the pair: as terrimp's view uses it, packed by its own FFDH or by stb_rect_pack ---- */
+/* ---- the pair: as the thesis uses it, packed by its own FFDH or by stb_rect_pack ---- */
 
 typedef struct pair_scheme {
-    terrimp_atlas_pair pair;
-    terrimp_shelf *shelves;
-    terrimp_pair_slot *slots; /* [node_count] */
-    terrimp_pack_item *items;
-    uint32_t *order;
+    atlas_pair pair;
+    pair_shelf *shelves;
+    pair_slot *slots; /* [node_count] */
+    terrimp_rect *sizes;
+    uint32_t *order;  /* [2 * node_count] */
     float scale;
     int use_stb;
 #ifdef HAVE_STB
@@ -371,13 +382,13 @@ typedef struct pair_scheme {
 static void open_pair(pair_scheme *s, uint32_t count, int use_stb)
 {
     memset(s, 0, sizeof *s);
-    s->shelves = (terrimp_shelf *)allocate(2u * count * sizeof *s->shelves);
-    s->slots = (terrimp_pair_slot *)allocate(count * sizeof *s->slots);
-    s->items = (terrimp_pack_item *)allocate(count * sizeof *s->items);
-    s->order = (uint32_t *)allocate(count * sizeof *s->order);
+    s->shelves = (pair_shelf *)allocate(2u * count * sizeof *s->shelves);
+    s->slots = (pair_slot *)allocate(count * sizeof *s->slots);
+    s->sizes = (terrimp_rect *)allocate(count * sizeof *s->sizes);
+    s->order = (uint32_t *)allocate(2u * count * sizeof *s->order);
     s->scale = 1.0f;
     s->use_stb = use_stb;
-    terrimp_pair_init(&s->pair, PAIR_SIDE, PAIR_SIDE, s->shelves, count);
+    pair_init(&s->pair, PAIR_SIDE, PAIR_SIDE, s->shelves, count);
 #ifdef HAVE_STB
     s->columns[0] = (stbrp_node *)allocate(PAIR_SIDE * sizeof(stbrp_node));
     s->columns[1] = (stbrp_node *)allocate(PAIR_SIDE * sizeof(stbrp_node));
@@ -391,7 +402,7 @@ static void close_pair(pair_scheme *s)
 {
     free(s->shelves);
     free(s->slots);
-    free(s->items);
+    free(s->sizes);
     free(s->order);
 #ifdef HAVE_STB
     free(s->columns[0]);
@@ -411,7 +422,7 @@ static terrimp_rect from_stb(const stbrp_rect *in)
     return rect;
 }
 
-/* What terrimp_pair_repack does, by stb_rect_pack. */
+/* What pair_repack does, by stb_rect_pack. */
 static void repack_stb(pair_scheme *s, uint32_t count)
 {
     uint32_t i, n, outdated = 1u - s->pair.newest;
@@ -419,11 +430,11 @@ static void repack_stb(pair_scheme *s, uint32_t count)
     for (;;) {
         for (i = n = 0; i < count; i++) {
             s->slots[i].assigned[outdated] = s->slots[i].filled[outdated] = 0;
-            if (s->items[i].rect.width == 0)
+            if (s->sizes[i].width == 0)
                 continue;
             s->rects[n].id = (int)i;
-            s->rects[n].w = (stbrp_coord)((float)s->items[i].rect.width * s->scale);
-            s->rects[n++].h = (stbrp_coord)((float)s->items[i].rect.height * s->scale);
+            s->rects[n].w = (stbrp_coord)((float)s->sizes[i].width * s->scale);
+            s->rects[n++].h = (stbrp_coord)((float)s->sizes[i].height * s->scale);
         }
         stbrp_init_target(&s->context[outdated], PAIR_SIDE, PAIR_SIDE, s->columns[outdated],
                           PAIR_SIDE);
@@ -432,14 +443,14 @@ static void repack_stb(pair_scheme *s, uint32_t count)
         s->scale *= 0.94f;
     }
     for (i = 0; i < n; i++) {
-        terrimp_pair_slot *slot = &s->slots[s->rects[i].id];
+        pair_slot *slot = &s->slots[s->rects[i].id];
         slot->rect[outdated] = from_stb(&s->rects[i]);
         slot->assigned[outdated] = 1;
     }
     s->pair.newest = outdated;
 }
 
-static int assign_stb(pair_scheme *s, terrimp_pair_slot *slot, const uint32_t size[2])
+static int assign_stb(pair_scheme *s, pair_slot *slot, const uint32_t size[2])
 {
     stbrp_rect rect;
     memset(&rect, 0, sizeof rect);
@@ -462,17 +473,17 @@ static void repack_pair(replay *p, pair_scheme *s)
         uint32_t size[2] = {0, 0};
         if (p->pictures[i].seen == p->number)
             size_of(p, i, size);
-        s->items[i].rect.width = size[0];
-        s->items[i].rect.height = size[1];
+        s->sizes[i].width = size[0];
+        s->sizes[i].height = size[1];
     }
 #ifdef HAVE_STB
     if (s->use_stb)
         repack_stb(s, count);
     else
 #endif
-        terrimp_pair_repack(&s->pair, s->slots, s->items, count, s->order, &s->scale);
+        (void)pair_repack(&s->pair, s->slots, s->sizes, count, s->order, &s->scale);
     for (i = 0; i < count; i++)
-        if (terrimp_pair_picture(&s->pair, &s->slots[i]) < 0)
+        if (pair_picture(&s->pair, &s->slots[i]) < 0)
             p->pictures[i].size[0] = 0;
     enqueue_expired(p);
 }
@@ -481,7 +492,7 @@ static int assign_pair(replay *p, pair_scheme *s)
 {
     uint32_t i, k;
     for (i = 0; i < p->queue_count; i++) {
-        terrimp_pair_slot *slot = &s->slots[p->queue[i]];
+        pair_slot *slot = &s->slots[p->queue[i]];
         uint32_t size[2], has[2];
         size_of(p, p->queue[i], size);
         for (k = 0; k < 2; k++)
@@ -497,7 +508,7 @@ static int assign_pair(replay *p, pair_scheme *s)
             continue;
         }
 #endif
-        if (terrimp_pair_assign(&s->pair, slot, size[0], size[1]) != TERRIMP_OK)
+        if (!pair_assign(&s->pair, slot, size[0], size[1]))
             return 0;
     }
     return 1;
@@ -509,7 +520,7 @@ static void renew_pair(replay *p, void *scheme)
     uint32_t i;
     int complete = 1, fits;
     for (i = 0; i < p->now->count; i++)
-        if (terrimp_pair_picture(&s->pair, &s->slots[p->now->nodes[i]]) == 1 - (int)s->pair.newest)
+        if (pair_picture(&s->pair, &s->slots[p->now->nodes[i]]) == 1 - (int)s->pair.newest)
             complete = 0;
     if (p->queue_count == 0)
         return;
@@ -522,9 +533,9 @@ static void renew_pair(replay *p, void *scheme)
     }
     p->sum.lacking += fits ? s->scale < 1.0f : p->queue_count;
     for (i = 0; fits && i < p->queue_count; i++) {
-        terrimp_pair_slot *slot = &s->slots[p->queue[i]];
+        pair_slot *slot = &s->slots[p->queue[i]];
         uint32_t size[2];
-        terrimp_pair_fill(&s->pair, slot);
+        pair_fill(&s->pair, slot);
         size[0] = slot->rect[s->pair.newest].width;
         size[1] = slot->rect[s->pair.newest].height;
         capture(p, p->queue[i], size);
@@ -663,13 +674,12 @@ static void print_packing(const char *name, const packing *p)
    (The live atlas does not keep low: it has no part in this.) */
 static void compare_packing(const recording *flown)
 {
-    static terrimp_pack_item items[MAX_NODES];
-    static terrimp_shelf rows[MAX_NODES];
-    static uint32_t order[MAX_NODES];
+    static terrimp_rect rects[MAX_NODES];
+    static uint32_t order[2 * MAX_NODES];
     packing ffdh;
 #ifdef HAVE_STB
     packing stb;
-    static stbrp_rect rects[MAX_NODES];
+    static stbrp_rect stb_rects[MAX_NODES];
     static stbrp_node columns[PAIR_SIDE];
     memset(&stb, 0, sizeof stb);
 #endif
@@ -680,36 +690,40 @@ static void compare_packing(const recording *flown)
     p.flown = flown;
     p.texels_per_px = 1.5f;
     for (i = 0; i < flown->frame_count; i += 10) {
-        uint32_t count = flown->frames[i].count, placed;
-        terrimp_shelves shelves;
+        uint32_t count = flown->frames[i].count, top = 0;
         double texels = 0.0, start;
         p.now = &flown->frames[i];
         for (k = 0; k < count; k++) {
             uint32_t size[2];
             size_of(&p, p.now->nodes[k], size);
-            items[k].rect.width = size[0];
-            items[k].rect.height = size[1];
+            rects[k].width = size[0];
+            rects[k].height = size[1];
             texels += (double)size[0] * (double)size[1];
         }
         start = now_us();
-        terrimp_shelves_init(&shelves, PAIR_SIDE, 65536, 0, rows, MAX_NODES);
-        terrimp_pack_ffdh(&shelves, items, count, order, &placed);
-        add_packing(&ffdh, texels, (double)shelves.top, now_us() - start);
+        terrimp_pack_ffdh(PAIR_SIDE, 65536, rects, count, order, NULL);
+        start = now_us() - start;
+        for (k = 0; k < count; k++)
+            top = rects[k].y + rects[k].height > top ? rects[k].y + rects[k].height : top;
+        add_packing(&ffdh, texels, (double)top, start);
 #ifdef HAVE_STB
         {
             stbrp_context context;
-            int top = 0;
+            top = 0;
             for (k = 0; k < count; k++) {
-                rects[k].id = (int)k;
-                rects[k].w = (stbrp_coord)items[k].rect.width;
-                rects[k].h = (stbrp_coord)items[k].rect.height;
+                stb_rects[k].id = (int)k;
+                stb_rects[k].w = (stbrp_coord)rects[k].width;
+                stb_rects[k].h = (stbrp_coord)rects[k].height;
             }
             start = now_us();
             stbrp_init_target(&context, PAIR_SIDE, 65536, columns, PAIR_SIDE);
-            stbrp_pack_rects(&context, rects, (int)count);
+            stbrp_pack_rects(&context, stb_rects, (int)count);
             start = now_us() - start;
             for (k = 0; k < count; k++)
-                top = rects[k].y + rects[k].h > top ? rects[k].y + rects[k].h : top;
+            {
+                uint32_t end = (uint32_t)(stb_rects[k].y + stb_rects[k].h);
+                top = end > top ? end : top;
+            }
             add_packing(&stb, texels, (double)top, start);
         }
 #endif
@@ -748,7 +762,7 @@ typedef struct churn {
 static int churn_alloc(churn *c)
 {
     float ratio = (float)c->largest / (float)c->smallest;
-    uint32_t width = (uint32_t)((float)c->smallest * powf(ratio, random_unit())), slot, count, i, k;
+    uint32_t width = (uint32_t)((float)c->smallest * powf(ratio, random_unit())), slot, i, k;
     uint32_t height = (uint32_t)((float)width * (0.4f + 0.6f * random_unit()));
     double start = now_us();
     int fits = terrimp_live_atlas_alloc(&c->live.atlas, width, height, &slot) == TERRIMP_OK;
@@ -757,19 +771,16 @@ static int churn_alloc(churn *c)
     c->failures += !fits;
     if (!fits && c->live.costs) {
         start = now_us();
-        terrimp_live_atlas_evict(&c->live.atlas, width, height, c->live.costs, c->live.victims,
-                                 &count);
+        do {
+            (void)free_cheapest(&c->live);
+        } while (terrimp_live_atlas_alloc(&c->live.atlas, width, height, &slot) != TERRIMP_OK);
         c->evict_us += now_us() - start;
         c->evicts++;
-        for (i = k = 0; i < c->held_count; i++) {
-            uint32_t v = 0;
-            while (v < count && c->live.victims[v] != c->held[i])
-                v++;
-            if (v == count)
+        for (i = k = 0; i < c->held_count; i++)
+            if (c->held[i] != slot && c->live.atlas.slots[c->held[i]].width > 0)
                 c->held[k++] = c->held[i];
-        }
         c->held_count = k;
-        fits = terrimp_live_atlas_alloc(&c->live.atlas, width, height, &slot) == TERRIMP_OK;
+        fits = 1;
     }
     if (fits) {
         c->held[c->held_count++] = slot;
@@ -789,7 +800,8 @@ static void churn_free(churn *c)
     c->held[i] = c->held[--c->held_count];
 }
 
-/* Slots come until the load is reached, then go in random order; a load of 0 evicts instead. */
+/* Slots come until the load is reached, then go in random order; with a load of 0 the
+   cheapest go instead. */
 static void churn_at(uint32_t smallest, uint32_t largest, float load)
 {
     const double area = (double)PAIR_SIDE * PAIR_SIDE;
@@ -826,7 +838,7 @@ static void churn_at(uint32_t smallest, uint32_t largest, float load)
     if (load > 0.0f)
         say("%.0f %% | %.1f %% | ", 100.0 * (double)load, 100.0 * full);
     else
-        say("evict | %.1f %% | ", 100.0 * full);
+        say("cheapest | %.1f %% | ", 100.0 * full);
     say("%.0f | %.1f %% | %.1f | %.1f | ", slots, 100.0 * c.failures / (double)c.allocs,
            c.alloc_us / (double)c.allocs, c.free_us / (double)(c.frees ? c.frees : 1u));
     if (c.evicts)
@@ -843,9 +855,9 @@ static void compare_churn(void)
     static const float loads[] = {0.6f, 0.7f, 0.8f, 0.9f, 0.0f};
     uint32_t i, k;
     say("\nSlots of random sizes in an atlas of %u x %u texels, freed at random above the "
-           "load;\nwith 'evict', what does not fit makes room by evicting what is cheapest\n\n",
+           "load;\n'cheapest': where one does not fit, what is cheapest goes until it does\n\n",
            (unsigned)PAIR_SIDE, (unsigned)PAIR_SIDE);
-    say("| widths | load | full, mean | slots | fit nowhere | alloc us | free us | evict us |\n"
+    say("| widths | load | full, mean | slots | fit nowhere | alloc us | free us | make room us |\n"
            "|---|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < 3; i++)
         for (k = 0; k < 5; k++)

@@ -12,6 +12,7 @@
 #ifndef BENCH_HESS_H
 #define BENCH_HESS_H
 
+#include "atlas_pair.h"
 #include "bench_scene.h"
 
 enum { HESS_MARGIN = 2, HESS_SMALLEST = 8 }; /* texels around a picture; of the least side */
@@ -31,11 +32,11 @@ typedef struct hess {
     uint32_t atlas_size;      /* of each of the two */
     hess_chunk *chunks;
     uint32_t *seen, seen_count; /* chunks in sight, from the closest on */
-    terrimp_atlas_pair pair;
-    terrimp_shelf *shelves;
-    terrimp_pair_slot *slots; /* [chunks], like the next two */
-    terrimp_pack_item *items;
-    uint32_t *order;
+    atlas_pair pair;
+    pair_shelf *shelves;
+    pair_slot *slots; /* [chunks], like the next two */
+    terrimp_rect *sizes;
+    uint32_t *order;          /* [2 * chunks] */
     float scale;              /* what the last packing made of the sizes that were wanted */
     terrimp_camera camera;
     float pixel_factor;
@@ -62,15 +63,15 @@ static void hess_open(hess *h, const terrimp_terrain *terrain, const terrimp_vie
     count = h->info.chunks_x * h->info.chunks_z;
     h->chunks = need_memory(count * sizeof *h->chunks);
     h->seen = need_memory(count * sizeof *h->seen);
-    h->order = need_memory(count * sizeof *h->order);
+    h->order = need_memory(2 * count * sizeof *h->order);
     h->slots = need_memory(count * sizeof *h->slots);
-    h->items = need_memory(count * sizeof *h->items);
+    h->sizes = need_memory(count * sizeof *h->sizes);
     h->shelves = need_memory(2 * count * sizeof *h->shelves);
     memset(h->chunks, 0, count * sizeof *h->chunks);
     memset(h->slots, 0, count * sizeof *h->slots);
     for (i = 0; i < count; i++)
         need(terrimp_terrain_get_box(terrain, i, &h->chunks[i].box));
-    need(terrimp_pair_init(&h->pair, h->atlas_size, h->atlas_size, h->shelves, count));
+    pair_init(&h->pair, h->atlas_size, h->atlas_size, h->shelves, count);
 }
 
 static void hess_close(hess *h)
@@ -79,7 +80,7 @@ static void hess_close(hess *h)
     free(h->seen);
     free(h->order);
     free(h->slots);
-    free(h->items);
+    free(h->sizes);
     free(h->shelves);
 }
 
@@ -128,7 +129,7 @@ static uint32_t hess_mark_due(hess *h, int *complete)
     *complete = 1;
     for (i = 0; i < h->seen_count; i++) {
         hess_chunk *c = &h->chunks[h->seen[i]];
-        int atlas = terrimp_pair_picture(&h->pair, &h->slots[h->seen[i]]);
+        int atlas = pair_picture(&h->pair, &h->slots[h->seen[i]]);
         float angle = 0.0f;
         c->due = 0;
         if (!hess_is_impostor(h, h->seen[i]))
@@ -146,15 +147,15 @@ static uint32_t hess_mark_due(hess *h, int *complete)
 static void hess_repack(hess *h)
 {
     uint32_t i, count = h->info.chunks_x * h->info.chunks_z;
-    memset(h->items, 0, count * sizeof *h->items);
+    memset(h->sizes, 0, count * sizeof *h->sizes);
     for (i = 0; i < h->seen_count; i++)
         if (hess_is_impostor(h, h->seen[i])) {
             uint32_t size[2];
             hess_size(h, h->seen[i], size);
-            h->items[h->seen[i]].rect.width = size[0];
-            h->items[h->seen[i]].rect.height = size[1];
+            h->sizes[h->seen[i]].width = size[0];
+            h->sizes[h->seen[i]].height = size[1];
         }
-    need(terrimp_pair_repack(&h->pair, h->slots, h->items, count, h->order, &h->scale));
+    (void)pair_repack(&h->pair, h->slots, h->sizes, count, h->order, &h->scale);
     h->least_scale = h->scale < h->least_scale ? h->scale : h->least_scale;
 }
 
@@ -164,12 +165,12 @@ static int hess_assign(hess *h)
 {
     uint32_t i, size[2];
     for (i = 0; i < h->seen_count; i++) {
-        terrimp_pair_slot *slot = &h->slots[h->seen[i]];
+        pair_slot *slot = &h->slots[h->seen[i]];
         if (!h->chunks[h->seen[i]].due || slot->assigned[h->pair.newest])
             continue;
         hess_size(h, h->seen[i], size);
-        if (terrimp_pair_assign(&h->pair, slot, (uint32_t)((float)size[0] * h->scale),
-                                (uint32_t)((float)size[1] * h->scale)) != TERRIMP_OK)
+        if (!pair_assign(&h->pair, slot, (uint32_t)((float)size[0] * h->scale),
+                         (uint32_t)((float)size[1] * h->scale)))
             return 0;
     }
     return 1;
@@ -260,7 +261,7 @@ static void hess_draw_block(const hess *h, uint32_t chunk, const terrimp_callbac
 static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callbacks)
 {
     hess_chunk *c = &h->chunks[chunk];
-    terrimp_pair_slot *slot = &h->slots[chunk];
+    pair_slot *slot = &h->slots[chunk];
     terrimp_capture capture;
     terrimp_capture_command command;
     uint32_t quads = h->info.chunk_quads, size[2], i;
@@ -286,7 +287,7 @@ static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callb
     callbacks->begin_capture(callbacks->user, &command);
     hess_draw_block(h, chunk, callbacks);
     callbacks->end_capture(callbacks->user, &command);
-    need(terrimp_pair_fill(&h->pair, slot));
+    pair_fill(&h->pair, slot);
     memcpy(c->eye, capture.eye, sizeof c->eye);
     need(terrimp_texture_matrix(&capture, &command.slot, h->atlas_size, h->atlas_size,
                                 c->texture_matrix));
@@ -300,7 +301,7 @@ static void hess_draw_impostor(const hess *h, uint32_t chunk, const terrimp_call
     need(terrimp_terrain_get_mesh(h->terrain, chunk, &mesh));
     command.node = chunk;
     command.part_count = 1;
-    command.atlas = (uint32_t)terrimp_pair_picture(&h->pair, &h->slots[chunk]);
+    command.atlas = (uint32_t)pair_picture(&h->pair, &h->slots[chunk]);
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;

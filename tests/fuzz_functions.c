@@ -420,68 +420,29 @@ static int apart(const terrimp_rect *a, const terrimp_rect *b)
 
 static void use_packer(void)
 {
-    terrimp_shelves shelves;
-    terrimp_shelf *shelf;
-    terrimp_pack_item items[RECTS];
-    uint32_t order[RECTS], count = fuzz_below(RECTS), placed = 0, i, k, capacity = fuzz_below(40);
-    uint32_t side = fuzz_size(250), height = fuzz_size(250), padding = fuzz_size(4);
-    terrimp_result result;
-    shelf = (terrimp_shelf *)fuzz_take(capacity * sizeof *shelf);
-    memset(items, 0, sizeof items);
-    for (i = 0; i < count; i++) {
-        items[i].rect.width = fuzz_size(80);
-        items[i].rect.height = fuzz_size(80);
-    }
-    if (terrimp_shelves_init(&shelves, side, height, padding, shelf, capacity) == TERRIMP_OK) {
-        terrimp_rect first = { 0, 0, 0, 0 };
-        int inserted;
-        first.width = fuzz_size(30);
-        first.height = fuzz_size(30);
-        inserted = terrimp_shelves_insert(&shelves, &first) == TERRIMP_OK;
-        result = terrimp_pack_ffdh(&shelves, items, count, order, &placed);
-        if (result == TERRIMP_OK || result == TERRIMP_E_CAPACITY)
-            for (i = 0; i < count; i++) {
-                const terrimp_rect *r = &items[i].rect;
-                if (!(items[i].flags & TERRIMP_PACK_PLACED))
-                    continue;
-                FUZZ_CHECK(r->width > 0 && r->height > 0);
-                FUZZ_CHECK(r->x <= side && r->width <= side - r->x);
-                FUZZ_CHECK(r->y <= height && r->height <= height - r->y);
-                FUZZ_CHECK(!inserted || apart(r, &first));
-                for (k = 0; k < i; k++)
-                    FUZZ_CHECK(!(items[k].flags & TERRIMP_PACK_PLACED) || apart(r, &items[k].rect));
-            }
-    }
-    free(shelf);
-}
-
-static void use_pair(void)
-{
-    terrimp_atlas_pair pair;
-    terrimp_shelf shelf[2 * RECTS];
-    terrimp_pair_slot slots[RECTS];
-    terrimp_pack_item items[RECTS];
-    uint32_t order[RECTS], count = fuzz_below(RECTS), steps, i;
-    float scale;
+    terrimp_rect rects[RECTS];
+    uint32_t *order, count = fuzz_below(RECTS), i, k;
     uint32_t width = fuzz_size(250), height = fuzz_size(250);
-    if (terrimp_pair_init(&pair, width, height, shelf, RECTS) != TERRIMP_OK)
-        return;
-    memset(slots, 0, sizeof slots);
-    for (steps = fuzz_below(12); steps-- > 0;) {
-        uint32_t which = fuzz_below(RECTS), wide = fuzz_size(80), high = fuzz_size(80);
-        int picture;
-        memset(items, 0, sizeof items);
-        for (i = 0; i < count && steps % 4u == 0; i++) {
-            items[i].rect.width = fuzz_u8() & 15u ? fuzz_size(80) : 0;
-            items[i].rect.height = items[i].rect.width ? fuzz_size(80) : 0;
-        }
-        if (steps % 4u == 0)
-            (void)terrimp_pair_repack(&pair, slots, items, count, order, &scale);
-        (void)terrimp_pair_assign(&pair, slots + which, wide, high);
-        (void)terrimp_pair_fill(&pair, slots + which);
-        picture = terrimp_pair_picture(&pair, slots + which);
-        FUZZ_CHECK(picture >= -1 && picture <= 1);
+    float scale = 0.0f;
+    order = (uint32_t *)fuzz_take(2u * count * sizeof *order);
+    memset(rects, 0, sizeof rects);
+    for (i = 0; i < count; i++) {
+        rects[i].width = fuzz_u8() & 15u ? fuzz_size(80) : 0;
+        rects[i].height = fuzz_size(80);
     }
+    if (terrimp_pack_ffdh(width, height, rects, count, order, &scale) == TERRIMP_OK) {
+        FUZZ_CHECK(scale > 0.0f && scale <= 1.0f);
+        for (i = 0; i < count; i++) {
+            const terrimp_rect *r = &rects[i];
+            if (r->width == 0 || r->height == 0)
+                continue;
+            FUZZ_CHECK(r->x <= width && r->width <= width - r->x);
+            FUZZ_CHECK(r->y <= height && r->height <= height - r->y);
+            for (k = 0; k < i; k++)
+                FUZZ_CHECK(rects[k].width == 0 || rects[k].height == 0 || apart(r, &rects[k]));
+        }
+    }
+    free(order);
 }
 
 /* ---- the calls ---- */
@@ -489,7 +450,7 @@ static void use_pair(void)
 static void (*const calls[])(void) = {
     change_field, change_place_of_field, refuse_field, change_camera, change_box,   query_field,
     read_field,   fill_field,            cast_ray,     use_camera,    use_capture,  judge_picture,
-    use_patterns, use_geomip,            use_packer,   use_pair,      use_simplifier,
+    use_patterns, use_geomip,            use_packer,   use_simplifier,
 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)

@@ -420,7 +420,7 @@ static flight_pose pose_at(const scene *s, float u, float v, float clearance, fl
                            float down_degrees)
 {
     const terrimp_box *box = &s->info.box;
-    float heading = heading_degrees * DEGREE, down = down_degrees * DEGREE, ground;
+    float heading = heading_degrees * DEGREE, down = down_degrees * DEGREE, ground = 0.0f;
     flight_pose pose;
     pose.eye[0] = box->min[0] + u * (box->max[0] - box->min[0]);
     pose.eye[2] = box->min[2] + v * (box->max[2] - box->min[2]);
@@ -1605,6 +1605,8 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
     scene_close(&s);
 }
 
+#include "render_scene.h"
+
 int main(void)
 {
     setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
@@ -1614,6 +1616,7 @@ int main(void)
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);
+    RUN(houses_and_seas_meet_the_terrain);
     RUN(pictures_in_two_parts_show_what_ridges_hide);
     RUN(pictures_in_pieces_are_like_whole_ones);
     RUN(frames_change_no_more_than_those_of_the_full_mesh);

@@ -26,11 +26,14 @@ static void *unit_malloc(size_t bytes)
 #include "unit_impostor.h"
 #include "unit_atlas.h"
 #include "unit_terrain.h"
+#include "unit_visibility.h"
 #include "unit_view.h"
 #include "unit_numbers.h"
+#include "unit_sorted.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
 #include "unit_layers.h"
+#include "unit_placement.h"
 #include "unit_golden.h"
 
 int main(int argc, char **argv)
@@ -50,9 +53,12 @@ int main(int argc, char **argv)
     terrain_tests();
     numbers_tests();
     bake_tests();
+    visibility_tests();
     view_tests();
+    sorted_tests();
     bad_input_tests();
     layers_tests();
+    placement_tests();
     golden_tests();
     return check_report();
 }

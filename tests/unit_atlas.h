@@ -1,7 +1,9 @@
-/* Laws of the atlas room: shelves, first-fit decreasing height, the pair of atlases. */
+/* Laws of the atlas room: first-fit decreasing height, the pair of atlases that tests and
+   benchmarks make of it, the live atlas. */
 #ifndef UNIT_ATLAS_H
 #define UNIT_ATLAS_H
 
+#include "atlas_pair.h"
 #include "unit_oracle.h"
 
 enum { ATLAS_ITEMS = 200 };
@@ -18,154 +20,172 @@ static int rect_within(const terrimp_rect *rect, uint32_t width, uint32_t height
            rect->height <= height - rect->y;
 }
 
-static void random_items(terrimp_pack_item *items, uint32_t count, uint32_t width, uint32_t height)
+static void random_rects(terrimp_rect *rects, uint32_t count, uint32_t width, uint32_t height)
 {
     uint32_t i;
-    memset(items, UNTOUCHED, count * sizeof *items);
+    memset(rects, UNTOUCHED, count * sizeof *rects);
     for (i = 0; i < count; i++) {
-        items[i].rect.width = random_range(1, width);
-        items[i].rect.height = random_range(1, height);
+        rects[i].width = random_range(1, width);
+        rects[i].height = random_range(1, height);
     }
 }
 
+/* Rectangles keep apart and inside, and have the sizes that were asked for at one common scale. */
 static void packed_rectangles_keep_apart_and_inside(void)
 {
-    static terrimp_pack_item items[ATLAS_ITEMS];
-    static terrimp_shelf rows[ATLAS_ITEMS];
-    static uint32_t order[ATLAS_ITEMS];
-    int i, some_left = 0, all_fit = 0;
+    static terrimp_rect rects[ATLAS_ITEMS], wanted[ATLAS_ITEMS];
+    static uint32_t order[2 * ATLAS_ITEMS];
+    int i, reduced = 0, whole = 0, empty = 0;
     for (i = 0; i < 300; i++) {
-        terrimp_shelves shelves;
-        uint32_t width = random_range(1, 700), height = random_range(1, 700);
-        uint32_t padding = random_range(0, 4), count = random_range(0, ATLAS_ITEMS), k, j;
-        uint32_t placed = 12345, flagged = 0;
-        terrimp_result result;
-        random_items(items, count, random_range(1, width), random_range(1, height));
-        CHECK(terrimp_shelves_init(&shelves, width, height, padding, rows, ATLAS_ITEMS) ==
-              TERRIMP_OK);
-        result = terrimp_pack_ffdh(&shelves, items, count, order, &placed);
+        uint32_t width = random_range(15, 700), height = random_range(15, 700);
+        uint32_t count = random_range(0, ATLAS_ITEMS), k, j;
+        float scale = 0.0f;
+        random_rects(rects, count, random_range(1, 2u * width), random_range(1, height));
+        for (k = 0; k < count; k++)
+            if (random_range(0, 9) == 0)
+                *(random_range(0, 1) ? &rects[k].width : &rects[k].height) = 0;
+        memcpy(wanted, rects, sizeof rects);
+        CHECK(terrimp_pack_ffdh(width, height, rects, count, order, &scale) == TERRIMP_OK);
+        CHECK(scale > 0.0f && scale <= 1.0f);
         for (k = 0; k < count; k++) {
-            if (!(items[k].flags & TERRIMP_PACK_PLACED))
+            double w = (double)wanted[k].width * (double)scale;
+            double h = (double)wanted[k].height * (double)scale;
+            CHECK(fabs((double)rects[k].width - (w > 0.0 ? fmax(w, 1.0) : 0.0)) <= 1.001);
+            CHECK(fabs((double)rects[k].height - (h > 0.0 ? fmax(h, 1.0) : 0.0)) <= 1.001);
+            CHECK(scale < 1.0f || (rects[k].width == wanted[k].width &&
+                                   rects[k].height == wanted[k].height));
+            CHECK((rects[k].width > 0) == (wanted[k].width > 0));
+            if (rects[k].width == 0 || rects[k].height == 0) {
+                empty++;
                 continue;
-            flagged++;
-            CHECK(rect_within(&items[k].rect, width, height));
+            }
+            CHECK(rect_within(&rects[k], width, height));
             for (j = 0; j < k; j++)
-                CHECK(!(items[j].flags & TERRIMP_PACK_PLACED) ||
-                      !rects_overlap(&items[k].rect, &items[j].rect, padding));
+                CHECK(rects[j].width == 0 || rects[j].height == 0 ||
+                      !rects_overlap(&rects[k], &rects[j], 0));
         }
-        CHECK(placed == flagged);
-        CHECK(result == (placed == count ? TERRIMP_OK : TERRIMP_E_CAPACITY));
-        CHECK(terrimp_pack_ffdh(&shelves, items, 0, NULL, NULL) == TERRIMP_OK);
-        some_left += placed < count;
-        all_fit += placed == count;
+        reduced += scale < 1.0f;
+        whole += scale == 1.0f;
     }
-    CHECK(some_left > 30 && all_fit > 30);
+    CHECK(reduced > 30 && whole > 30 && empty > 1000);
+    CHECK(terrimp_pack_ffdh(8, 8, NULL, 0, NULL, NULL) == TERRIMP_OK);
 }
 
-/* A rectangle that is larger than the atlas is reduced to fit it, with its shape, and said so. */
+/* A rectangle that is larger than the atlas, however much, is reduced to fit it, with its shape, by
+   no more than a step too much. */
 static void oversize_rectangles_are_scaled_with_their_shape(void)
 {
     int i;
     for (i = 0; i < 3000; i++) {
-        terrimp_shelf row;
-        terrimp_shelves shelves;
-        terrimp_pack_item item;
-        uint32_t order, placed, width = random_range(1, 2000), height = random_range(1, 2000);
+        terrimp_rect rect;
+        uint32_t order[2], width = random_range(1, 2000), height = random_range(1, 2000);
         uint32_t w = random_range(1, 5000), h = random_range(1, 5000);
-        double scale = fmin(1.0, fmin((double)width / (double)w, (double)height / (double)h));
+        double most;
+        float scale = 0.0f;
         if (i % 50 == 0)
             w = 0xffffffffu - random_range(0, 3);
         if (i % 50 == 1)
             h = 0xffffffffu;
-        scale = fmin(1.0, fmin((double)width / (double)w, (double)height / (double)h));
-        item.rect.width = w;
-        item.rect.height = h;
-        CHECK(terrimp_shelves_init(&shelves, width, height, 0, &row, 1) == TERRIMP_OK);
-        CHECK(terrimp_pack_ffdh(&shelves, &item, 1, &order, &placed) == TERRIMP_OK);
-        CHECK(placed == 1 && (item.flags & TERRIMP_PACK_PLACED));
-        CHECK(((item.flags & TERRIMP_PACK_SCALED) != 0) == (scale < 1.0));
-        CHECK(rect_within(&item.rect, width, height));
-        CHECK(fabs((double)item.rect.width - (double)w * scale) <= 1.001);
-        CHECK(fabs((double)item.rect.height - (double)h * scale) <= 1.001);
-        CHECK(scale < 1.0 || (item.rect.width == w && item.rect.height == h));
+        /* a side below two texels counts as one */
+        most = fmin((double)(width + (width < 2u)) / (double)w,
+                    (double)(height + (height < 2u)) / (double)h);
+        rect.width = w;
+        rect.height = h;
+        CHECK(terrimp_pack_ffdh(width, height, &rect, 1, order, &scale) == TERRIMP_OK);
+        CHECK(rect_within(&rect, width, height) && rect.x == 0 && rect.y == 0);
+        CHECK(fabs((double)rect.width - fmax((double)w * (double)scale, 1.0)) <= 1.001);
+        CHECK(fabs((double)rect.height - fmax((double)h * (double)scale, 1.0)) <= 1.001);
+        CHECK((w <= width && h <= height) == (scale == 1.0f));
+        CHECK(scale == 1.0f || (double)scale >= 0.9399 * fmin(most, 1.0));
     }
 }
 
-/* The algorithm as its paper words it, one rectangle at a time: what the library has to match. */
+/* The algorithm as its paper words it, one rectangle at a time: what the library has to match, at
+   the scale that it chose. And it may choose a lower one only where a step less does not fit. */
+static int matches_the_paper(const terrimp_rect *rects, const uint32_t *order, uint32_t count,
+                             uint32_t width, uint32_t height, float scale, int places)
+{
+    static uint32_t y[ATLAS_ITEMS], high[ATLAS_ITEMS], used[ATLAS_ITEMS];
+    uint32_t k, s, shelf_count = 0, top = 0;
+    for (k = 0; k < count; k++) {
+        const terrimp_rect *r = &rects[order[k]];
+        uint32_t w = (uint32_t)((float)r->width * scale), h = (uint32_t)((float)r->height * scale);
+        w = w < 1u ? 1u : w;
+        h = h < 1u ? 1u : h;
+        for (s = 0; s < shelf_count; s++)
+            if (h <= high[s] && used[s] + w <= width)
+                break;
+        if (s == shelf_count) {
+            if (top + h > height || w > width)
+                return 0;
+            y[s] = top;
+            high[s] = h;
+            used[s] = 0;
+            top += h;
+            shelf_count++;
+        }
+        if (places)
+            CHECK(r->x == used[s] && r->y == y[s]);
+        used[s] += w;
+    }
+    return 1;
+}
+
 static void packing_is_first_fit_from_the_tallest(void)
 {
-    static terrimp_pack_item items[ATLAS_ITEMS];
-    static terrimp_shelf rows[ATLAS_ITEMS];
-    static uint32_t order[ATLAS_ITEMS];
-    int i;
+    static terrimp_rect rects[ATLAS_ITEMS], wanted[ATLAS_ITEMS];
+    static uint32_t order[2 * ATLAS_ITEMS];
+    int i, reduced = 0;
     for (i = 0; i < 200; i++) {
-        terrimp_shelves shelves;
-        uint32_t y[ATLAS_ITEMS], high[ATLAS_ITEMS], used[ATLAS_ITEMS], count, k, s;
-        uint32_t shelf_count = 0, top = 0, width = random_range(20, 300);
+        uint32_t count = random_range(1, ATLAS_ITEMS), k, width = random_range(20, 300);
         unsigned char seen[ATLAS_ITEMS] = {0};
-        count = random_range(1, ATLAS_ITEMS);
-        random_items(items, count, width, i % 2 ? 5 : 200); /* few heights: many ties */
-        CHECK(terrimp_shelves_init(&shelves, width, 1000, 1, rows, ATLAS_ITEMS) == TERRIMP_OK);
-        (void)terrimp_pack_ffdh(&shelves, items, count, order, NULL);
+        float scale = 0.0f;
+        random_rects(rects, count, width, i % 2 ? 5 : 200); /* few heights: many ties */
+        memcpy(wanted, rects, sizeof rects);
+        CHECK(terrimp_pack_ffdh(width, 1000, rects, count, order, &scale) == TERRIMP_OK);
         for (k = 0; k < count; k++) {
-            const terrimp_rect *r;
+            const terrimp_rect *r, *before;
             CHECK(order[k] < count && !seen[order[k]]);
             seen[order[k]] = 1;
-            r = &items[order[k]].rect;
-            if (k > 0) {
-                const terrimp_rect *before = &items[order[k - 1u]].rect;
-                CHECK(before->height > r->height ||
-                      (before->height == r->height &&
-                       (before->width > r->width ||
-                        (before->width == r->width && order[k - 1u] < order[k]))));
-            }
-            for (s = 0; s < shelf_count; s++)
-                if (r->height <= high[s] && used[s] + r->width <= width)
-                    break;
-            if (s == shelf_count && top + r->height <= 1000u) {
-                y[s] = top;
-                high[s] = r->height;
-                used[s] = 0;
-                top += r->height + 1u;
-                shelf_count++;
-            }
-            CHECK(((items[order[k]].flags & TERRIMP_PACK_PLACED) != 0) == (s < shelf_count));
-            if (s == shelf_count)
-                continue;
-            CHECK(r->x == used[s] && r->y == y[s]);
-            used[s] += r->width + 1u;
+            r = &wanted[order[k]];
+            before = &wanted[order[k > 0 ? k - 1u : 0]];
+            CHECK(k == 0 || before->height > r->height ||
+                  (before->height == r->height &&
+                   (before->width > r->width ||
+                    (before->width == r->width && order[k - 1u] < order[k]))));
+        }
+        CHECK(matches_the_paper(rects, order, count, width, 1000, 1.0f, 1));
+        if (scale < 1.0f) {
+            reduced++;
+            CHECK(!matches_the_paper(wanted, order, count, width, 1000, 1.0f, 0));
+            CHECK(!matches_the_paper(wanted, order, count, width, 1000, scale / 0.94f, 0));
         }
     }
+    CHECK(reduced > 20);
 }
 
 static void packing_is_deterministic(void)
 {
-    static terrimp_pack_item items[ATLAS_ITEMS], again[ATLAS_ITEMS];
-    static terrimp_shelf rows[ATLAS_ITEMS];
-    static uint32_t order[ATLAS_ITEMS];
+    static terrimp_rect rects[ATLAS_ITEMS], again[ATLAS_ITEMS];
+    static uint32_t order[2 * ATLAS_ITEMS];
     int i;
     for (i = 0; i < 50; i++) {
-        terrimp_shelves shelves;
-        random_items(items, ATLAS_ITEMS, 40, 6);
-        memcpy(again, items, sizeof items);
-        memset(rows, i, sizeof rows);
-        (void)terrimp_shelves_init(&shelves, 300, 300, 0, rows, ATLAS_ITEMS);
-        (void)terrimp_pack_ffdh(&shelves, items, ATLAS_ITEMS, order, NULL);
+        random_rects(rects, ATLAS_ITEMS, 40, 6);
+        memcpy(again, rects, sizeof rects);
+        (void)terrimp_pack_ffdh(300, 300, rects, ATLAS_ITEMS, order, NULL);
         memset(order, i, sizeof order);
-        memset(rows, ~i, sizeof rows);
-        (void)terrimp_shelves_init(&shelves, 300, 300, 0, rows, ATLAS_ITEMS);
-        (void)terrimp_pack_ffdh(&shelves, again, ATLAS_ITEMS, order, NULL);
-        CHECK(memcmp(items, again, sizeof items) == 0);
+        (void)terrimp_pack_ffdh(300, 300, again, ATLAS_ITEMS, order, NULL);
+        CHECK(memcmp(rects, again, sizeof rects) == 0);
     }
 }
 
-/* Cuts a rectangle at random into pieces of `items`, so that the best packing is known. */
-static void cut(const terrimp_rect *whole, terrimp_pack_item *items, uint32_t *count, int depth)
+/* Cuts a rectangle at random into pieces of `rects`, so that the best packing is known. */
+static void cut(const terrimp_rect *whole, terrimp_rect *rects, uint32_t *count, int depth)
 {
     terrimp_rect a = *whole, b = *whole;
     int across = whole->height < 2u || (whole->width >= 2u && random_range(0, 1));
     if (depth == 0 || *count >= ATLAS_ITEMS - 16u || (whole->width < 2u && whole->height < 2u)) {
-        items[(*count)++].rect = *whole;
+        rects[(*count)++] = *whole;
         return;
     }
     if (across) {
@@ -175,75 +195,40 @@ static void cut(const terrimp_rect *whole, terrimp_pack_item *items, uint32_t *c
         a.height = random_range(1, whole->height - 1u);
         b.height = whole->height - a.height;
     }
-    cut(&a, items, count, depth - 1);
-    cut(&b, items, count, depth - 1);
+    cut(&a, rects, count, depth - 1);
+    cut(&b, rects, count, depth - 1);
 }
 
 /* Coffman, Garey, Johnson and Tarjan 1980: at most 1.7 OPT + the tallest. OPT is known where the
    pieces come from one rectangle; for any pieces, twice their area bounds the height instead. */
 static void packing_height_keeps_its_bound(void)
 {
-    static terrimp_pack_item items[ATLAS_ITEMS];
-    static terrimp_shelf rows[ATLAS_ITEMS];
-    static uint32_t order[ATLAS_ITEMS];
+    static terrimp_rect rects[ATLAS_ITEMS];
+    static uint32_t order[2 * ATLAS_ITEMS];
     int i;
     for (i = 0; i < 400; i++) {
-        terrimp_shelves shelves;
         terrimp_rect whole;
-        uint32_t count = 0, k, tallest = 0;
+        uint32_t count = 0, k, tallest = 0, top = 0;
         double area = 0.0, bound;
+        float scale = 0.0f;
         memset(&whole, 0, sizeof whole);
         whole.width = random_range(10, 500);
         whole.height = random_range(10, 500);
         if (i % 2)
-            cut(&whole, items, &count, (int)random_range(1, 7));
+            cut(&whole, rects, &count, (int)random_range(1, 7));
         else
-            random_items(items, count = ATLAS_ITEMS, whole.width, whole.height);
+            random_rects(rects, count = ATLAS_ITEMS, whole.width, whole.height);
         for (k = 0; k < count; k++) {
-            tallest = items[k].rect.height > tallest ? items[k].rect.height : tallest;
-            area += (double)items[k].rect.width * (double)items[k].rect.height;
+            tallest = rects[k].height > tallest ? rects[k].height : tallest;
+            area += (double)rects[k].width * (double)rects[k].height;
         }
-        CHECK(terrimp_shelves_init(&shelves, whole.width, 65536, 0, rows, ATLAS_ITEMS) ==
-              TERRIMP_OK);
-        if (terrimp_pack_ffdh(&shelves, items, count, order, NULL) != TERRIMP_OK)
+        CHECK(terrimp_pack_ffdh(whole.width, 65536, rects, count, order, &scale) == TERRIMP_OK);
+        if (scale < 1.0f)
             continue; /* random ones can be too many */
+        for (k = 0; k < count; k++)
+            top = rects[k].y + rects[k].height > top ? rects[k].y + rects[k].height : top;
         bound = (i % 2 ? 1.7 : 2.0) * area / (double)whole.width + (double)tallest;
-        CHECK((double)shelves.top <= bound);
-    }
-}
-
-static void shelves_take_rectangles_one_by_one(void)
-{
-    static terrimp_shelf rows[64];
-    static terrimp_rect taken[2000];
-    int i;
-    for (i = 0; i < 60; i++) {
-        terrimp_shelves shelves, before;
-        uint32_t width = random_range(10, 300), height = random_range(10, 300), count = 0, k;
-        uint32_t padding = random_range(0, 3), tries;
-        memset(&shelves, 0, sizeof shelves); /* compared as bytes below, gaps included */
-        CHECK(terrimp_shelves_init(&shelves, width, height, padding, rows, 64) == TERRIMP_OK);
-        CHECK(shelves.count == 0 && shelves.top == 0);
-        for (tries = 0; tries < 200; tries++) {
-            terrimp_rect rect;
-            terrimp_result result;
-            rect.x = rect.y = 777;
-            rect.width = random_range(1, width / 3u + 2u);
-            rect.height = random_range(1, height / 4u + 2u);
-            before = shelves;
-            result = terrimp_shelves_insert(&shelves, &rect);
-            if (result != TERRIMP_OK) {
-                CHECK(result == TERRIMP_E_CAPACITY);
-                CHECK(rect.x == 777 && rect.y == 777);
-                CHECK(memcmp(&before, &shelves, sizeof shelves) == 0);
-                continue;
-            }
-            CHECK(rect_within(&rect, width, height));
-            for (k = 0; k < count; k++)
-                CHECK(!rects_overlap(&rect, &taken[k], padding));
-            taken[count++] = rect;
-        }
-        CHECK(count > 5);
+        CHECK((double)top <= bound);
     }
 }
 
@@ -253,9 +238,9 @@ enum { PAIR_SIDE = 96, PAIR_SLOTS = 24 };
 
 /* What the texels of both atlases show: the number of the picture painted there last. */
 typedef struct painted_pair {
-    terrimp_atlas_pair pair;
-    terrimp_shelf rows[2 * PAIR_SLOTS];
-    terrimp_pair_slot slots[PAIR_SLOTS];
+    atlas_pair pair;
+    pair_shelf rows[2 * PAIR_SLOTS];
+    pair_slot slots[PAIR_SLOTS];
     uint32_t texel[2][PAIR_SIDE][PAIR_SIDE];
     uint32_t picture[PAIR_SLOTS]; /* number of the slot's latest picture; 0: none */
     uint32_t painted;
@@ -270,8 +255,8 @@ static void paint(painted_pair *p, uint32_t slot)
     for (y = rect->y; y < rect->y + rect->height; y++)
         for (x = rect->x; x < rect->x + rect->width; x++)
             p->texel[atlas][y][x] = p->painted;
-    CHECK(terrimp_pair_fill(&p->pair, &p->slots[slot]) == TERRIMP_OK);
-    CHECK(terrimp_pair_picture(&p->pair, &p->slots[slot]) == (int)atlas);
+    pair_fill(&p->pair, &p->slots[slot]);
+    CHECK(pair_picture(&p->pair, &p->slots[slot]) == (int)atlas);
     CHECK(!p->slots[slot].assigned[1u - atlas]); /* it has moved */
     CHECK(!p->slots[slot].filled[1u - atlas]);
 }
@@ -281,7 +266,7 @@ static void check_pictures(const painted_pair *p)
 {
     uint32_t slot, x, y;
     for (slot = 0; slot < PAIR_SLOTS; slot++) {
-        int atlas = terrimp_pair_picture(&p->pair, &p->slots[slot]);
+        int atlas = pair_picture(&p->pair, &p->slots[slot]);
         const terrimp_rect *rect;
         int whole = 1;
         if (atlas < 0)
@@ -297,29 +282,23 @@ static void check_pictures(const painted_pair *p)
 /* Packs the outdated atlas for all slots, as the terrain does when every picture has moved. */
 static void repack_all(painted_pair *p, uint32_t most, float *scale)
 {
-    terrimp_pack_item items[PAIR_SLOTS];
-    uint32_t order[PAIR_SLOTS], slot, outdated = 1u - p->pair.newest, repacks = p->pair.repacks;
-    uint32_t wanted[PAIR_SLOTS][2];
+    terrimp_rect rects[PAIR_SLOTS];
+    uint32_t order[2 * PAIR_SLOTS], slot, outdated = 1u - p->pair.newest;
+    uint32_t repacks = p->pair.repacks;
+    memset(rects, 0, sizeof rects);
     for (slot = 0; slot < PAIR_SLOTS; slot++) {
-        wanted[slot][0] = items[slot].rect.width = random_range(0, most);
-        wanted[slot][1] = items[slot].rect.height = random_range(0, most);
+        rects[slot].width = random_range(0, most);
+        rects[slot].height = random_range(0, most);
     }
-    CHECK(terrimp_pair_repack(&p->pair, p->slots, items, PAIR_SLOTS, order, scale) == TERRIMP_OK);
+    CHECK(pair_repack(&p->pair, p->slots, rects, PAIR_SLOTS, order, scale));
     CHECK(p->pair.newest == outdated && p->pair.repacks == repacks + 1u);
     for (slot = 0; slot < PAIR_SLOTS; slot++) {
-        const terrimp_pair_slot *s = &p->slots[slot];
-        int empty = wanted[slot][0] == 0 || wanted[slot][1] == 0;
+        const pair_slot *s = &p->slots[slot];
+        int empty = rects[slot].width == 0 || rects[slot].height == 0;
         CHECK(s->assigned[p->pair.newest] == !empty);
         CHECK(!s->filled[p->pair.newest]);
-        if (empty)
-            continue;
-        CHECK(memcmp(&s->rect[p->pair.newest], &items[slot].rect, sizeof(terrimp_rect)) == 0);
-        CHECK(fabs((double)items[slot].rect.width -
-                   fmax(1.0, (double)wanted[slot][0] * (double)*scale)) <= 1.001);
-        CHECK(fabs((double)items[slot].rect.height -
-                   fmax(1.0, (double)wanted[slot][1] * (double)*scale)) <= 1.001);
-        CHECK(*scale < 1.0f || (items[slot].rect.width == wanted[slot][0] &&
-                                items[slot].rect.height == wanted[slot][1]));
+        CHECK(empty ||
+              memcmp(&s->rect[p->pair.newest], &rects[slot], sizeof(terrimp_rect)) == 0);
     }
 }
 
@@ -331,13 +310,13 @@ static void pair_never_overwrites_a_picture_in_use(void)
     int run, frame, moves = 0, repacks = 0;
     for (run = 0; run < 12; run++) {
         memset(&p, 0, sizeof p);
-        CHECK(terrimp_pair_init(&p.pair, PAIR_SIDE, PAIR_SIDE, p.rows, PAIR_SLOTS) == TERRIMP_OK);
+        pair_init(&p.pair, PAIR_SIDE, PAIR_SIDE, p.rows, PAIR_SLOTS);
         for (frame = 0; frame < 120; frame++) {
             uint32_t n, slot;
             int complete = 1;
             float scale = 0.0f;
             for (slot = 0; slot < PAIR_SLOTS; slot++)
-                complete = complete && terrimp_pair_picture(&p.pair, &p.slots[slot]) !=
+                complete = complete && pair_picture(&p.pair, &p.slots[slot]) !=
                                            1 - (int)p.pair.newest;
             if (complete || random_range(0, 20) == 0) { /* also before time, when it is full */
                 repack_all(&p, run % 3 ? 18 : 60, &scale);
@@ -348,15 +327,11 @@ static void pair_never_overwrites_a_picture_in_use(void)
                 slot = random_range(0, PAIR_SLOTS - 1);
                 if (!p.slots[slot].assigned[p.pair.newest] || random_range(0, 7) == 0) {
                     uint32_t width = random_range(1, 18), height = random_range(1, 18);
-                    if (terrimp_pair_assign(&p.pair, &p.slots[slot], width, height) == TERRIMP_OK)
+                    if (pair_assign(&p.pair, &p.slots[slot], width, height))
                         CHECK(!p.slots[slot].filled[p.pair.newest]); /* a new place is empty */
                 }
-                if (!p.slots[slot].assigned[p.pair.newest]) {
-                    CHECK(terrimp_pair_fill(&p.pair, &p.slots[slot]) == TERRIMP_E_STATE);
-                    continue;
-                }
-                if (random_range(0, 9) == 0)
-                    continue; /* a host that drops a frame */
+                if (!p.slots[slot].assigned[p.pair.newest] || random_range(0, 9) == 0)
+                    continue; /* full, or a host that drops a frame */
                 paint(&p, slot);
                 moves++;
                 check_pictures(&p);
@@ -366,74 +341,29 @@ static void pair_never_overwrites_a_picture_in_use(void)
     CHECK(moves > 2000 && repacks > 100);
 }
 
-/* Sizes that do not fit are reduced, all alike, and by no more than a step too much. First fit has
-   its anomalies: now and then larger rectangles fit where smaller ones do not. */
-static void pair_reduces_what_does_not_fit(void)
-{
-    int i, reduced = 0, anomalies = 0;
-    for (i = 0; i < 200; i++) {
-        static painted_pair p;
-        terrimp_pack_item items[PAIR_SLOTS], larger[PAIR_SLOTS];
-        uint32_t order[PAIR_SLOTS], k, j, most = random_range(5, 90), placed;
-        float scale = 0.0f;
-        terrimp_shelves shelves;
-        terrimp_shelf rows[PAIR_SLOTS];
-        memset(&p, 0, sizeof p);
-        CHECK(terrimp_pair_init(&p.pair, PAIR_SIDE, PAIR_SIDE, p.rows, PAIR_SLOTS) == TERRIMP_OK);
-        random_items(items, PAIR_SLOTS, most, most);
-        memcpy(larger, items, sizeof items);
-        CHECK(terrimp_pair_repack(&p.pair, p.slots, items, PAIR_SLOTS, order, &scale) ==
-              TERRIMP_OK);
-        for (k = 0; k < PAIR_SLOTS; k++)
-            for (j = 0; j < k; j++)
-                CHECK(!rects_overlap(&items[k].rect, &items[j].rect, 0));
-        CHECK(scale > 0.0f && scale <= 1.0f);
-        if (scale < 1.0f) {
-            reduced++;
-            for (k = 0; k < PAIR_SLOTS; k++) {
-                uint32_t w = (uint32_t)((float)larger[k].rect.width * scale * 1.07f) + 1u;
-                uint32_t h = (uint32_t)((float)larger[k].rect.height * scale * 1.07f) + 1u;
-                larger[k].rect.width = w;
-                larger[k].rect.height = h;
-                CHECK(items[k].flags & TERRIMP_PACK_SCALED);
-            }
-            (void)terrimp_shelves_init(&shelves, PAIR_SIDE, PAIR_SIDE, 0, rows, PAIR_SLOTS);
-            anomalies += terrimp_pack_ffdh(&shelves, larger, PAIR_SLOTS, order, &placed) ==
-                         TERRIMP_OK;
-        }
-    }
-    CHECK(reduced > 50 && anomalies * 10 < reduced);
-}
-
 /* Where not even a texel each fits, slots are left without a place, the other atlas as it was. */
 static void pair_reports_when_nothing_fits(void)
 {
-    terrimp_atlas_pair pair;
-    terrimp_pair_slot slots[5];
-    terrimp_pack_item items[5];
-    terrimp_shelf rows[10];
-    uint32_t order[5], k;
+    atlas_pair pair;
+    pair_slot slots[5];
+    terrimp_rect rects[5];
+    pair_shelf rows[10];
+    uint32_t order[10], k;
+    float scale = 7.0f;
     memset(slots, 0, sizeof slots);
-    CHECK(terrimp_pair_init(&pair, 2, 2, rows, 5) == TERRIMP_OK);
-    CHECK(terrimp_pair_assign(&pair, &slots[0], 2, 2) == TERRIMP_OK);
-    CHECK(terrimp_pair_fill(&pair, &slots[0]) == TERRIMP_OK);
+    pair_init(&pair, 2, 2, rows, 5);
+    CHECK(pair_assign(&pair, &slots[0], 2, 2));
+    pair_fill(&pair, &slots[0]);
     for (k = 0; k < 5; k++)
-        items[k].rect.width = items[k].rect.height = 1;
-    CHECK(terrimp_pair_repack(&pair, slots, items, 5, order, NULL) == TERRIMP_E_CAPACITY);
+        rects[k].width = rects[k].height = 1;
+    CHECK(!pair_repack(&pair, slots, rects, 5, order, &scale) && scale == 7.0f);
     for (k = 0; k < 5; k++)
-        CHECK(!slots[k].assigned[pair.newest]);
-    CHECK(terrimp_pair_picture(&pair, &slots[0]) == 1 - (int)pair.newest);
-    CHECK(terrimp_pair_repack(&pair, slots, items, 4, order, NULL) == TERRIMP_OK);
+        CHECK(!slots[k].assigned[pair.newest] && rects[k].width == 1 && rects[k].height == 1);
+    CHECK(pair_picture(&pair, &slots[0]) == 1 - (int)pair.newest);
+    CHECK(pair_repack(&pair, slots, rects, 4, order, &scale) && scale == 1.0f);
 }
 
 /* ---- the live atlas ---- */
-
-/* Costs that protect a slot: negative, infinite, NaN. */
-static float not_a_cost(int i)
-{
-    volatile float zero = 0.0f;
-    return i % 3 == 0 ? -1.0f : i % 3 == 1 ? 1.0f / zero : zero / zero;
-}
 
 enum { LIVE_SLOTS = 64 };
 
@@ -508,7 +438,7 @@ static terrimp_result live_alloc(live_model *m, uint32_t width, uint32_t height)
         return result;
     }
     CHECK(slot < d->max_slots && m->taken[slot].width == 0);
-    CHECK(terrimp_live_atlas_rect(&m->atlas, slot, &rect) == TERRIMP_OK);
+    rect = m->atlas.slots[slot];
     CHECK(rect.width == width && rect.height == height);
     CHECK(rect_within(&rect, d->width, d->height));
     for (k = 0; k < d->max_slots; k++)
@@ -571,16 +501,6 @@ static void live_slots_keep_apart_inside_and_find_all_room(void)
         live_close(&m);
     }
     CHECK(failed > 300);
-}
-
-/* What a slot may take of a free rectangle. */
-static terrimp_rect live_unpadded(const live_model *m, const terrimp_rect *hole)
-{
-    terrimp_rect rect = *hole;
-    uint32_t padding = m->atlas.desc.padding;
-    rect.width = rect.width > padding ? rect.width - padding : 0;
-    rect.height = rect.height > padding ? rect.height - padding : 0;
-    return rect;
 }
 
 /* Whether a rectangle, padding included, is free and within the atlas. */
@@ -670,7 +590,7 @@ static void live_slots_go_where_they_fit_best(void)
                 continue;
             before = m;
             CHECK(terrimp_live_atlas_alloc(&m.atlas, width, height, &slot) == TERRIMP_OK);
-            CHECK(terrimp_live_atlas_rect(&m.atlas, slot, &rect) == TERRIMP_OK);
+            rect = m.atlas.slots[slot];
             m.taken[slot] = rect;
             m.count++;
             rect.width += padding;
@@ -692,39 +612,22 @@ static void live_slots_go_where_they_fit_best(void)
     CHECK(choices > 200);
 }
 
-static void live_statistics_count_what_is_there(void)
+static void live_atlas_counts_what_is_there(void)
 {
     int run, step;
     for (run = 0; run < 8; run++) {
         live_model m;
-        uint32_t width = random_range(50, 300), height = random_range(50, 300);
-        live_open(&m, width, height, random_range(0, 2), LIVE_SLOTS);
+        live_open(&m, random_range(50, 300), random_range(50, 300), random_range(0, 2), LIVE_SLOTS);
         for (step = 0; step < 200; step++) {
-            terrimp_live_atlas_stats stats;
             uint32_t k, texels = 0;
             live_churn(&m, 3, 50);
-            CHECK(terrimp_live_atlas_query(&m.atlas, &stats) == TERRIMP_OK);
-            for (k = 0; k < LIVE_SLOTS; k++)
+            for (k = 0; k < LIVE_SLOTS; k++) {
+                CHECK(m.atlas.slots[k].width == m.taken[k].width);
                 texels += m.taken[k].width * m.taken[k].height * (m.taken[k].width > 0);
-            CHECK(stats.slots == m.count && stats.texels_used == texels);
-            CHECK(stats.texels_free == width * height - texels && stats.failures == m.failures);
-            for (k = 0; k < m.atlas.hole_count; k++) {
-                terrimp_rect hole = live_unpadded(&m, &m.atlas.holes[k]);
-                CHECK(hole.width * hole.height <= stats.largest_width * stats.largest_height);
             }
-            if (m.count == LIVE_SLOTS)
-                continue;
-            CHECK(stats.largest_width > 0 ? stats.largest_height > 0 : !live_fits(&m, 1, 1));
-            if (stats.largest_width > 0) {
-                CHECK(live_fits(&m, stats.largest_width, stats.largest_height));
-                CHECK(!live_fits(&m, stats.largest_width + 1u, stats.largest_height));
-                CHECK(!live_fits(&m, stats.largest_width, stats.largest_height + 1u));
-            }
+            CHECK(m.atlas.slot_count == m.count && m.atlas.texels_used == texels);
+            CHECK(m.atlas.failures == m.failures);
         }
-        CHECK(terrimp_live_atlas_reset(&m.atlas) == TERRIMP_OK);
-        memset(m.taken, 0, sizeof m.taken);
-        m.count = 0;
-        CHECK(m.atlas.failures == 0 && live_alloc(&m, width, height) == TERRIMP_OK);
         live_close(&m);
     }
 }
@@ -759,95 +662,6 @@ static void live_room_is_the_largest_of_its_shape(void)
     CHECK(reduced > 50);
 }
 
-/* What eviction costs at a place; negative where a slot stays. */
-static double live_cost(const live_model *m, const terrimp_rect *place, const float *costs)
-{
-    double cost = 0.0;
-    uint32_t k;
-    for (k = 0; k < m->atlas.desc.max_slots; k++)
-        if (m->taken[k].width > 0 && rects_overlap(place, &m->taken[k], m->atlas.desc.padding)) {
-            if (!(costs[k] >= 0.0f && costs[k] < 1e30f))
-                return -1.0;
-            cost += (double)costs[k];
-        }
-    return cost;
-}
-
-/* The least that room for a size costs at the corners of slots; negative when it cannot be had. */
-static double live_cheapest(const live_model *m, uint32_t width, uint32_t height,
-                            const float *costs)
-{
-    const terrimp_live_atlas_desc *d = &m->atlas.desc;
-    double best = -1.0, cost;
-    uint32_t k, corner;
-    for (k = 0; k < d->max_slots; k++)
-        for (corner = 0; corner < 4 && m->taken[k].width > 0; corner++) {
-            terrimp_rect place = m->taken[k];
-            if (corner & 1u)
-                place.x = place.x + place.width < width ? 0 : place.x + place.width - width;
-            if (corner & 2u)
-                place.y = place.y + place.height < height ? 0 : place.y + place.height - height;
-            place.x = place.x > d->width - width ? d->width - width : place.x;
-            place.y = place.y > d->height - height ? d->height - height : place.y;
-            place.width = width;
-            place.height = height;
-            cost = live_cost(m, &place, costs);
-            if (cost >= 0.0 && (best < 0.0 || cost < best))
-                best = cost;
-        }
-    return best;
-}
-
-/* Eviction makes room, frees nothing that stays and nothing when there is room, and is at least as
-   cheap as room at any slot's corner. */
-static void live_eviction_frees_what_costs_least(void)
-{
-    int run, step, evicted = 0, refused = 0, out_of_handles = 0;
-    for (run = 0; run < 18; run++) {
-        live_model m;
-        live_open(&m, random_range(20, 200), random_range(20, 200), random_range(0, 3),
-                  run % 3 ? LIVE_SLOTS : random_range(1, 12));
-        for (step = 0; step < 120; step++) {
-            uint32_t width = random_range(1, m.atlas.desc.width);
-            uint32_t height = random_range(1, m.atlas.desc.height);
-            uint32_t victims[LIVE_SLOTS], count = 4321, k, slots, most = m.atlas.desc.max_slots;
-            float costs[LIVE_SLOTS];
-            double least, paid = 0.0;
-            int fits;
-            terrimp_result result;
-            live_churn(&m, 4, 50);
-            for (k = 0; k < LIVE_SLOTS; k++)
-                costs[k] = random_range(0, 19) == 0 ? not_a_cost((int)k) : random_float(0.0f, 9.0f);
-            slots = m.count;
-            fits = live_fits(&m, width, height);
-            least = live_cheapest(&m, width, height, costs);
-            result = terrimp_live_atlas_evict(&m.atlas, width, height, costs, victims, &count);
-            if (result != TERRIMP_OK) {
-                CHECK(result == TERRIMP_E_CAPACITY && !fits && count == 4321);
-                CHECK(least < 0.0 || slots == most);
-                CHECK(m.atlas.slot_count == slots);
-                refused++;
-                continue;
-            }
-            CHECK(fits == (count == 0));
-            for (k = 0; k < count; k++) {
-                CHECK(victims[k] < LIVE_SLOTS && m.taken[victims[k]].width > 0);
-                CHECK(costs[victims[k]] >= 0.0f && costs[victims[k]] < 1e30f);
-                m.taken[victims[k]].width = 0;
-                m.count--;
-                paid += (double)costs[victims[k]];
-            }
-            CHECK(m.atlas.slot_count == m.count);
-            CHECK(fits || slots == most || least < 0.0 || paid <= least + 1e-4);
-            out_of_handles += slots == most && count > 0;
-            CHECK(live_alloc(&m, width, height) == TERRIMP_OK);
-            evicted += count > 0;
-        }
-        live_close(&m);
-    }
-    CHECK(evicted > 300 && refused > 50 && out_of_handles > 20);
-}
-
 /* Where the memory for free rectangles is too small some room is overlooked, but slots still keep
    apart and the whole atlas comes back. */
 static void live_atlas_survives_a_full_list_of_holes(void)
@@ -869,18 +683,17 @@ static void live_atlas_survives_a_full_list_of_holes(void)
     }
 }
 
-/* How full the atlas stays when slots of random sizes come and, at random costs a texel, go. */
+/* How full the atlas stays when slots of random sizes come and, from the oldest on, go. */
 static void live_atlas_stays_full(void)
 {
     static const uint32_t smallest[] = {20, 20, 60, 100}, largest[] = {80, 300, 200, 500};
+    static const double least[] = {0.84, 0.59, 0.63, 0.58}; /* 0.87, 0.64, 0.68, 0.62 seen */
     int run, step;
     for (run = 0; run < 4; run++) {
         enum { SLOTS = 1024, SIDE = 1024, STEPS = 1200 };
-        static float costs[SLOTS];
-        static uint32_t victims[SLOTS];
+        static uint32_t since[SLOTS];
         terrimp_live_atlas_desc desc;
         terrimp_live_atlas atlas;
-        terrimp_rect rect = {0, 0, 0, 0};
         double full = 0.0;
         void *memory;
         memset(&desc, 0, sizeof desc);
@@ -892,18 +705,19 @@ static void live_atlas_stays_full(void)
         for (step = 0; step < STEPS; step++) {
             float ratio = (float)largest[run] / (float)smallest[run];
             uint32_t width = (uint32_t)((float)smallest[run] * powf(ratio, random_float(0, 1)));
-            uint32_t height = (uint32_t)((float)width * random_float(0.4f, 1.0f)), slot, count;
-            if (terrimp_live_atlas_alloc(&atlas, width, height, &slot) != TERRIMP_OK) {
-                CHECK(terrimp_live_atlas_evict(&atlas, width, height, costs, victims, &count) ==
-                      TERRIMP_OK);
-                CHECK(terrimp_live_atlas_alloc(&atlas, width, height, &slot) == TERRIMP_OK);
+            uint32_t height = (uint32_t)((float)width * random_float(0.4f, 1.0f)), slot = 0;
+            while (terrimp_live_atlas_alloc(&atlas, width, height, &slot) != TERRIMP_OK) {
+                uint32_t k, oldest = SLOTS;
+                for (k = 0; k < atlas.slot_end; k++)
+                    if (atlas.slots[k].width > 0 && (oldest == SLOTS || since[k] < since[oldest]))
+                        oldest = k;
+                CHECK(terrimp_live_atlas_free(&atlas, oldest) == TERRIMP_OK);
             }
-            CHECK(terrimp_live_atlas_rect(&atlas, slot, &rect) == TERRIMP_OK);
-            costs[slot] = (float)(rect.width * rect.height) * random_float(0.5f, 1.0f);
+            since[slot] = (uint32_t)step;
             full += step >= STEPS / 2 ? (double)atlas.texels_used / (SIDE * SIDE) : 0.0;
         }
         full /= STEPS / 2;
-        CHECK(full > 0.8);
+        CHECK(full > least[run]);
         free(memory);
     }
 }
@@ -933,11 +747,8 @@ static void live_atlas_refuses_without_a_change(void)
 {
     terrimp_live_atlas_desc desc, bad;
     terrimp_live_atlas atlas, before, unused;
-    terrimp_live_atlas_stats stats;
-    terrimp_rect rect;
     unsigned char *memory, *copy;
-    float costs[5] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
-    uint32_t slot = 77u, size[2], victims[5], first, k;
+    uint32_t slot = 77u, size[2], first, k;
     size_t bytes;
     memset(&unused, 0, sizeof unused);
     memset(&desc, 0, sizeof desc);
@@ -985,12 +796,6 @@ static void live_atlas_refuses_without_a_change(void)
     CHECK(terrimp_live_atlas_free(&atlas, 4) == TERRIMP_E_STATE);    /* never in use */
     CHECK(terrimp_live_atlas_free(&atlas, 5) == TERRIMP_E_RANGE);
     CHECK(terrimp_live_atlas_free(&atlas, 0xffffffffu) == TERRIMP_E_RANGE);
-    memset(&rect, UNTOUCHED, sizeof rect);
-    CHECK(terrimp_live_atlas_rect(NULL, first, &rect) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_rect(&atlas, first, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_rect(&atlas, slot, &rect) == TERRIMP_E_STATE);
-    CHECK(terrimp_live_atlas_rect(&atlas, 5, &rect) == TERRIMP_E_RANGE);
-    CHECK(is_untouched(&rect, sizeof rect));
     memset(size, UNTOUCHED, sizeof size);
     CHECK(terrimp_live_atlas_room(NULL, 1, 1, size) == TERRIMP_E_NULL);
     CHECK(terrimp_live_atlas_room(&atlas, 1, 1, NULL) == TERRIMP_E_NULL);
@@ -999,28 +804,9 @@ static void live_atlas_refuses_without_a_change(void)
     CHECK(terrimp_live_atlas_room(&atlas, 65537, 1, size) == TERRIMP_E_RANGE);
     CHECK(terrimp_live_atlas_room(&atlas, 1, 0xffffffffu, size) == TERRIMP_E_RANGE);
     CHECK(is_untouched(size, sizeof size));
-    memset(victims, UNTOUCHED, sizeof victims);
-    CHECK(terrimp_live_atlas_evict(NULL, 1, 1, costs, victims, &k) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_evict(&atlas, 1, 1, NULL, victims, &k) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_evict(&atlas, 1, 1, costs, NULL, &k) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_evict(&atlas, 1, 1, costs, victims, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_evict(&atlas, 0, 1, costs, victims, &k) == TERRIMP_E_RANGE);
-    CHECK(terrimp_live_atlas_evict(&atlas, 1, 0, costs, victims, &k) == TERRIMP_E_RANGE);
-    CHECK(terrimp_live_atlas_evict(&atlas, 65, 1, costs, victims, &k) == TERRIMP_E_CAPACITY);
-    CHECK(terrimp_live_atlas_evict(&atlas, 1, 33, costs, victims, &k) == TERRIMP_E_CAPACITY);
-    CHECK(terrimp_live_atlas_evict(&unused, 1, 1, costs, victims, &k) == TERRIMP_E_STATE);
-    CHECK(is_untouched(victims, sizeof victims));
-    memset(&stats, UNTOUCHED, sizeof stats);
-    CHECK(terrimp_live_atlas_query(NULL, &stats) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_query(&atlas, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_reset(NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_reset(&unused) == TERRIMP_E_STATE);
     CHECK(terrimp_live_atlas_alloc(&unused, 1, 1, &k) == TERRIMP_E_STATE);
     CHECK(terrimp_live_atlas_free(&unused, 0) == TERRIMP_E_STATE);
-    CHECK(terrimp_live_atlas_rect(&unused, 0, &rect) == TERRIMP_E_STATE);
     CHECK(terrimp_live_atlas_room(&unused, 1, 1, size) == TERRIMP_E_STATE);
-    CHECK(terrimp_live_atlas_query(&unused, &stats) == TERRIMP_E_STATE);
-    CHECK(is_untouched(&stats, sizeof stats));
     CHECK(memcmp(&before, &atlas, sizeof atlas) == 0 && memcmp(copy, memory, bytes) == 0);
 
     CHECK(terrimp_live_atlas_alloc(&atlas, 65, 1, &k) == TERRIMP_E_CAPACITY);
@@ -1038,16 +824,13 @@ static void atlas_tests(void)
     RUN(packing_is_first_fit_from_the_tallest);
     RUN(packing_is_deterministic);
     RUN(packing_height_keeps_its_bound);
-    RUN(shelves_take_rectangles_one_by_one);
     RUN(pair_never_overwrites_a_picture_in_use);
-    RUN(pair_reduces_what_does_not_fit);
     RUN(pair_reports_when_nothing_fits);
     RUN(live_slots_keep_apart_inside_and_find_all_room);
     RUN(live_holes_are_maximal);
     RUN(live_slots_go_where_they_fit_best);
-    RUN(live_statistics_count_what_is_there);
+    RUN(live_atlas_counts_what_is_there);
     RUN(live_room_is_the_largest_of_its_shape);
-    RUN(live_eviction_frees_what_costs_least);
     RUN(live_atlas_survives_a_full_list_of_holes);
     RUN(live_atlas_stays_full);
     RUN(live_atlas_is_deterministic);

@@ -650,79 +650,23 @@ static void huge_and_random_numbers_do_no_harm(void)
 
 static void atlas_functions_refuse(void)
 {
-    terrimp_shelves shelves, out;
-    terrimp_shelf rows[8];
-    terrimp_rect rect = {0, 0, 4, 4};
-    terrimp_pack_item items[2], item_copy[2];
-    terrimp_atlas_pair pair, pair_out;
-    terrimp_pair_slot slots[2], slot_copy[2];
-    uint32_t order[2], placed;
+    terrimp_rect rects[5], copy[5];
+    uint32_t order[10], i;
     float scale;
-    REFUSES(TERRIMP_E_NULL, rows, terrimp_shelves_init(NULL, 8, 8, 0, rows, 4));
-    REFUSES(TERRIMP_E_NULL, out, terrimp_shelves_init(&out, 8, 8, 0, NULL, 4));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 0, 8, 0, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 8, 0, 0, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 65537, 8, 0, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 8, 0xffffffffu, 0, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 8, 8, 0xffffffffu, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, out, terrimp_shelves_init(&out, 8, 8, 0, rows, 0));
-
-    memset(&shelves, 0, sizeof shelves); /* compared as bytes below, gaps included */
-    GIVES(TERRIMP_OK, terrimp_shelves_init(&shelves, 8, 8, 0, rows, 1));
-    GIVES(TERRIMP_E_NULL, terrimp_shelves_insert(NULL, &rect));
-    GIVES(TERRIMP_E_NULL, terrimp_shelves_insert(&shelves, NULL));
-    rect.width = 0;
-    GIVES(TERRIMP_E_RANGE, terrimp_shelves_insert(&shelves, &rect));
-    rect.width = 9;
-    GIVES(TERRIMP_E_CAPACITY, terrimp_shelves_insert(&shelves, &rect));
-    rect.width = 0xffffffffu;
-    GIVES(TERRIMP_E_CAPACITY, terrimp_shelves_insert(&shelves, &rect));
-    rect.width = 4;
-    rect.height = 0;
-    GIVES(TERRIMP_E_RANGE, terrimp_shelves_insert(&shelves, &rect));
-    rect.height = 4;
-    GIVES(TERRIMP_OK, terrimp_shelves_insert(&shelves, &rect));
-    rect.width = 8;
-    GIVES(TERRIMP_E_CAPACITY, terrimp_shelves_insert(&shelves, &rect)); /* the array has one row */
-
-    memset(items, 0, sizeof items);
-    items[0].rect.width = items[0].rect.height = 3;
-    items[1].rect.width = 3; /* of no height */
-    memcpy(item_copy, items, sizeof items);
-    REFUSES(TERRIMP_E_NULL, placed, terrimp_pack_ffdh(NULL, items, 2, order, &placed));
-    REFUSES(TERRIMP_E_NULL, placed, terrimp_pack_ffdh(&shelves, NULL, 2, order, &placed));
-    REFUSES(TERRIMP_E_NULL, placed, terrimp_pack_ffdh(&shelves, items, 2, NULL, &placed));
-    out = shelves;
-    REFUSES(TERRIMP_E_RANGE, placed, terrimp_pack_ffdh(&shelves, items, 2, order, &placed));
-    CHECK(memcmp(items, item_copy, sizeof items) == 0 && memcmp(&out, &shelves, sizeof out) == 0);
-
-    GIVES(TERRIMP_E_NULL, terrimp_pair_init(NULL, 8, 8, rows, 4));
-    REFUSES(TERRIMP_E_NULL, pair_out, terrimp_pair_init(&pair_out, 8, 8, NULL, 4));
-    REFUSES(TERRIMP_E_RANGE, pair_out, terrimp_pair_init(&pair_out, 0, 8, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, pair_out, terrimp_pair_init(&pair_out, 8, 65537, rows, 4));
-    REFUSES(TERRIMP_E_RANGE, pair_out, terrimp_pair_init(&pair_out, 8, 8, rows, 0));
-    memset(&pair, 0, sizeof pair);
-    GIVES(TERRIMP_OK, terrimp_pair_init(&pair, 8, 8, rows, 4));
-    pair_out = pair;
-    memset(slots, 0, sizeof slots);
-    memcpy(slot_copy, slots, sizeof slots);
-    REFUSES(TERRIMP_E_NULL, scale, terrimp_pair_repack(NULL, slots, items, 2, order, &scale));
-    REFUSES(TERRIMP_E_NULL, scale, terrimp_pair_repack(&pair, NULL, items, 2, order, &scale));
-    REFUSES(TERRIMP_E_NULL, scale, terrimp_pair_repack(&pair, slots, NULL, 2, order, &scale));
-    REFUSES(TERRIMP_E_NULL, scale, terrimp_pair_repack(&pair, slots, items, 2, NULL, &scale));
-    GIVES(TERRIMP_E_NULL, terrimp_pair_assign(NULL, slots, 1, 1));
-    GIVES(TERRIMP_E_NULL, terrimp_pair_assign(&pair, NULL, 1, 1));
-    GIVES(TERRIMP_E_RANGE, terrimp_pair_assign(&pair, slots, 0, 1));
-    GIVES(TERRIMP_E_RANGE, terrimp_pair_assign(&pair, slots, 1, 0));
-    GIVES(TERRIMP_E_CAPACITY, terrimp_pair_assign(&pair, slots, 9, 1));
-    GIVES(TERRIMP_E_CAPACITY, terrimp_pair_assign(&pair, slots, 1, 0xffffffffu));
-    GIVES(TERRIMP_E_NULL, terrimp_pair_fill(NULL, slots));
-    GIVES(TERRIMP_E_NULL, terrimp_pair_fill(&pair, NULL));
-    GIVES(TERRIMP_E_STATE, terrimp_pair_fill(&pair, slots));
-    CHECK(memcmp(slots, slot_copy, sizeof slots) == 0);
-    CHECK(memcmp(&pair, &pair_out, sizeof pair) == 0);
-    CHECK(terrimp_pair_picture(NULL, slots) == -1 && terrimp_pair_picture(&pair, NULL) == -1);
-    CHECK(terrimp_pair_picture(&pair, slots) == -1);
+    memset(rects, 0, sizeof rects);
+    for (i = 0; i < 5u; i++)
+        rects[i].width = rects[i].height = 1;
+    memcpy(copy, rects, sizeof rects);
+    REFUSES(TERRIMP_E_NULL, scale, terrimp_pack_ffdh(2, 2, NULL, 5, order, &scale));
+    REFUSES(TERRIMP_E_NULL, scale, terrimp_pack_ffdh(2, 2, rects, 5, NULL, &scale));
+    REFUSES(TERRIMP_E_RANGE, scale, terrimp_pack_ffdh(0, 2, rects, 5, order, &scale));
+    REFUSES(TERRIMP_E_RANGE, scale, terrimp_pack_ffdh(2, 0, rects, 5, order, &scale));
+    REFUSES(TERRIMP_E_RANGE, scale, terrimp_pack_ffdh(65537, 2, rects, 5, order, &scale));
+    REFUSES(TERRIMP_E_RANGE, scale, terrimp_pack_ffdh(2, 0xffffffffu, rects, 5, order, &scale));
+    CHECK(memcmp(rects, copy, sizeof rects) == 0);
+    REFUSES(TERRIMP_E_CAPACITY, scale, terrimp_pack_ffdh(2, 2, rects, 5, order, &scale));
+    for (i = 0; i < 5u; i++)
+        CHECK(rects[i].width == 1 && rects[i].height == 1);
 }
 
 /* ---- terrain ---- */

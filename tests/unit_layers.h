@@ -502,24 +502,22 @@ static void simple_shapes_are_covered_exactly(void)
 static void quads_are_packed_with_their_gutters(void)
 {
     static terrimp_layer_quad quads[200];
-    static terrimp_pack_item items[200];
-    static terrimp_shelf rows[200];
-    static uint32_t order[200];
-    terrimp_shelves shelves;
+    static terrimp_rect rects[200];
+    static uint32_t order[400];
+    static const uint32_t atlas[2] = {512, 700};
     uint32_t i, k, gutter;
     for (gutter = 0; gutter < 4; gutter++) {
         for (i = 0; i < 200; i++) {
             quads[i].texels.width = random_range(1, 40);
             quads[i].texels.height = random_range(1, 30);
         }
-        CHECK(terrimp_shelves_init(&shelves, 512, 1024, 0, rows, 200) == TERRIMP_OK);
-        CHECK(terrimp_layer_pack(&shelves, quads, 200, gutter, items, order) == TERRIMP_OK);
+        CHECK(terrimp_layer_pack(atlas, quads, 200, gutter, rects, order) == TERRIMP_OK);
         for (i = 0; i < 200; i++) {
             terrimp_rect a = quads[i].texels;
             a.x = quads[i].x;
             a.y = quads[i].y;
             CHECK(a.x >= gutter && a.y >= gutter && a.x + a.width + gutter <= 512);
-            CHECK(a.y + a.height + gutter <= shelves.top);
+            CHECK(a.y + a.height + gutter <= atlas[1]);
             for (k = 0; k < i; k++) {
                 terrimp_rect b = quads[k].texels;
                 b.x = quads[k].x;
@@ -528,12 +526,412 @@ static void quads_are_packed_with_their_gutters(void)
             }
         }
         quads[7].texels.width = 513 - 2 * gutter;
-        CHECK(terrimp_layer_pack(&shelves, quads, 200, gutter, items, order) ==
+        CHECK(terrimp_layer_pack(atlas, quads, 200, gutter, rects, order) ==
               TERRIMP_E_CAPACITY);
     }
 }
 
+/* ---- recording ---- */
+
+/* Both sides of a border, and both triangles of an edge, get the same cut, bit for bit; and the
+   parts are the triangle, no more and no less. */
+static void cuts_are_alike_on_both_sides_of_a_border(void)
+{
+    int i, k;
+    for (i = 0; i < 2000; i++) {
+        float tri[2][9], depths[2][3], out[2][15], cut = random_float(2.0f, 9.0f);
+        double area[3] = {0, 0, 0};
+        uint32_t count[2] = {99, 99}, n, m;
+        for (k = 0; k < 9; k++)
+            tri[0][k] = random_float(1.0f, 10.0f);
+        if (i % 5 == 0)
+            tri[0][5] = cut; /* a vertex in the border */
+        memcpy(tri[1], tri[0] + 3, 3 * sizeof(float)); /* shares edge 0-1, the other way round */
+        memcpy(tri[1] + 3, tri[0], 3 * sizeof(float));
+        for (k = 6; k < 9; k++)
+            tri[1][k] = random_float(1.0f, 10.0f);
+        for (k = 0; k < 6; k++)
+            depths[k / 3][k % 3] = tri[k / 3][3 * (k % 3) + 2];
+        CHECK(terrimp_layer_clip(tri[0], 3, depths[0], 0.0f, cut, out[0], &count[0]) == TERRIMP_OK);
+        CHECK(terrimp_layer_clip(tri[0], 3, depths[0], cut, 99.0f, out[1], &count[1]) ==
+              TERRIMP_OK);
+        CHECK(count[0] <= 5 && count[1] <= 5);
+        for (k = 0; k < 2; k++)
+            for (n = 0; n < count[k]; n++) {
+                const float *p = out[k] + 3 * n, *q = out[k] + 3 * ((n + 1) % count[k]);
+                area[k] += (double)p[0] * (double)q[1] - (double)q[0] * (double)p[1];
+                if (p[2] < cut || p[2] > cut)
+                    CHECK(k ? p[2] > cut * 0.999999f : p[2] < cut * 1.000001f);
+            }
+        for (n = 0; n < 3; n++) {
+            const float *p = tri[0] + 3 * n, *q = tri[0] + 3 * ((n + 1) % 3);
+            area[2] += (double)p[0] * (double)q[1] - (double)q[0] * (double)p[1];
+        }
+        CHECK(fabs(area[0] + area[1] - area[2]) < 1e-3);
+        /* cut vertices of the front part are vertices of the back part, and of the neighbour */
+        CHECK(terrimp_layer_clip(tri[1], 3, depths[1], 0.0f, cut, out[0], &count[0]) == TERRIMP_OK);
+        for (n = 0; n < count[1]; n++) {
+            const float *p = out[1] + 3 * n, *a = tri[0], *b = tri[0] + 3;
+            int found = 0, on_edge = (a[2] < cut) != (b[2] < cut) &&
+                                     fabsf((p[0] - a[0]) * (b[2] - a[2]) -
+                                           (p[2] - a[2]) * (b[0] - a[0])) < 1e-4f &&
+                                     fabsf((p[1] - a[1]) * (b[2] - a[2]) -
+                                           (p[2] - a[2]) * (b[1] - a[1])) < 1e-4f &&
+                                     fabsf(p[2] - cut) < 1e-5f;
+            for (m = 0; m < count[0]; m++)
+                found |= memcmp(out[0] + 3 * m, p, 3 * sizeof(float)) == 0;
+            CHECK(found || !on_edge);
+        }
+    }
+}
+
+enum { SCENE_SIDE = 160, SCENE_LAYERS = 80, SCENE_WORDS = TERRIMP_MASK_WORDS(SCENE_SIDE) };
+
+typedef struct layered_scene {
+    terrimp_layers_desc desc;
+    terrimp_layers layers;
+    terrimp_capture picture;
+    terrimp_layer_record record;
+    uint32_t masks[SCENE_LAYERS][SCENE_SIDE * SCENE_WORDS];
+    float depths[(SCENE_SIDE + 1) * (SCENE_SIDE + 1)];
+} layered_scene;
+
+static layered_scene scene;
+
+/* Scenery of a depth of 60 behind 100, seen along +z from a cell of any size within limits. */
+static void scene_begin(uint32_t layers)
+{
+    layered_scene *s = &scene;
+    float size = 4.0f;
+    memset(s, 0, sizeof *s);
+    s->picture.right[0] = -1.0f;
+    s->picture.up[1] = 1.0f;
+    s->picture.forward[2] = 1.0f;
+    s->desc.distance = 100.0f;
+    s->desc.depth = 60.0f;
+    s->desc.view_tan[0] = s->desc.view_tan[1] = 0.3f;
+    s->desc.texel = 0.6f / (float)SCENE_SIDE;
+    do {
+        size *= 1.02f;
+        s->desc.cell_size[0] = s->desc.cell_depth = size;
+        s->desc.cell_size[1] = 0.7f * size;
+        CHECK(terrimp_layers_plan(&s->desc, &s->layers) == TERRIMP_OK);
+    } while (s->layers.count < layers);
+    s->picture.tan_left = s->picture.tan_down = -0.3f;
+    s->picture.tan_right = s->picture.tan_up = 0.3f;
+    s->record.layers = &s->layers;
+    s->record.picture = &s->picture;
+    s->record.width = s->record.height = SCENE_SIDE;
+    s->record.masks = s->masks[0];
+    CHECK(s->layers.count <= SCENE_LAYERS);
+}
+
+static void scene_triangle(const float *a, const float *b, const float *c)
+{
+    float xyz[9];
+    memcpy(xyz, a, 3 * sizeof(float));
+    memcpy(xyz + 3, b, 3 * sizeof(float));
+    memcpy(xyz + 6, c, 3 * sizeof(float));
+    CHECK(terrimp_layer_triangle(&scene.record, xyz) == TERRIMP_OK);
+}
+
+/* A sheet of n x n quads across the whole view, wherever `depth` says. */
+static void scene_sheet(int n, float (*depth)(float u, float v))
+{
+    float points[41][41][3];
+    int x, y;
+    for (y = 0; y <= n; y++)
+        for (x = 0; x <= n; x++) {
+            float u = ((float)x / (float)n - 0.5f) * 1.6f, v = ((float)y / (float)n - 0.5f) * 1.6f;
+            points[y][x][0] = u * 100.0f;
+            points[y][x][1] = v * 100.0f;
+            points[y][x][2] = depth(u, v);
+        }
+    for (y = 0; y < n; y++)
+        for (x = 0; x < n; x++) {
+            scene_triangle(points[y][x], points[y][x + 1], points[y + 1][x]);
+            scene_triangle(points[y + 1][x + 1], points[y + 1][x], points[y][x + 1]);
+        }
+}
+
+static float depth_of_waves(float u, float v)
+{
+    return 130.0f + 14.0f * sinf(31.0f * u + 9.0f * v) + 14.0f * sinf(23.0f * v - 7.0f * u);
+}
+
+static float depth_of_slope(float u, float v) { return 132.0f + 20.0f * u + 25.0f * v; }
+static float depth_of_wall(float u, float v) { return 158.0f + 0.5f * u * v; }
+
+static void scene_boxes(void)
+{
+    static const int faces[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
+                                    {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+    int i, k;
+    for (i = 0; i < 40; i++) {
+        float corner[8][3], at[3], size[3], turn = random_float(0.0f, 3.0f);
+        for (k = 0; k < 3; k++) {
+            at[k] = random_float(-30.0f, 30.0f);
+            size[k] = random_float(0.02f, 9.0f);
+        }
+        for (k = 0; k < 8; k++) {
+            float x = (k & 1 ? 0.5f : -0.5f) * size[0], z = (k & 4 ? 0.5f : -0.5f) * size[2];
+            corner[k][0] = at[0] + x * cosf(turn) - z * sinf(turn);
+            corner[k][1] = at[1] + (k & 2 ? 0.5f : -0.5f) * size[1];
+            corner[k][2] = 130.0f + 0.7f * at[2] + x * sinf(turn) + z * cosf(turn);
+        }
+        for (k = 0; k < 6; k++) {
+            const int *f = faces[k];
+            scene_triangle(corner[f[0]], corner[f[1]], corner[f[2]]);
+            scene_triangle(corner[f[0]], corner[f[2]], corner[f[3]]);
+        }
+    }
+}
+
+static void scene_cull(void)
+{
+    static uint32_t state[4][SCENE_SIDE * SCENE_WORDS];
+    uint32_t k;
+    memset(state, 0, sizeof state);
+    for (k = 0; k < scene.layers.count; k++)
+        CHECK(terrimp_layer_cull(scene.masks[k], SCENE_SIDE, SCENE_SIDE, 0, state[0],
+                                 scene.masks[k]) == TERRIMP_OK);
+}
+
+/* 1: a line of sight meets an opaque texel; 0: it meets none; -1: it leaves the picture. */
+static int scene_ray(const double eye[3], const double point[3])
+{
+    int met = 0;
+    uint32_t k;
+    for (k = 0; k < scene.layers.count; k++) {
+        double t = (double)terrimp_layer_depth(&scene.layers, k);
+        double part = (t - eye[2]) / (point[2] - eye[2]);
+        double u = ((eye[0] + (point[0] - eye[0]) * part) / t + 0.3) / (double)scene.layers.texel;
+        double v = ((eye[1] + (point[1] - eye[1]) * part) / t + 0.3) / (double)scene.layers.texel;
+        if (!(u >= 0.0 && v >= 0.0 && u < SCENE_SIDE && v < SCENE_SIDE))
+            return -1;
+        met |= mask_at(scene.masks[k], SCENE_SIDE, (int)u, (int)v);
+    }
+    return met;
+}
+
+/* Lines of sight that see through everything, from the cell's corners and eyes anywhere in it. */
+static long scene_gaps(int eyes, int rays, long *met)
+{
+    long gaps = 0;
+    int e, r;
+    for (e = 0; e < eyes; e++) {
+        double eye[3], point[3];
+        random_layers_eye(&scene.desc, eye);
+        if (e < 8) {
+            eye[0] = (e & 1 ? 0.5 : -0.5) * (double)scene.desc.cell_size[0];
+            eye[1] = (e & 2 ? 0.5 : -0.5) * (double)scene.desc.cell_size[1];
+            eye[2] = e & 4 ? 0.0 : -(double)scene.desc.cell_depth;
+        }
+        for (r = 0; r < rays; r++) {
+            int hit;
+            random_layers_point(&scene.desc, 130.0, point);
+            hit = scene_ray(eye, point);
+            gaps += hit == 0;
+            *met += hit == 1;
+        }
+    }
+    return gaps;
+}
+
+/* Three scenes without any hole: an eye of the cell sees none either, culled or not. */
+static void layers_show_no_gap_to_any_eye_of_the_cell(void)
+{
+    int i, turn;
+    for (i = 0; i < 3; i++) {
+        long met = 0;
+        scene_begin(i == 1 ? 70 : 25);
+        if (i == 0)
+            scene_sheet(40, depth_of_waves);
+        else
+            scene_sheet(i == 1 ? 1 : 7, i == 1 ? depth_of_slope : depth_of_wall);
+        if (i == 2)
+            scene_boxes();
+        for (turn = 0; turn < 2; turn++) {
+            CHECK(scene_gaps(1008, 150, &met) == 0);
+            scene_cull();
+        }
+        CHECK(met > 100000);
+    }
+}
+
+static void layers_of_pictures_with_depth_show_no_gap(void)
+{
+    int x, y, turn;
+    long met = 0;
+    scene_begin(40);
+    for (y = 0; y <= SCENE_SIDE; y++)
+        for (x = 0; x <= SCENE_SIDE; x++)
+            scene.depths[y * (SCENE_SIDE + 1) + x] = depth_of_waves((float)x / 140.0f,
+                                                                    (float)y / 140.0f);
+    CHECK(terrimp_layer_depths(&scene.record, scene.depths) == TERRIMP_OK);
+    for (turn = 0; turn < 2; turn++) {
+        CHECK(scene_gaps(1008, 100, &met) == 0);
+        scene_cull();
+    }
+    CHECK(met > 50000);
+    memset(scene.masks, 0, sizeof scene.masks);
+    for (x = 0; x < (SCENE_SIDE + 1) * (SCENE_SIDE + 1); x++)
+        scene.depths[x] = x == 500 ? 120.0f : x % 3 ? -1.0f : not_finite(x);
+    CHECK(terrimp_layer_depths(&scene.record, scene.depths) == TERRIMP_OK);
+    for (turn = 0, y = 0; turn < SCENE_LAYERS; turn++)
+        for (x = 0; x < SCENE_SIDE * SCENE_WORDS; x++)
+            y += (int)terrimpi_bit_count(scene.masks[turn][x]);
+    CHECK(y == 4); /* the texels round that corner */
+}
+
+/* Texels touched by a triangle, and those whose centres it holds, against points of the triangle
+   and of the texels. */
+static void triangles_set_the_texels_that_they_touch(void)
+{
+    int i, n, x, y, outline;
+    for (i = 0; i < 60; i++) {
+        float xyz[9];
+        double corner[3][2];
+        scene_begin(8);
+        for (n = 0; n < 3; n++) {
+            float depth = random_float(105.0f, 155.0f);
+            corner[n][0] = (double)random_float(-20.0f, 180.0f);
+            corner[n][1] = (double)random_float(-20.0f, 180.0f);
+            if (i % 4 == 0 && n == 2) /* a sliver */
+                corner[2][0] = corner[1][0] + 0.01;
+            xyz[3 * n] = -((float)corner[n][0] * scene.layers.texel - 0.3f) * depth;
+            xyz[3 * n + 1] = ((float)corner[n][1] * scene.layers.texel - 0.3f) * depth;
+            xyz[3 * n + 2] = depth;
+        }
+        for (outline = 1; outline >= 0; outline--) {
+            memset(scene.masks, 0, sizeof scene.masks);
+            scene.record.no_outline = !outline;
+            CHECK(terrimp_layer_triangle(&scene.record, xyz) == TERRIMP_OK);
+            for (n = 0; outline && n < 3000; n++) { /* every point's texel is set in its layer */
+                double a = (double)random_float(0, 1), b = (double)random_float(0, 1), p[3], t;
+                uint32_t k;
+                a = sqrt(a);
+                t = b;
+                for (k = 0; k < 3; k++)
+                    p[k] = (1 - a) * (double)xyz[k] + a * (1 - t) * (double)xyz[3 + k] +
+                           a * t * (double)xyz[6 + k];
+                x = (int)floor((-p[0] / p[2] + 0.3) / (double)scene.layers.texel);
+                y = (int)floor((p[1] / p[2] + 0.3) / (double)scene.layers.texel);
+                k = terrimp_layer_of(&scene.layers, (float)p[2]);
+                if (x >= 0 && y >= 0 && x < SCENE_SIDE && y < SCENE_SIDE)
+                    CHECK(mask_at(scene.masks[k], SCENE_SIDE, x, y) ||
+                          fabs(fmod(-p[0] / p[2] / (double)scene.layers.texel + 80.5, 1.0) - 0.5) >
+                              0.499 || /* in between two texels, or two layers, by rounding */
+                          fabs(p[2] / (double)terrimp_layer_border(&scene.layers, k) - 1) < 1e-5);
+            }
+            for (y = 0; y < SCENE_SIDE; y++)
+                for (x = 0; x < SCENE_SIDE; x++) {
+                    double reach = outline ? 0.7072 : 0.01, centre[2], side[3];
+                    int set = 0, k, inside;
+                    for (k = 0; k < (int)scene.layers.count; k++)
+                        set |= mask_at(scene.masks[k], SCENE_SIDE, x, y);
+                    centre[0] = x + 0.5;
+                    centre[1] = y + 0.5;
+                    for (k = 0; k < 3; k++) { /* signed distance from each side */
+                        const double *p = corner[k], *q = corner[(k + 1) % 3];
+                        double dx = q[0] - p[0], dy = q[1] - p[1];
+                        side[k] = dx * (centre[1] - p[1]) - dy * (centre[0] - p[0]);
+                        side[k] /= hypot(dx, dy);
+                    }
+                    inside = (side[0] > -reach && side[1] > -reach && side[2] > -reach) ||
+                             (side[0] < reach && side[1] < reach && side[2] < reach);
+                    CHECK(!set || inside);
+                    inside = (side[0] > 0.01 && side[1] > 0.01 && side[2] > 0.01) ||
+                             (side[0] < -0.01 && side[1] < -0.01 && side[2] < -0.01);
+                    CHECK(set || !inside);
+                }
+        }
+    }
+}
+
+/* The repair asks for exactly what the rule says, and then the gap is closed. */
+static void corners_between_two_layers_are_closed(void)
+{
+    enum { W = 70, H = 40, N = TERRIMP_MASK_WORDS(W) * H };
+    static uint32_t front[N], back[N], wanted[N];
+    int i, x, y, k;
+    long closed = 0;
+    for (i = 0; i < 20; i++) {
+        for (k = 0; k < N; k++) {
+            front[k] = random_bits() | random_bits();
+            back[k] = random_bits() | random_bits();
+        }
+        CHECK(terrimp_layer_repair(front, back, W, H, wanted) == TERRIMP_OK);
+        for (y = 0; y < H; y++)
+            for (x = 0; x < W; x++) {
+                int wish = 0, dx, dy;
+                for (dy = -1; dy <= 1; dy += 2)
+                    for (dx = -1; dx <= 1; dx += 2) {
+                        int u = x + dx, v = y + dy;
+                        if (u < 0 || v < 0 || u >= W || v >= H)
+                            continue;
+                        wish |= mask_at(front, W, u, y) && mask_at(back, W, u, y) &&
+                                mask_at(front, W, x, v) && mask_at(back, W, x, v) &&
+                                mask_at(front, W, u, v) != mask_at(back, W, u, v) &&
+                                mask_at(front, W, x, y) && !mask_at(back, W, x, y);
+                    }
+                closed += wish;
+                CHECK(mask_at(wanted, W, x, y) == wish);
+            }
+    }
+    CHECK(closed > 100);
+}
+
 /* ---- bad input ---- */
+
+static void recording_refuses(void)
+{
+    float tri[9] = {0, 0, 110, 10, 0, 120, 0, 10, 130}, depths[3] = {1, 2, 3}, out[15];
+    uint32_t count, word[1];
+    terrimp_layer_record bad;
+    int i;
+    scene_begin(8);
+    REFUSES(TERRIMP_E_NULL, count, terrimp_layer_clip(NULL, 3, depths, 0, 1, out, &count));
+    REFUSES(TERRIMP_E_NULL, count, terrimp_layer_clip(tri, 3, NULL, 0, 1, out, &count));
+    REFUSES(TERRIMP_E_NULL, count, terrimp_layer_clip(tri, 3, depths, 0, 1, NULL, &count));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_clip(tri, 3, depths, 0, 1, out, NULL));
+    REFUSES(TERRIMP_E_RANGE, count, terrimp_layer_clip(tri, 0, depths, 0, 1, out, &count));
+    REFUSES(TERRIMP_E_RANGE, count, terrimp_layer_clip(tri, 3, depths, 2, 1, out, &count));
+    REFUSES(TERRIMP_E_RANGE, count, terrimp_layer_clip(tri, 3, depths, not_finite(0), 1, out,
+                                                       &count));
+    depths[1] = not_finite(1);
+    REFUSES(TERRIMP_E_NOT_FINITE, count, terrimp_layer_clip(tri, 3, depths, 0, 1, out, &count));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_triangle(NULL, tri));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_triangle(&scene.record, NULL));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_depths(&scene.record, NULL));
+    for (i = 0; i < 6; i++) {
+        terrimp_result wanted = i < 3 ? TERRIMP_E_NULL : TERRIMP_E_RANGE;
+        terrimp_layers none = scene.layers;
+        none.count = 0;
+        bad = scene.record;
+        if (i == 0)
+            bad.layers = NULL;
+        else if (i == 1)
+            bad.picture = NULL;
+        else if (i == 2)
+            bad.masks = NULL;
+        else if (i == 3)
+            bad.width = 0;
+        else if (i == 4)
+            bad.height = 16385;
+        else
+            bad.layers = &none;
+        GIVES(wanted, terrimp_layer_triangle(&bad, tri));
+        GIVES(wanted, terrimp_layer_depths(&bad, scene.depths));
+    }
+    tri[4] = not_finite(2);
+    GIVES(TERRIMP_E_NOT_FINITE, terrimp_layer_triangle(&scene.record, tri));
+    REFUSES(TERRIMP_E_NULL, word, terrimp_layer_repair(NULL, word, 1, 1, word));
+    REFUSES(TERRIMP_E_NULL, word, terrimp_layer_repair(word, NULL, 1, 1, word));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_repair(word, word, 1, 1, NULL));
+    REFUSES(TERRIMP_E_RANGE, word, terrimp_layer_repair(word, word, 0, 1, word));
+    REFUSES(TERRIMP_E_RANGE, word, terrimp_layer_repair(word, word, 1, 0, word));
+}
 
 static void layers_refuse(void)
 {
@@ -642,10 +1040,8 @@ static void layer_quads_refuse(void)
     terrimp_layer_quad quad;
     terrimp_layers l;
     terrimp_capture picture;
-    terrimp_shelves shelves;
-    terrimp_shelf row[2];
-    terrimp_pack_item item;
-    uint32_t order;
+    terrimp_rect rect;
+    uint32_t order[2];
     float xyz[12];
     memset(&quad, 0, sizeof quad);
     memset(&l, 0, sizeof l);
@@ -660,14 +1056,13 @@ static void layer_quads_refuse(void)
     REFUSES(TERRIMP_E_RANGE, xyz, terrimp_layer_corners(&l, &picture, &quad, none, xyz, NULL));
     quad.layer = 1;
     REFUSES(TERRIMP_E_RANGE, xyz, terrimp_layer_corners(&l, &picture, &quad, atlas, xyz, NULL));
-    CHECK(terrimp_shelves_init(&shelves, 64, 64, 0, row, 2) == TERRIMP_OK);
-    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(&shelves, &quad, 1, 1, &item, &order));
+    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(atlas, &quad, 1, 1, &rect, order));
     quad.texels.width = quad.texels.height = 5;
-    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(&shelves, &quad, 1, 65, &item, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(NULL, &quad, 1, 1, &item, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(&shelves, NULL, 1, 1, &item, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(&shelves, &quad, 1, 1, NULL, &order));
-    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(&shelves, &quad, 1, 1, &item, NULL));
+    GIVES(TERRIMP_E_RANGE, terrimp_layer_pack(atlas, &quad, 1, 65, &rect, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(NULL, &quad, 1, 1, &rect, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, NULL, 1, 1, &rect, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, &quad, 1, 1, NULL, order));
+    GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, &quad, 1, 1, &rect, NULL));
 }
 
 static void layers_tests(void)
@@ -684,6 +1079,12 @@ static void layers_tests(void)
     RUN(covers_hold_all_that_is_opaque_and_cost_less_than_greedy_ones);
     RUN(simple_shapes_are_covered_exactly);
     RUN(quads_are_packed_with_their_gutters);
+    RUN(cuts_are_alike_on_both_sides_of_a_border);
+    RUN(triangles_set_the_texels_that_they_touch);
+    RUN(layers_show_no_gap_to_any_eye_of_the_cell);
+    RUN(layers_of_pictures_with_depth_show_no_gap);
+    RUN(corners_between_two_layers_are_closed);
+    RUN(recording_refuses);
     RUN(layers_refuse);
     RUN(layer_masks_refuse);
     RUN(layer_quads_refuse);

@@ -795,7 +795,7 @@ static void check_stats(flight *f)
     CHECK(s->shortfall >= 0.0f && s->shortfall <= 1.0f && s->reuse >= 0.0f);
     CHECK(s->waiting == 0 || has_impostors(f));
     CHECK((double)s->texels_used >= slots);
-    CHECK((double)s->texels_used + (double)s->texels_free <= all * (double)f->desc.atlas_count);
+    CHECK((double)s->texels_used + (double)s->texels_free == all * (double)f->desc.atlas_count);
     CHECK(s->z_near >= 0.0f && s->z_near <= s->z_far);
     CHECK(has_impostors(f) || (s->captures == 0 && s->captures_due == 0 && s->texels_used == 0));
     f->total_captures += f->begun_count;
@@ -2014,6 +2014,33 @@ static void create_survives_every_failed_allocation(void)
     land_free(&l);
 }
 
+/* Up to 16 atlases of 2^30 texels each. */
+static void texels_of_the_largest_atlases_are_counted(void)
+{
+    land l;
+    uint32_t count;
+    make_hills(&l);
+    if (!land_build(&l))
+        return;
+    for (count = 1; count <= 16u; count += 5u) {
+        terrimp_view_desc d;
+        flight *f = &flight_room;
+        pilot p;
+        memset(&d, 0, sizeof d);
+        memset(&p, 0, sizeof p);
+        d.mode = TERRIMP_MODE_IMPOSTOR;
+        d.atlas_size = 32768;
+        d.atlas_count = count;
+        if (!flight_open(f, &l, &d))
+            break;
+        flight_update(f, pilot_next(&p, &l));
+        CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+        CHECK(f->stats.texels_used + f->stats.texels_free == (uint64_t)count << 30);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
 static void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
@@ -2043,6 +2070,7 @@ static void view_tests(void)
     RUN(two_views_give_the_same_commands);
     RUN(views_keep_to_their_blocks_and_apart);
     RUN(create_survives_every_failed_allocation);
+    RUN(texels_of_the_largest_atlases_are_counted);
 }
 
 #endif

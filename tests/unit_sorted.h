@@ -1,0 +1,1090 @@
+/* Sorted: painter's order against a depth buffer, cracks, blending, pages, the pace. */
+#ifndef UNIT_SORTED_H
+#define UNIT_SORTED_H
+
+#include "check.h"
+#include "unit_oracle.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static float not_a_number(void)
+{
+    volatile float zero = 0.0f;
+    return zero / zero;
+}
+
+/* ---- terrains and frames ---- */
+
+enum { SORTED_SIDE = 513, SORTED_MOST = 40000 };
+static float sorted_heights[SORTED_SIDE * SORTED_SIDE];
+static terrimp_sorted_square sorted_squares[SORTED_MOST];
+static uint32_t sorted_count; /* of the squares of the frame that was made last */
+
+/* Hills of many sizes that repeat every 512 samples: first and last column and row are equal. */
+static void sorted_make_hills(float height)
+{
+    int x, z, k;
+    for (z = 0; z < SORTED_SIDE; z++)
+        for (x = 0; x < SORTED_SIDE; x++) {
+            float h = 0.0f;
+            for (k = 1; k <= 128; k *= 2) {
+                float a = (float)(x % 512 * k) * (6.2831853f / 512.0f);
+                float b = (float)(z % 512 * (k * 2 + 1) % 512) * (6.2831853f / 512.0f);
+                h += sinf(a + 1.3f * (float)k + sinf(b)) * sinf(b + 0.7f * (float)k) / (float)k;
+            }
+            sorted_heights[z * SORTED_SIDE + x] = height * h;
+        }
+}
+
+static terrimp_sorted_desc sorted_hills(void)
+{
+    terrimp_sorted_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.field.samples = sorted_heights;
+    desc.field.width = desc.field.depth = SORTED_SIDE;
+    desc.field.wrap = 1;
+    return desc;
+}
+
+/* A field of any size cut from the hills, of spacings of its own. */
+static terrimp_sorted_desc sorted_piece(void)
+{
+    terrimp_sorted_desc desc = sorted_hills();
+    desc.field.wrap = 0;
+    desc.field.row_bytes = SORTED_SIDE * sizeof(float);
+    desc.field.width = random_range(2, 300);
+    desc.field.depth = random_range(2, 300);
+    desc.field.spacing_x = random_float(0.5f, 2.0f);
+    desc.field.spacing_z = random_float(0.5f, 2.0f);
+    desc.field.origin_x = random_float(-300.0f, 300.0f);
+    desc.field.origin_z = random_float(-300.0f, 300.0f);
+    desc.page_quads = 4u << random_range(0, 5);
+    return desc;
+}
+
+/* Anywhere above or among the heights, looking anywhere; one in four straight along an axis. */
+static terrimp_camera sorted_camera(const terrimp_sorted_desc *desc)
+{
+    const terrimp_heightfield *f = &desc->field;
+    float sx = f->spacing_x > 0.0f ? f->spacing_x : 1.0f;
+    float sz = f->spacing_z > 0.0f ? f->spacing_z : 1.0f;
+    terrimp_camera camera;
+    memset(&camera, 0, sizeof camera);
+    camera.eye[0] = f->origin_x + random_float(-0.2f, 1.2f) * sx * (float)f->width;
+    camera.eye[1] = random_float(-5.0f, 60.0f);
+    camera.eye[2] = f->origin_z + random_float(-0.2f, 1.2f) * sz * (float)f->depth;
+    camera.forward[0] = random_float(-1.0f, 1.0f);
+    camera.forward[1] = random_float(-0.7f, 0.3f);
+    camera.forward[2] = random_float(-1.0f, 1.0f);
+    if (random_range(0, 3) == 0)
+        camera.forward[random_range(0, 1) * 2] = 0.0f;
+    camera.fov_y_rad = random_float(0.3f, 1.6f);
+    camera.width_px = 64;
+    camera.height_px = 48;
+    camera.z_near = 0.05f;
+    camera.z_far = random_float(50.0f, 600.0f);
+    return camera;
+}
+
+/* Makes a frame, in pieces of odd sizes. */
+static void sorted_frame(terrimp_sorted *s, const terrimp_camera *camera)
+{
+    uint32_t got, capacity;
+    sorted_count = 0;
+    CHECK(terrimp_sorted_begin(s, camera) == TERRIMP_OK);
+    do {
+        capacity = random_range(1, 50);
+        got = terrimp_sorted_next(s, sorted_squares + sorted_count, capacity);
+        sorted_count += got;
+    } while (got == capacity && sorted_count + 50 < SORTED_MOST);
+    CHECK(got < capacity);
+}
+
+/* ---- order ---- */
+
+enum { ORDER_WIDE = 64, ORDER_HIGH = 48 };
+static double order_nearest[ORDER_WIDE * ORDER_HIGH]; /* 1 / depth: with a depth buffer */
+static double order_shown[ORDER_WIDE * ORDER_HIGH];   /* and of what was drawn last */
+
+/* One side of a clipped triangle's plane before the eye. */
+static int order_clip(double in[3][3], double out[4][3], double z_near)
+{
+    int i, k, count = 0;
+    for (i = 0; i < 3; i++) {
+        const double *a = in[i], *b = in[(i + 1) % 3];
+        if (a[2] >= z_near)
+            memcpy(out[count++], a, sizeof out[0]);
+        if ((a[2] >= z_near) != (b[2] >= z_near)) {
+            double t = (z_near - a[2]) / (b[2] - a[2]);
+            for (k = 0; k < 3; k++)
+                out[count][k] = a[k] + (b[k] - a[k]) * t;
+            count++;
+        }
+    }
+    return count;
+}
+
+/* Fills the pixels of a triangle of x / depth, y / depth, 1 / depth; either side shows. */
+static void order_fill(const double a[3], const double b[3], const double c[3], int reversed)
+{
+    double area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    double left = fmin(a[0], fmin(b[0], c[0])), right = fmax(a[0], fmax(b[0], c[0]));
+    double top = fmin(a[1], fmin(b[1], c[1])), end = fmax(a[1], fmax(b[1], c[1]));
+    int x, y;
+    if (!(fabs(area) > 1e-12) || right < 0 || left > ORDER_WIDE || end < 0 || top > ORDER_HIGH)
+        return;
+    for (y = (int)fmax(top, 0); y < ORDER_HIGH && y <= end; y++)
+        for (x = (int)fmax(left, 0); x < ORDER_WIDE && x <= right; x++) {
+            double px = x + 0.5, py = y + 0.5, depth;
+            double u = ((px - a[0]) * (c[1] - a[1]) - (py - a[1]) * (c[0] - a[0])) / area;
+            double v = ((b[0] - a[0]) * (py - a[1]) - (b[1] - a[1]) * (px - a[0])) / area;
+            if (u < 0 || v < 0 || u + v > 1)
+                continue;
+            depth = a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2]);
+            if (depth > order_nearest[y * ORDER_WIDE + x])
+                order_nearest[y * ORDER_WIDE + x] = depth;
+            if (!reversed || order_shown[y * ORDER_WIDE + x] == 0.0)
+                order_shown[y * ORDER_WIDE + x] = depth;
+        }
+}
+
+/* Draws the frame that was made and returns the pixels that show what is not nearest. */
+static int order_faults(const terrimp_sorted *s, const terrimp_camera *camera)
+{
+    double scale = ORDER_HIGH / (2.0 * tan((double)camera->fov_y_rad / 2.0));
+    float view[16], projection[16];
+    uint32_t i;
+    int t, k, faults = 0;
+    CHECK(terrimp_camera_matrices(camera, view, projection) == TERRIMP_OK);
+    for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
+        order_nearest[k] = order_shown[k] = 0.0;
+    for (i = 0; i < sorted_count; i++)
+        for (t = 0; t < sorted_squares[i].triangle_count; t++) {
+            double eyes[3][3], cut[4][3];
+            int n, j;
+            for (k = 0; k < 3; k++) {
+                float at[3];
+                double d[3];
+                terrimp_sorted_position(s, &sorted_squares[i].vertices
+                                               [sorted_squares[i].indices[3 * t + k]], at);
+                for (j = 0; j < 3; j++)
+                    d[j] = (double)at[j] - (double)camera->eye[j];
+                eyes[k][0] = (double)view[0] * d[0] + (double)view[4] * d[1] +
+                             (double)view[8] * d[2];
+                eyes[k][1] = (double)view[1] * d[0] + (double)view[5] * d[1] +
+                             (double)view[9] * d[2];
+                eyes[k][2] = -((double)view[2] * d[0] + (double)view[6] * d[1] +
+                               (double)view[10] * d[2]);
+            }
+            n = order_clip(eyes, cut, 0.05);
+            for (k = 0; k < n; k++) {
+                cut[k][0] = ORDER_WIDE / 2 + scale * cut[k][0] / cut[k][2];
+                cut[k][1] = ORDER_HIGH / 2 - scale * cut[k][1] / cut[k][2];
+                cut[k][2] = 1.0 / cut[k][2];
+            }
+            for (k = 2; k < n; k++)
+                order_fill(cut[0], cut[k - 1], cut[k], s->desc.front_to_back);
+        }
+    for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
+        faults += order_shown[k] < order_nearest[k] * (1.0 - 1e-7);
+    return faults;
+}
+
+static void sorted_needs_no_depth_buffer(void)
+{
+    int i, faults = 0, seen = 0;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 1000; i++) {
+        terrimp_sorted_desc desc = i % 2 ? sorted_hills() : sorted_piece();
+        terrimp_sorted s;
+        terrimp_camera camera;
+        int k;
+        desc.front_to_back = i % 3 == 0;
+        desc.scale = random_float(2.0f, 12.0f);
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        camera = sorted_camera(&s.desc);
+        sorted_frame(&s, &camera);
+        faults += order_faults(&s, &camera);
+        for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
+            seen += order_shown[k] > 0.0;
+    }
+    CHECK(faults == 0);
+    CHECK(seen > 1000 * ORDER_WIDE * ORDER_HIGH / 10);
+}
+
+/* ---- cracks ---- */
+
+/* An edge of a triangle in plan, and the heights of its ends; key: its place whatever its way. */
+typedef struct sorted_edge {
+    int32_t x0, z0, x1, z1;
+    terrimp_sorted_height h0, h1;
+    int way;
+} sorted_edge;
+
+static sorted_edge sorted_edges[SORTED_MOST * 6];
+
+static int sorted_compare_edges(const void *a, const void *b)
+{
+    const sorted_edge *p = (const sorted_edge *)a, *q = (const sorted_edge *)b;
+    return p->x0 != q->x0 ? (p->x0 < q->x0 ? -1 : 1) : p->z0 != q->z0 ? (p->z0 < q->z0 ? -1 : 1)
+         : p->x1 != q->x1 ? (p->x1 < q->x1 ? -1 : 1) : p->z1 != q->z1 ? (p->z1 < q->z1 ? -1 : 1)
+         : p->way - q->way;
+}
+
+static void sorted_note_edge(size_t *count, const terrimp_sorted_vertex *a,
+                             const terrimp_sorted_vertex *b)
+{
+    sorted_edge *e = &sorted_edges[*count];
+    int swap = a->x > b->x || (a->x == b->x && a->z > b->z);
+    const terrimp_sorted_vertex *p = swap ? b : a, *q = swap ? a : b;
+    if (a->x == b->x && a->z == b->z)
+        return;
+    e->x0 = p->x, e->z0 = p->z, e->h0 = p->height;
+    e->x1 = q->x, e->z1 = q->z, e->h1 = q->height;
+    e->way = swap;
+    ++*count;
+}
+
+/* Whether a place, in half samples, lies in a square of the frame. */
+static int sorted_drawn_at(int32_t x2, int32_t z2)
+{
+    uint32_t i;
+    for (i = 0; i < sorted_count; i++) {
+        const terrimp_sorted_vertex *v = sorted_squares[i].vertices;
+        if (x2 > 2 * v[0].x && x2 < 2 * v[3].x && z2 > 2 * v[0].z && z2 < 2 * v[3].z)
+            return 1;
+    }
+    return 0;
+}
+
+/* Edges that have no partner of the same heights on their other side though something is drawn
+   there, or that have more than one. Twice the area of all triangles is added up. */
+static int sorted_count_cracks(double *area)
+{
+    size_t count = 0, i;
+    uint32_t k;
+    int t, cracks = 0;
+    for (k = 0; k < sorted_count; k++)
+        for (t = 0; t < sorted_squares[k].triangle_count; t++) {
+            const terrimp_sorted_square *q = &sorted_squares[k];
+            const terrimp_sorted_vertex *a = &q->vertices[q->indices[3 * t]];
+            const terrimp_sorted_vertex *b = &q->vertices[q->indices[3 * t + 1]];
+            const terrimp_sorted_vertex *c = &q->vertices[q->indices[3 * t + 2]];
+            double turn = (double)(b->z - a->z) * (c->x - a->x) -
+                          (double)(b->x - a->x) * (c->z - a->z);
+            CHECK(turn >= 0.0); /* counter-clockwise from above */
+            *area += turn;
+            if (turn == 0.0) /* beyond the last column or row */
+                continue;
+            sorted_note_edge(&count, a, b);
+            sorted_note_edge(&count, b, c);
+            sorted_note_edge(&count, c, a);
+        }
+    qsort(sorted_edges, count, sizeof sorted_edges[0], sorted_compare_edges);
+    for (i = 0; i < count; i++) {
+        const sorted_edge *e = &sorted_edges[i];
+        int32_t x = e->x0 + e->x1, z = e->z0 + e->z1, side = e->way ? -1 : 1;
+        int has = i + 1 < count && e[1].x0 == e->x0 && e[1].z0 == e->z0 && e[1].x1 == e->x1 &&
+                  e[1].z1 == e->z1;
+        if (has) {
+            cracks += e->way == e[1].way || e->h0 != e[1].h0 || e->h1 != e[1].h1;
+            i++;
+        } else {
+            /* Its triangle lies to the left of its way, seen from above; the other side is where
+               nothing may be. */
+            int32_t dx = e->x1 - e->x0, dz = e->z1 - e->z0;
+            int32_t out_x = -side * (dz > 0 ? 1 : dz < 0 ? -1 : 0);
+            int32_t out_z = side * (dx > 0 ? 1 : dx < 0 ? -1 : 0);
+            cracks += sorted_drawn_at(x + (dz ? out_x : 0), z + (dx ? out_z : 0));
+        }
+    }
+    return cracks;
+}
+
+static void sorted_squares_meet_without_cracks(void)
+{
+    int i, cracks = 0;
+    uint32_t k, middles = 0;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 400; i++) {
+        terrimp_sorted_desc desc = i % 2 ? sorted_hills() : sorted_piece();
+        terrimp_sorted s;
+        terrimp_camera camera;
+        double area = 0.0, squares = 0.0;
+        desc.scale = random_float(2.0f, 8.0f);
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        camera = sorted_camera(&s.desc);
+        sorted_frame(&s, &camera);
+        cracks += sorted_count_cracks(&area);
+        for (k = 0; k < sorted_count; k++) {
+            const terrimp_sorted_vertex *v = sorted_squares[k].vertices;
+            squares += 2.0 * (double)(v[3].x - v[0].x) * (double)(v[3].z - v[0].z);
+            middles += (uint32_t)sorted_squares[k].vertex_count - 4u;
+        }
+        CHECK(area == squares);
+    }
+    CHECK(cracks == 0);
+    CHECK(middles > 1000);
+}
+
+/* All 16 patterns of split sides, in both orders, from eyes all around: the triangles of a square
+   cover it, and of two the later one has its part of the plan on the eye's side. */
+static void sorted_patterns_are_ordered(void)
+{
+    int pattern, i, k, m, t;
+    for (pattern = 0; pattern < 16; pattern++)
+        for (i = 0; i < 400; i++) {
+            terrimp_sorted s;
+            terrimp_sorted_square q;
+            int middle[4], area = 0, first;
+            memset(&s, 0, sizeof s);
+            memset(&q, 0, sizeof q);
+            s.desc.page_quads = 8;
+            s.unit[0] = s.unit[1] = 64;
+            s.eye[0] = (terrimp_sorted_int)random_range(0, 64 * 24) - 64 * 8;
+            s.eye[1] = (terrimp_sorted_int)random_range(0, 64 * 24) - 64 * 8;
+            s.desc.front_to_back = i & 1;
+            for (k = 0; k < 4; k++) {
+                q.vertices[k].x = (k & 1) * 8;
+                q.vertices[k].z = (k >> 1) * 8;
+            }
+            q.vertex_count = 4;
+            for (k = 0; k < 4; k++) {
+                middle[k] = pattern >> k & 1 ? q.vertex_count++ : 0;
+                q.vertices[middle[k] ? middle[k] : 7].x = k < 2 ? 4 : (k & 1) * 8;
+                q.vertices[middle[k] ? middle[k] : 7].z = k < 2 ? (k & 1) * 8 : 4;
+            }
+            terrimpi_sorted_triangles(&s, &q, middle);
+            CHECK(q.triangle_count == 2 + q.vertex_count - 4);
+            for (t = 0; t < q.triangle_count; t++) {
+                const terrimp_sorted_vertex *v[3];
+                for (k = 0; k < 3; k++)
+                    v[k] = &q.vertices[q.indices[3 * t + k]];
+                area += (v[1]->z - v[0]->z) * (v[2]->x - v[0]->x) -
+                        (v[1]->x - v[0]->x) * (v[2]->z - v[0]->z);
+                /* A ray from the eye in plan through a triangle meets no earlier one on its way. */
+                for (m = 0; m < 10; m++) {
+                    float a = random_float(0.01f, 0.98f), b = random_float(0.01f, 0.99f - a);
+                    float x = (float)v[0]->x + a * (float)(v[1]->x - v[0]->x) +
+                              b * (float)(v[2]->x - v[0]->x);
+                    float z = (float)v[0]->z + a * (float)(v[1]->z - v[0]->z) +
+                              b * (float)(v[2]->z - v[0]->z);
+                    float part = random_float(0.0f, 1.0f);
+                    float ex = (float)s.eye[0] / 64.0f, ez = (float)s.eye[1] / 64.0f;
+                    x = ex + (x - ex) * part; /* in front of the triangle: only later ones */
+                    z = ez + (z - ez) * part;
+                    for (first = 0; first < q.triangle_count; first++) {
+                        const terrimp_sorted_vertex *p[3];
+                        int inside = 1;
+                        for (k = 0; k < 3; k++)
+                            p[k] = &q.vertices[q.indices[3 * first + k]];
+                        for (k = 0; k < 3; k++) {
+                            const terrimp_sorted_vertex *c = p[k], *d = p[(k + 1) % 3];
+                            inside &= (float)(d->z - c->z) * (x - (float)c->x) -
+                                      (float)(d->x - c->x) * (z - (float)c->z) > 1e-3f;
+                        }
+                        CHECK(!inside || (i & 1 ? first <= t : first >= t));
+                    }
+                }
+            }
+            CHECK(area == 128);
+        }
+}
+
+/* ---- the footprint ---- */
+
+/* Every sample that projects on to the screen lies in a square that is drawn. */
+static void sorted_draws_all_that_is_seen(void)
+{
+    int i, k, seen = 0, missed = 0;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 150; i++) {
+        terrimp_sorted_desc desc = i % 2 ? sorted_hills() : sorted_piece();
+        terrimp_sorted s;
+        terrimp_camera camera;
+        terrimp_frustum frustum;
+        desc.scale = 2.0f;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        camera = sorted_camera(&s.desc);
+        sorted_frame(&s, &camera);
+        CHECK(terrimp_camera_frustum(&camera, &frustum) == TERRIMP_OK);
+        for (k = 0; k < 300; k++) {
+            terrimp_sorted_vertex v;
+            terrimp_box box;
+            v.x = (int32_t)random_range(0, s.desc.field.width - 2);
+            v.z = (int32_t)random_range(0, s.desc.field.depth - 2);
+            v.height = sorted_heights[v.z * SORTED_SIDE + v.x];
+            if (desc.field.wrap) {
+                v.x += 512 * ((int32_t)random_range(0, 2) - 1);
+                v.z += 512 * ((int32_t)random_range(0, 2) - 1);
+            }
+            terrimp_sorted_position(&s, &v, box.min);
+            memcpy(box.max, box.min, sizeof box.max);
+            if (terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) != 0)
+                continue;
+            seen++;
+            missed += !sorted_drawn_at(2 * v.x + 1, 2 * v.z + 1);
+        }
+    }
+    CHECK(missed == 0);
+    CHECK(seen > 1000);
+}
+
+/* ---- blending ---- */
+
+/* The height of what is drawn at a place, in samples; 0 when nothing is. */
+static int sorted_height_at(float x, float z, float *height)
+{
+    uint32_t i;
+    int t;
+    for (i = 0; i < sorted_count; i++) {
+        const terrimp_sorted_square *q = &sorted_squares[i];
+        if (x < (float)q->vertices[0].x || x > (float)q->vertices[3].x ||
+            z < (float)q->vertices[0].z || z > (float)q->vertices[3].z)
+            continue;
+        for (t = 0; t < q->triangle_count; t++) {
+            const terrimp_sorted_vertex *a = &q->vertices[q->indices[3 * t]];
+            const terrimp_sorted_vertex *b = &q->vertices[q->indices[3 * t + 1]];
+            const terrimp_sorted_vertex *c = &q->vertices[q->indices[3 * t + 2]];
+            float bx = (float)(b->x - a->x), bz = (float)(b->z - a->z);
+            float cx = (float)(c->x - a->x), cz = (float)(c->z - a->z);
+            float area = bx * cz - bz * cx, px = x - (float)a->x, pz = z - (float)a->z;
+            float u = (px * cz - pz * cx) / area, v = (bx * pz - bz * px) / area;
+            if (area == 0.0f || u < -1e-5f || v < -1e-5f || u + v > 1.00001f)
+                continue;
+            *height = a->height + u * (b->height - a->height) + v * (c->height - a->height);
+            return 1;
+        }
+    }
+    return 0;
+}
+
+enum { BLEND_PLACES = 400 };
+
+/* The largest change of a drawn height while the eye moves by a step, over many eyes. */
+static float sorted_largest_step(terrimp_sorted *s, float step)
+{
+    static float place[BLEND_PLACES][2], before[BLEND_PLACES];
+    float largest = 0.0f;
+    int i, k;
+    for (i = 0; i < 40; i++) {
+        terrimp_camera camera = sorted_camera(&s->desc);
+        camera.eye[1] = 40.0f;
+        camera.forward[1] = -0.5f;
+        camera.z_far = 300.0f;
+        sorted_frame(s, &camera);
+        for (k = 0; k < BLEND_PLACES; k++) {
+            place[k][0] = camera.eye[0] + random_float(-120.0f, 120.0f);
+            place[k][1] = camera.eye[2] + random_float(-120.0f, 120.0f);
+            if (!sorted_height_at(place[k][0], place[k][1], &before[k]))
+                before[k] = 1e9f;
+        }
+        camera.eye[0] += step;
+        camera.eye[2] += step;
+        sorted_frame(s, &camera);
+        for (k = 0; k < BLEND_PLACES; k++) {
+            float after;
+            if (before[k] < 1e8f && sorted_height_at(place[k][0], place[k][1], &after))
+                largest = fmaxf(largest, fabsf(after - before[k]));
+        }
+    }
+    return largest;
+}
+
+static void sorted_levels_change_without_a_pop(void)
+{
+    static const float scales[3] = { 2.5f, 4.0f, 9.0f };
+    int i;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 3; i++) {
+        terrimp_sorted_desc desc = sorted_hills();
+        terrimp_sorted s;
+        float steps[3];
+        desc.scale = scales[i];
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        steps[0] = sorted_largest_step(&s, 1.0f);
+        steps[1] = sorted_largest_step(&s, 1.0f / 8.0f);
+        steps[2] = sorted_largest_step(&s, 1.0f / 64.0f);
+        CHECK(steps[0] > 0.05f);
+        CHECK(steps[1] < steps[0] / 3.0f && steps[2] < steps[1] / 3.0f);
+    }
+}
+
+/* ---- endless ---- */
+
+static void sorted_repeats_after_a_period(void)
+{
+    static terrimp_sorted_square before[SORTED_MOST];
+    terrimp_sorted_desc desc = sorted_hills();
+    terrimp_sorted s;
+    int i;
+    uint32_t k, count;
+    sorted_make_hills(8.0f);
+    desc.scale = 4.0f;
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    for (i = 0; i < 50; i++) {
+        terrimp_camera camera = sorted_camera(&s.desc);
+        int32_t away_x = 8 * ((int32_t)random_range(0, 6) - 3);
+        int32_t away_z = 8 * ((int32_t)random_range(0, 6) - 3);
+        camera.eye[0] = floorf(camera.eye[0] * 64.0f) / 64.0f; /* so that no float is rounded */
+        camera.eye[2] = floorf(camera.eye[2] * 64.0f) / 64.0f;
+        memset(sorted_squares, 0, sizeof sorted_squares);
+        sorted_frame(&s, &camera);
+        memcpy(before, sorted_squares, sizeof before);
+        count = sorted_count;
+        camera.eye[0] += (float)(away_x * 64);
+        camera.eye[2] += (float)(away_z * 64);
+        memset(sorted_squares, 0, sizeof sorted_squares);
+        sorted_frame(&s, &camera);
+        CHECK(count == sorted_count);
+        for (k = 0; k < sorted_count; k++) {
+            int v;
+            sorted_squares[k].page_x -= away_x;
+            sorted_squares[k].page_z -= away_z;
+            for (v = 0; v < sorted_squares[k].vertex_count; v++) {
+                sorted_squares[k].vertices[v].x -= away_x * 64;
+                sorted_squares[k].vertices[v].z -= away_z * 64;
+            }
+        }
+        CHECK(memcmp(before, sorted_squares, sizeof before) == 0);
+    }
+}
+
+/* Heights, normals and rays of a field that wraps are those of one that is laid out nine times. */
+static void field_that_wraps_is_endless(void)
+{
+    static float tile[6 * 9], tiled[16 * 25];
+    terrimp_heightfield one, nine;
+    int i, x, z, hits = 0;
+    memset(&one, 0, sizeof one);
+    for (z = 0; z < 6; z++)
+        for (x = 0; x < 9; x++)
+            tile[z * 9 + x] = random_float(0.0f, 3.0f);
+    for (z = 0; z < 6; z++)
+        tile[z * 9 + 8] = tile[z * 9];
+    memcpy(tile + 5 * 9, tile, 9 * sizeof tile[0]);
+    for (z = 0; z < 16; z++)
+        for (x = 0; x < 25; x++)
+            tiled[z * 25 + x] = tile[z % 5 * 9 + x % 8];
+    one.samples = tile;
+    one.width = 9, one.depth = 6;
+    one.spacing_x = 0.5f, one.spacing_z = 2.0f;
+    one.origin_x = 4.0f, one.origin_z = 10.0f;
+    one.wrap = 1;
+    nine = one;
+    nine.samples = tiled;
+    nine.width = 25, nine.depth = 16;
+    nine.origin_x = 0.0f, nine.origin_z = 0.0f;
+    nine.wrap = 0;
+    for (i = 0; i < 3000; i++) {
+        float from[3], way[3], a, b, length = random_float(0.1f, 6.0f);
+        terrimp_ray_hit p, q;
+        terrimp_result got;
+        from[0] = floorf(random_float(0.0f, 12.0f) * 64.0f) / 64.0f;
+        from[1] = random_float(-1.0f, 4.0f);
+        from[2] = floorf(random_float(0.0f, 30.0f) * 64.0f) / 64.0f;
+        CHECK(terrimp_heightfield_height(&one, from[0], from[2], &a) == TERRIMP_OK);
+        CHECK(terrimp_heightfield_height(&nine, from[0], from[2], &b) == TERRIMP_OK);
+        CHECK(same_float(a, b));
+        CHECK(terrimp_heightfield_normal(&one, from[0], from[2], p.normal) == TERRIMP_OK);
+        CHECK(terrimp_heightfield_normal(&nine, from[0], from[2], q.normal) == TERRIMP_OK);
+        CHECK(memcmp(p.normal, q.normal, sizeof p.normal) == 0);
+        from[0] = random_float(6.1f, 6.9f);
+        from[2] = random_float(8.0f, 22.0f);
+        way[0] = random_float(-1.0f, 1.0f);
+        way[1] = random_float(-1.0f, 0.3f);
+        way[2] = random_float(-1.0f, 1.0f);
+        got = terrimp_heightfield_raycast(&one, from, way, length, &p);
+        CHECK(terrimp_heightfield_raycast(&nine, from, way, length, &q) == got);
+        if (got != TERRIMP_OK)
+            continue;
+        hits++;
+        CHECK(fabsf(p.distance - q.distance) < 1e-3f);
+        CHECK(fabsf(p.position[0] - q.position[0]) < 1e-3f);
+        CHECK(fabsf(p.position[2] - q.position[2]) < 1e-3f);
+        CHECK(p.x == q.x % 8 && p.z == q.z % 5);
+    }
+    CHECK(hits > 1000);
+}
+
+/* A ray along an endless plain ends; one straight down from anywhere hits. */
+static void rays_over_a_field_that_wraps_end(void)
+{
+    static float flat[4];
+    terrimp_heightfield f;
+    terrimp_ray_hit hit;
+    float from[3] = { 0.3f, 1.0f, 0.6f }, way[3] = { 1.0f, 0.0f, 0.37f };
+    memset(&f, 0, sizeof f);
+    f.samples = flat;
+    f.width = f.depth = 2;
+    f.wrap = 1;
+    CHECK(terrimp_heightfield_raycast(&f, from, way, 1048576.0f, &hit) == TERRIMP_E_MISS);
+    CHECK(terrimp_heightfield_raycast(&f, from, way, 1048580.0f, &hit) == TERRIMP_E_RANGE);
+    CHECK(terrimp_heightfield_raycast(&f, from, way, FLT_MAX, &hit) == TERRIMP_E_RANGE);
+    way[1] = -0.01f;
+    CHECK(terrimp_heightfield_raycast(&f, from, way, 1000.0f, &hit) == TERRIMP_OK);
+    CHECK(fabsf(hit.position[0] - 100.3f) < 0.01f && fabsf(hit.position[2] - 37.6f) < 0.01f);
+    from[0] = -12345.5f;
+    way[0] = way[2] = 0.0f, way[1] = -1.0f;
+    CHECK(terrimp_heightfield_raycast(&f, from, way, 5.0f, &hit) == TERRIMP_OK);
+    CHECK(hit.position[0] == -12345.5f && hit.distance == 1.0f);
+}
+
+/* ---- pages ---- */
+
+/* A host that has only some levels of some pages of the endless hills, by chance but always the
+   same ones; it packs what is asked for. */
+typedef struct sorted_host {
+    uint32_t seed, coarsest, asked, drawn;
+    int none; /* some pages are not here at all */
+    float samples[65 * 65];
+} sorted_host;
+
+static uint32_t sorted_level_here(const sorted_host *host, int32_t x, int32_t z)
+{
+    uint32_t bits = ((uint32_t)x * 73856093u ^ (uint32_t)z * 19349663u ^ host->seed) * 2654435761u;
+    if (host->none && (bits >> 24) % 7u == 0)
+        return TERRIMP_SORTED_ABSENT;
+    return (bits >> 16) % (host->coarsest + 1u);
+}
+
+static void sorted_give_page(void *user, terrimp_sorted_page *page)
+{
+    sorted_host *host = (sorted_host *)user;
+    int x, z, side, step;
+    CHECK(page->level == 0);
+    page->level = sorted_level_here(host, page->x, page->z);
+    host->asked += !page->only_level;
+    if (page->level == TERRIMP_SORTED_ABSENT || page->only_level)
+        return;
+    host->drawn++;
+    step = 1 << page->level;
+    side = 64 / step + 1;
+    for (z = 0; z < side; z++)
+        for (x = 0; x < side; x++)
+            host->samples[z * side + x] =
+                sorted_heights[((page->z & 7) * 64 + z * step) * SORTED_SIDE +
+                               (page->x & 7) * 64 + x * step];
+    page->samples = host->samples;
+    page->row_bytes = (size_t)side * sizeof(float);
+}
+
+static terrimp_sorted_desc sorted_hosted(sorted_host *host)
+{
+    terrimp_sorted_desc desc = sorted_hills();
+    memset(host, 0, sizeof *host);
+    desc.field.samples = NULL;
+    desc.field.width = desc.field.depth = 0;
+    desc.low = -40.0f;
+    desc.high = 40.0f;
+    desc.user = host;
+    desc.page = sorted_give_page;
+    return desc;
+}
+
+static void sorted_pages_come_from_the_host(void)
+{
+    static terrimp_sorted_square before[SORTED_MOST];
+    static sorted_host host;
+    terrimp_sorted_desc desc = sorted_hosted(&host), field = sorted_hills();
+    terrimp_sorted s;
+    terrimp_camera camera;
+    int i;
+    uint32_t count;
+    sorted_make_hills(8.0f);
+    field.low = desc.low, field.high = desc.high;
+    for (i = 0; i < 20; i++) {
+        CHECK(terrimp_sorted_init(&field, &s) == TERRIMP_OK);
+        camera = sorted_camera(&s.desc);
+        memset(sorted_squares, 0, sizeof sorted_squares);
+        sorted_frame(&s, &camera);
+        count = sorted_count;
+        memcpy(before, sorted_squares, sizeof before);
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        memset(sorted_squares, 0, sizeof sorted_squares);
+        sorted_frame(&s, &camera);
+        CHECK(sorted_count == count && memcmp(before, sorted_squares, sizeof before) == 0);
+    }
+    CHECK(host.asked > 100);
+}
+
+/* With levels missing here and there: no cracks, no wrong order; heights that are here are right,
+   others between those that are. */
+static void sorted_pages_may_be_coarse_or_absent(void)
+{
+    static sorted_host host;
+    terrimp_sorted_desc desc = sorted_hosted(&host);
+    int i, cracks = 0, faults = 0, absent = 0, own = 0, k;
+    uint32_t q;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 60; i++) {
+        terrimp_sorted s;
+        terrimp_camera camera;
+        double area = 0.0;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        host.seed = random_bits();
+        host.coarsest = random_range(1, 6);
+        host.none = i & 1;
+        camera = sorted_camera(&s.desc);
+        host.asked = host.drawn = 0;
+        sorted_frame(&s, &camera);
+        absent += (int)(host.asked - host.drawn);
+        cracks += sorted_count_cracks(&area);
+        faults += order_faults(&s, &camera);
+        for (q = 0; q < sorted_count; q++)
+            for (k = 0; k < sorted_squares[q].vertex_count; k++) {
+                const terrimp_sorted_vertex *v = &sorted_squares[q].vertices[k];
+                uint32_t here = sorted_level_here(&host, sorted_squares[q].page_x,
+                                                  sorted_squares[q].page_z);
+                CHECK(here != TERRIMP_SORTED_ABSENT);
+                if (((v->x | v->z) & 63) == 0) { /* of all pages that meet here */
+                    CHECK(v->height ==
+                          sorted_heights[(v->z & 511) * SORTED_SIDE + (v->x & 511)]);
+                    own++;
+                }
+            }
+    }
+    CHECK(cracks == 0 && faults == 0);
+    CHECK(absent > 10 && own > 1000);
+}
+
+/* The level of a page's texture: its texels cover 1 to 2 pixels at the page's closest point, give
+   or take the tenth that keeps it from flickering; and an eye that trembles changes nothing. */
+static void sorted_texture_levels_fit_the_screen(void)
+{
+    static uint8_t levels[64 * 64];
+    terrimp_sorted_desc desc = sorted_hills();
+    terrimp_sorted s;
+    int i, t, changes = 0, seen[16] = { 0 };
+    uint32_t k;
+    sorted_make_hills(8.0f);
+    desc.texture_level_count = 6;
+    desc.page_texels = 128;
+    desc.texture_levels = levels;
+    desc.texture_window = 64;
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    for (i = 0; i < 60; i++) {
+        terrimp_camera camera = sorted_camera(&s.desc);
+        float factor, x = camera.eye[0];
+        uint8_t first[64 * 64];
+        camera.z_far = 900.0f;
+        CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);
+        memset(levels, 255, sizeof levels);
+        for (t = 0; t < 8; t++) {
+            camera.eye[0] = x + (t & 1 ? 0.5f : -0.5f); /* 1 % and less of most distances */
+            sorted_frame(&s, &camera);
+            if (t == 0)
+                memcpy(first, levels, sizeof first);
+        }
+        for (k = 0; k < sizeof levels; k++)
+            changes += first[k] != 255 && levels[k] != first[k];
+        for (k = 0; k < sorted_count; k++) {
+            const terrimp_sorted_square *q = &sorted_squares[k];
+            float dx = fmaxf(fmaxf((float)q->page_x * 64.0f - camera.eye[0],
+                                   camera.eye[0] - (float)(q->page_x + 1) * 64.0f), 0.0f);
+            float dz = fmaxf(fmaxf((float)q->page_z * 64.0f - camera.eye[2],
+                                   camera.eye[2] - (float)(q->page_z + 1) * 64.0f), 0.0f);
+            float dy = fmaxf(fmaxf(s.desc.low - camera.eye[1], camera.eye[1] - s.desc.high), 0.0f);
+            float away = sqrtf(dx * dx + dy * dy + dz * dz);
+            float pixels = 0.5f * (float)(1 << q->texture_level) * factor / away;
+            CHECK(q->texture_level == 0 || pixels < 1.12f);
+            CHECK(q->texture_level == 5 || pixels > 0.44f);
+            seen[q->texture_level]++;
+        }
+    }
+    CHECK(changes < 60); /* those first seen late, and the closest pages */
+    CHECK(seen[0] > 0 && seen[1] > 0 && seen[2] > 0);
+}
+
+/* Halving agrees with its definition, and pages that share a border keep on sharing it. */
+static void sorted_halving_keeps_borders(void)
+{
+    static uint8_t map[65 * 65 * 3], page[2][33 * 65 * 3], half[33 * 33 * 3], part[2][17 * 33 * 3];
+    int x, y, c, i, wrap;
+    for (i = 0; i < (int)sizeof map; i++)
+        map[i] = (uint8_t)random_bits();
+    for (i = 0; i < 2; i++)
+        for (y = 0; y < 65; y++)
+            memcpy(page[i] + y * 33 * 3, map + (y * 65 + i * 32) * 3, 33 * 3);
+    for (i = 0; i < 2; i++)
+        CHECK(terrimp_sorted_halve(page[i], 33, 65, 3, 0, part[i]) == TERRIMP_OK);
+    for (y = 0; y < 33; y++)
+        CHECK(memcmp(part[0] + (y * 17 + 16) * 3, part[1] + y * 17 * 3, 3) == 0);
+    for (y = 0; y < 65; y++) /* a map that repeats */
+        memcpy(map + (y * 65 + 64) * 3, map + y * 65 * 3, 3);
+    memcpy(map + 64 * 65 * 3, map, 65 * 3);
+    for (wrap = 0; wrap < 2; wrap++) {
+        CHECK(terrimp_sorted_halve(map, 65, 65, 3, wrap, half) == TERRIMP_OK);
+        for (y = 0; y < 33; y++)
+            for (x = 0; x < 33; x++)
+                for (c = 0; c < 3; c++) {
+                    int dx, dz, sum = 0, weight = 0;
+                    for (dz = -1; dz <= 1; dz++)
+                        for (dx = -1; dx <= 1; dx++) {
+                            int u = (2 * x + dx + 64) % 64, v = (2 * y + dz + 64) % 64;
+                            int w = (2 - abs(dx)) * (2 - abs(dz));
+                            if (!wrap && ((dx && x % 32 == 0) || (dz && y % 32 == 0)))
+                                continue;
+                            sum += w * map[(v * 65 + u) * 3 + c];
+                            weight += w;
+                        }
+                    CHECK(half[(y * 33 + x) * 3 + c] == (2 * sum + weight) / (2 * weight));
+                }
+    }
+    CHECK(terrimp_sorted_halve(NULL, 65, 65, 3, 0, half) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_halve(map, 65, 65, 3, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_halve(map, 64, 65, 3, 0, half) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_halve(map, 65, 1, 3, 0, half) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_halve(map, 65, 65, 5, 0, half) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_halve(map, 65, 65, 0, 0, half) == TERRIMP_E_RANGE);
+}
+
+/* ---- pace ---- */
+
+/* Over flights: triangles stay within 3 % of what was asked for, and hardly change between frames;
+   where even the smallest scale needs more, that is used. */
+static void sorted_keeps_to_its_triangles(void)
+{
+    static const uint32_t most[4] = { 400, 1000, 2500, 6000 };
+    int i, k, frame, outside = 0, jumps = 0, fields = 0;
+    sorted_make_hills(8.0f);
+    for (i = 0; i < 8; i++)
+        for (k = 0; k < 4; k++) {
+            terrimp_sorted_desc desc = sorted_hills();
+            terrimp_sorted s;
+            terrimp_camera camera;
+            float turn = random_float(0.0f, 6.28f), rate = random_float(-0.05f, 0.05f);
+            uint32_t before = 0;
+            desc.max_triangles = most[k];
+            CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+            camera = sorted_camera(&s.desc);
+            camera.eye[1] = random_float(5.0f, 40.0f);
+            camera.forward[1] = random_float(-0.4f, 0.0f);
+            camera.fov_y_rad = 1.0f;
+            camera.z_far = 400.0f;
+            for (frame = 0; frame < 40; frame++) {
+                camera.forward[0] = cosf(turn + rate * (float)frame);
+                camera.forward[2] = sinf(turn + rate * (float)frame);
+                camera.eye[0] += camera.forward[0];
+                camera.eye[2] += camera.forward[2];
+                sorted_frame(&s, &camera);
+                if (s.scale <= 2.0f) {
+                    before = 0;
+                    continue;
+                }
+                fields++;
+                outside += (float)s.triangle_count < 0.97f * (float)most[k] ||
+                           s.triangle_count > most[k];
+                jumps += before && fabsf((float)s.triangle_count - (float)before) >
+                                       0.05f * (float)before;
+                before = s.triangle_count;
+            }
+        }
+    CHECK(fields > 600);
+    CHECK(outside * 200 <= fields); /* one split can be more than that of 400 */
+    CHECK(jumps * 200 <= fields);
+}
+
+/* Time rises with triangles by some law; the pace finds the allowance whatever it starts from, from
+   one side, and stays there. */
+static void sorted_pace_comes_to_rest(void)
+{
+    int i, frame;
+    for (i = 0; i < 300; i++) {
+        float fixed = random_float(0.0f, 8.0f), each = powf(10.0f, random_float(-4.0f, -2.0f));
+        float target = fixed + random_float(4.0f, 30.0f), ms = 0.0f;
+        uint32_t triangles = 1u << random_range(0, 17), before;
+        int side = 0, turns = 0;
+        for (frame = 0; frame < 800; frame++) {
+            int now;
+            ms = fixed + each * (float)triangles;
+            before = triangles;
+            triangles = terrimp_sorted_pace(triangles, ms, target);
+            CHECK((float)triangles >= 0.95f * (float)before - 1.0f);
+            CHECK((float)triangles <= 1.02f * (float)before + 1.0f);
+            now = triangles > before ? 1 : triangles < before ? -1 : 0;
+            turns += side && now && now != side;
+            side = now ? now : side;
+        }
+        CHECK(turns == 0);
+        CHECK(ms >= 0.97f * target && ms <= 1.03f * target);
+    }
+    CHECK(terrimp_sorted_pace(1000, not_a_number(), 16.0f) == 1000);
+    CHECK(terrimp_sorted_pace(1000, 0.0f, 16.0f) == 1000);
+    CHECK(terrimp_sorted_pace(1000, 4e4f, 16.0f) == 950);
+    CHECK(terrimp_sorted_pace(1000, 30.0f, 0.0f) == 1000);
+    CHECK(terrimp_sorted_pace(0, 1.0f, 16.0f) == 1);
+    CHECK(terrimp_sorted_pace(0xffffffffu, 1.0f, 16.0f) == 0xffffffffu);
+}
+
+/* The farthest corner of a square that the frame has. */
+static float sorted_reach(const terrimp_camera *camera)
+{
+    float reach = 0.0f;
+    uint32_t i;
+    for (i = 0; i < sorted_count; i++) {
+        const terrimp_sorted_vertex *v = sorted_squares[i].vertices;
+        reach = fmaxf(reach, hypotf((float)v->x - camera->eye[0], (float)v->z - camera->eye[2]));
+    }
+    return reach;
+}
+
+/* An eye that sinks sees less far, step by step, and as far as it can at the height given. */
+static void sorted_horizon_comes_in(void)
+{
+    terrimp_sorted_desc desc = sorted_hills();
+    terrimp_sorted s;
+    terrimp_camera camera;
+    float before = 0.0f, all, reach;
+    int i;
+    sorted_make_hills(1.0f);
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    camera = sorted_camera(&s.desc);
+    camera.eye[0] = camera.eye[2] = 0.0f;
+    camera.forward[1] = -0.1f;
+    camera.fov_y_rad = 1.0f;
+    camera.z_far = 1000.0f;
+    desc.low_far = 100.0f;
+    desc.low_height = 20.0f;
+    for (i = 0; i <= 20; i += 4) {
+        camera.eye[1] = sorted_heights[0] + (float)i;
+        desc.low_far = 0.0f;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        sorted_frame(&s, &camera);
+        all = sorted_reach(&camera);
+        desc.low_far = 100.0f;
+        CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        sorted_frame(&s, &camera);
+        reach = sorted_reach(&camera);
+        CHECK(i < 20 ? reach < all && reach > before : reach == all);
+        before = reach;
+    }
+}
+
+/* ---- bad input ---- */
+
+static void sorted_refuses_bad_input(void)
+{
+    static const float flat_table[7] = { 0, 2, 4, 4, 16, 32, 64 };
+    static const float steep_table[7] = { 0, 1, 2, 4, 8, 16, 32 };
+    static float no_height[4];
+    terrimp_sorted_desc good = sorted_hills(), bad, out;
+    terrimp_sorted s, untouched;
+    terrimp_sorted_square square;
+    terrimp_camera camera;
+    int i;
+    sorted_make_hills(8.0f);
+    CHECK(sizeof s <= 2048);
+    CHECK(terrimp_sorted_desc_resolve(NULL, &out) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_desc_resolve(&good, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_init(&good, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_begin(NULL, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_next(NULL, &square, 1) == 0);
+    memset(&s, 1, sizeof s);
+    untouched = s;
+    for (i = 0; i < 24; i++) {
+        terrimp_result wanted = TERRIMP_E_RANGE;
+        bad = good;
+        switch (i) {
+        case 0: bad.page_quads = 1; break;
+        case 1: bad.page_quads = 48; break;
+        case 2: bad.page_quads = 2048; break;
+        case 3: bad.scale = 1.99f; break;
+        case 4: bad.scale = -1.0f; break;
+        case 5: bad.table = flat_table; break;
+        case 6: bad.table = steep_table, bad.scale = 3.0f; break;
+        case 7: bad.low = 1.0f; break;
+        case 8: bad.low_far = -1.0f; break;
+        case 9: bad.low_height = -1.0f; break;
+        case 10: bad.page_texels = 100; break;
+        case 11: bad.texture_level_count = 17; break;
+        case 12: bad.texels_per_px = -1.0f; break;
+        case 13: bad.texture_window = 33; break;
+        case 14: bad.field.width = 512; break;
+        case 15: bad.page_quads = 1024; break; /* the field wraps within a page */
+        case 16: bad.scale = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 17: bad.high = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 18: bad.low_far = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 19: bad.low_height = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 20: bad.texels_per_px = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 21: bad.field.samples = NULL, wanted = TERRIMP_E_NULL; break;
+        case 22: bad.field.origin_x = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        default: bad.field.wrap = 0, bad.field.width = bad.field.depth = 2;
+                 bad.field.samples = no_height, no_height[3] = not_a_number();
+                 wanted = TERRIMP_E_NOT_FINITE;
+        }
+        CHECK(terrimp_sorted_init(&bad, &s) == wanted);
+        CHECK(memcmp(&s, &untouched, sizeof s) == 0);
+    }
+    good.table = steep_table;
+    good.scale = 4.0f;
+    CHECK(terrimp_sorted_init(&good, &s) == TERRIMP_OK);
+    for (i = 0; i < 8; i++) {
+        terrimp_result wanted = TERRIMP_E_RANGE;
+        camera = sorted_camera(&s.desc);
+        CHECK(terrimp_sorted_begin(&s, &camera) == TERRIMP_OK);
+        switch (i) {
+        case 0: camera.z_far = 1e9f; break;
+        case 1: camera.z_far = FLT_MAX; break;
+        case 2: camera.eye[0] = 1e9f; break;
+        case 3: camera.eye[2] = -FLT_MAX; break;
+        case 4: camera.z_near = 0.0f; break;
+        case 5: camera.eye[0] = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 6: camera.eye[1] = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        default: camera.forward[1] = not_a_number(), wanted = TERRIMP_E_NOT_FINITE;
+        }
+        camera.forward[1] = i < 2 ? -0.1f : camera.forward[1];
+        CHECK(terrimp_sorted_begin(&s, &camera) == wanted);
+        CHECK(terrimp_sorted_next(&s, &square, 1) == 0); /* no frame, rather than the old one */
+    }
+    CHECK(terrimp_sorted_begin(&s, NULL) == TERRIMP_E_NULL);
+}
+
+/* Cameras that see everything, nothing or a line: no crash, no endless frame. */
+static void sorted_bears_odd_cameras(void)
+{
+    terrimp_sorted_desc desc = sorted_hills();
+    terrimp_sorted s;
+    int i;
+    sorted_make_hills(8.0f);
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    for (i = 0; i < 60; i++) {
+        terrimp_camera camera = sorted_camera(&s.desc);
+        switch (i % 6) {
+        case 0: camera.fov_y_rad = 3.1f; camera.z_far = 60.0f; break;
+        case 1: camera.fov_y_rad = 0.001f; break;
+        case 2: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = -1.0f; break;
+        case 3: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = 1.0f;
+                camera.eye[1] = 100.0f; break;
+        case 4: camera.eye[1] = 3e30f; break;
+        default: camera.eye[1] = -1e9f, camera.z_far = 1e7f;
+        }
+        sorted_frame(&s, &camera);
+        CHECK(i % 6 < 3 || sorted_count == 0);
+    }
+}
+
+static void sorted_tests(void)
+{
+    RUN(sorted_needs_no_depth_buffer);
+    RUN(sorted_squares_meet_without_cracks);
+    RUN(sorted_patterns_are_ordered);
+    RUN(sorted_draws_all_that_is_seen);
+    RUN(sorted_levels_change_without_a_pop);
+    RUN(sorted_repeats_after_a_period);
+    RUN(field_that_wraps_is_endless);
+    RUN(rays_over_a_field_that_wraps_end);
+    RUN(sorted_pages_come_from_the_host);
+    RUN(sorted_pages_may_be_coarse_or_absent);
+    RUN(sorted_texture_levels_fit_the_screen);
+    RUN(sorted_halving_keeps_borders);
+    RUN(sorted_keeps_to_its_triangles);
+    RUN(sorted_pace_comes_to_rest);
+    RUN(sorted_horizon_comes_in);
+    RUN(sorted_refuses_bad_input);
+    RUN(sorted_bears_odd_cameras);
+}
+
+#endif
