@@ -1058,7 +1058,7 @@ static void sorted_bears_odd_cameras(void)
         case 2: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = -1.0f; break;
         case 3: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = 1.0f;
                 camera.eye[1] = 100.0f; break;
-        case 4: camera.eye[1] = 3e30f; break;
+        case 4: camera.eye[1] = 1e18f; break;
         default: camera.eye[1] = -1e9f, camera.z_far = 1e7f;
         }
         sorted_frame(&s, &camera);
