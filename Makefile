@@ -5,6 +5,7 @@
 ## make demo      flies over a terrain: pictures and a table of statistics, in build/demo/
 ##                  DEM=FILE     over this elevation file instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
+## make deps-viewer viewer   a window to fly in, build/viewer [FILE]; needs GLFW
 ## make test      runs every test, as many suites at once as there are cores
 ##                  JOBS=N   so many at once; 1: one after the other
 ## make bench     measures; tables and plots also go to build/bench/
@@ -53,6 +54,7 @@ GL_FLAGS_osmesa := -DHOST_OSMESA
 GL_LIBS_osmesa  := -lOSMesa
 GL_FLAGS_egl    := -DHOST_EGL
 GL_LIBS_egl     := -lEGL -lOpenGL
+GL_LIBS          = $(GL_LIBS_$(GL))
 
 # The benchmark compares with meshoptimizer where that is installed.
 BENCH_FLAGS = $(if $(call has_header,meshoptimizer.h),-DTERRIMP_HAVE_MESHOPT)
@@ -62,22 +64,29 @@ BENCH_LIBS  = $(if $(call has_header,meshoptimizer.h),-lmeshoptimizer)
 TIFF_FLAGS = $(if $(call has_header,tiffio.h),-DHOST_TIFF)
 TIFF_LIBS  = $(if $(call has_header,tiffio.h),-ltiff)
 
-EXAMPLES := $(patsubst examples/%.c,%,$(wildcard examples/*.c))
+# The viewer needs GLFW, and is built when it is asked for.
+EXAMPLES := $(filter-out viewer,$(patsubst examples/%.c,%,$(wildcard examples/*.c)))
 EXAMPLES_CPP := $(patsubst examples/%.cpp,%,$(wildcard examples/*.cpp))
 BENCHES  := $(patsubst tests/%.c,%,$(wildcard tests/bench_*.c))
 TESTS    := unit unit_host render
 HOST     := $(patsubst examples/%.c,$(BUILD)/%.o,$(wildcard examples/host/*.c))
-DEPS     := $(filter deps deps-portable,$(MAKECMDGOALS))
+DEPS     := $(filter deps deps-portable deps-viewer deps-web,$(MAKECMDGOALS))
 
 all: $(EXAMPLES) $(if $(shell command -v $(firstword $(CXX))),$(EXAMPLES_CPP))
 
-$(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS): %: $(BUILD)/%
+$(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer: %: $(BUILD)/%
 
 help:
 	@sed -n 's/^## \{0,1\}//p' Makefile
 
 deps:
 	@sh tests/deps.sh
+
+deps-viewer:
+	@sh tests/deps_viewer.sh
+
+test-viewer: | $(DEPS)
+	@sh tests/viewer.sh
 
 demo: flyover
 	@mkdir -p build/demo
@@ -126,7 +135,7 @@ vpath %.cpp examples
 
 $(BUILD)/%: $(BUILD)/%.o $(BUILD)/host.a
 	@echo "link    $@"
-	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS_$(GL)) $(TIFF_LIBS) -lpng -lm \
+	@$(LINK) $(CONFIG_$(CONFIG)) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(GL_LIBS) $(TIFF_LIBS) -lpng -lm \
 	    -o $@
 
 $(BUILD)/host.a: $(HOST)
@@ -153,9 +162,12 @@ $(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
 $(BUILD)/bench_%: LIBS = $(BENCH_LIBS) -pthread
 $(BUILD)/parallel_build: LIBS = -lpthread
+$(BUILD)/viewer $(BUILD)/test_viewer: LIBS = -lpthread
+$(BUILD)/viewer $(BUILD)/test_viewer: GL_LIBS = -lglfw -lGL
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
 .PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz golden \
-        $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS)
+        $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer test-viewer deps-viewer web \
+        deps-web test-web
 .SECONDARY:

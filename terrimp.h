@@ -49,6 +49,7 @@
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
        >>visibility   the horizon: which nodes are hidden behind others
+       >>capture      a picture to be made, and what is drawn for it
        >>view         the per-frame decision, the schedule, the draw commands
        >>sorted       terrain in exact painter's order, for machines without a depth buffer
        >>layers       pictures one behind the other, of what stands on terrain
@@ -1173,6 +1174,9 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
                                                 const terrimp_quadtree *tree, const void *walls,
                                                 const terrimp_camera *camera,
                                                 terrimp_geomip_view *view);
+/* ==== Capture ============================================================ >>capture */
+
+/* (No functions of its own: a view calls back with what it makes.) */
 
 /* ==== View =============================================================== >>view */
 
@@ -1363,9 +1367,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
-   Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR: the
-              frame before stays. In GEOMIP and AUTO E_CAPACITY when even ground at 1000 px needs
-              more nodes: there is no frame then
+   Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
+              more nodes in GEOMIP and AUTO even at 1000 px. The frame before stays
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
@@ -4020,6 +4023,7 @@ typedef struct terrimpi_mip_frame {
                                   seen there, and across it */
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
+    float relief;              /* what measures are multiplied with */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
@@ -4127,6 +4131,7 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_nod
             return 0.0f;
     }
     d2 = terrimpi_mip_distance2(&box, f->eye);
+    split2 *= f->relief;
     measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
                                                  : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
@@ -4308,24 +4313,33 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
     return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
 }
 
+/* Decides which nodes are split, at a tolerance that is `scale` times as large as the view's: the
+   distances stay. Settings and camera are resolved. */
+static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tree,
+                              terrimp_geomip_view *view, const terrimp_camera *camera, float scale)
+{
+    float pixel_factor = terrimpi_camera_pixel_factor(camera);
+    uint32_t level;
+    terrimpi_camera_frustum(camera, &f->frustum);
+    f->tree = tree;
+    f->view = view;
+    f->exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
+    f->relief = view->rule == TERRIMP_GEOMIP_PICTURE ? 1.0f / scale : 1.0f / (scale * scale);
+    for (level = 0; level < tree->level_count; level++)
+        f->first[level] = tree->node_count;
+    terrimpi_mip_aim(f, camera, view->tolerance_px * scale / pixel_factor);
+    terrimpi_mip_refresh(f, pixel_factor);
+    view->frame = view->frame + 1u == 0 ? 1u : view->frame + 1u; /* 0 is what fresh marks say */
+    terrimpi_mip_mark_errors(f);
+    terrimpi_mip_balance(f);
+}
+
 /* terrimp_geomip_select with resolved settings and camera. */
 static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_geomip_view *view,
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
-    float pixel_factor = terrimpi_camera_pixel_factor(camera);
-    uint32_t level;
-    terrimpi_camera_frustum(camera, &f.frustum);
-    f.tree = tree;
-    f.view = view;
-    f.exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
-    for (level = 0; level < tree->level_count; level++)
-        f.first[level] = tree->node_count;
-    terrimpi_mip_aim(&f, camera, view->tolerance_px / pixel_factor);
-    terrimpi_mip_refresh(&f, pixel_factor);
-    view->frame = view->frame + 1u == 0 ? 1u : view->frame + 1u; /* 0 is what fresh marks say */
-    terrimpi_mip_mark_errors(&f);
-    terrimpi_mip_balance(&f);
+    terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
     if (view->draws_needed <= view->draw_capacity)
@@ -7029,137 +7043,368 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
     return TERRIMP_OK;
 }
 
+/* ==== Capture ============================================================ >>impl-capture */
+/* Based on: Hess 2010, sections 3.3, 3.4, 6.2 and 6.5.
+
+   A picture to be made: its camera, the level of the ground that it shows, the width of the border
+   around the node, and its layers. What is drawn for it is one list, back to front: a piece of the
+   picture is a slice of that list, a layer draws what of it reaches into the layer's depths. */
+
+#define TERRIMPI_CAPTURE_MARGIN 2u   /* texels around the fitted picture in its slot */
+#define TERRIMPI_CAPTURE_SMALLEST 8u /* texels along a side */
+#define TERRIMPI_CAPTURE_SOURCES 3u  /* a picture is made of up to 8 x 8 ground nodes */
+#define TERRIMPI_CAPTURE_ROW 10u     /* ... and those beside them */
+#define TERRIMPI_CAPTURE_DRAWS (TERRIMPI_CAPTURE_ROW * TERRIMPI_CAPTURE_ROW)
+#define TERRIMPI_CAPTURE_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
+#define TERRIMPI_CAPTURE_OVERLAP 1.1f /* of a mesh's error along a ray: of layers, at their edge */
+#define TERRIMPI_CAPTURE_LAYERS 2u   /* at most */
+
+typedef struct terrimpi_capture_plan {
+    terrimp_node node;
+    terrimp_box box;
+    terrimp_capture camera; /* of all layers: they differ in their clip distances */
+    float z_near[TERRIMPI_CAPTURE_LAYERS], z_far[TERRIMPI_CAPTURE_LAYERS];
+    uint32_t layer_count;
+    uint32_t source;        /* level of the ground that is drawn */
+    uint32_t border;        /* its width: see terrimpi_strip_quads */
+} terrimpi_capture_plan;
+
+/* Ground of the source level: a whole node, or the part of one that lies in the border. */
+typedef struct terrimpi_capture_draw {
+    uint32_t node;
+    uint32_t first_index, index_count, triangle_count;
+} terrimpi_capture_draw;
+
+/* ---- the camera ---- */
+
+/* Fits the camera around a node's mesh, which is in xyz, and says how many texels the picture needs
+   at so many for a unit of size at distance 1. Returns 0 when no camera fits. */
+static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], const float *xyz,
+                                uint32_t vertex_count, float density, uint32_t largest,
+                                terrimp_capture *camera, uint32_t size[2])
+{
+    float width, height;
+    if (terrimpi_capture_fit(box, eye, camera) != TERRIMP_OK ||
+        !terrimpi_capture_tighten(camera, xyz, vertex_count))
+        return 0;
+    width = (camera->tan_right - camera->tan_left) * density;
+    height = (camera->tan_up - camera->tan_down) * density;
+    if (!terrimpi_finite2(width, height)) /* the eye is almost beside a vertex */
+        return 0;
+    terrimpi_picture_size(width, height, TERRIMPI_CAPTURE_SMALLEST, largest, size);
+    size[0] += 2u * TERRIMPI_CAPTURE_MARGIN;
+    size[1] += 2u * TERRIMPI_CAPTURE_MARGIN;
+    return 1;
+}
+
+/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
+static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const terrimp_node *node,
+                                           uint32_t level)
+{
+    uint32_t shift = node->level - level, x, z;
+    uint32_t x1 = terrimpi_min_u32((node->x + 1u) << shift, tree->level_x[level]);
+    uint32_t z1 = terrimpi_min_u32((node->z + 1u) << shift, tree->level_z[level]);
+    float worst = 0.0f;
+    for (z = node->z << shift; z < z1; z++)
+        for (x = node->x << shift; x < x1; x++)
+            worst = terrimpi_max(worst, tree->nodes[tree->level_first[level] +
+                                                    z * tree->level_x[level] + x].rms);
+    return worst;
+}
+
+/* The level of the ground that a picture is made of: the coarsest whose rms error [wu] keeps to a
+   limit. */
+static uint32_t terrimpi_capture_source(const terrimp_quadtree *tree, const terrimp_node *node,
+                                        float limit)
+{
+    uint32_t level = node->level;
+    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES &&
+           terrimpi_capture_source_error(tree, node, level) > limit)
+        level--;
+    return level;
+}
+
+/* The border of neighbours that a picture needs: so many texels, in world units. At a grazing angle
+   a texel is as many times longer on the ground as the sine of that angle is smaller. */
+static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                                        const uint32_t size[2], float texels)
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    const terrimp_capture *c = &plan->camera;
+    uint32_t quads = t->desc.chunk_quads, width = 0, widths = terrimpi_strip_count(quads);
+    float per_texel_x = (c->tan_right - c->tan_left) / (float)size[0];
+    float per_texel_y = (c->tan_up - c->tan_down) / (float)size[1];
+    float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
+    float sine = terrimpi_max(drop / c->z_far, 0.1f);
+    float reach = texels * c->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
+    float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << plan->source);
+    while (width < widths && (float)terrimpi_strip_quads(quads, width) * step < reach)
+        width++;
+    return width;
+}
+
+/* Width of a plan's border in samples. */
+static float terrimpi_capture_reach(const terrimp_terrain *t, const terrimpi_capture_plan *plan)
+{
+    return (float)(terrimpi_strip_quads(t->desc.chunk_quads, plan->border) << plan->source);
+}
+
+/* Spreads the camera over a slot of a size, and its depths over the border, which lies in front of
+   and behind the box that was fitted. */
+static void terrimpi_capture_spread(const terrimp_terrain *t, terrimpi_capture_plan *plan,
+                                    const uint32_t size[2], float texels)
+{
+    terrimp_capture *c = &plan->camera;
+    float border;
+    terrimpi_pad(&c->tan_left, &c->tan_right, size[0] - 2u * TERRIMPI_CAPTURE_MARGIN,
+                 TERRIMPI_CAPTURE_MARGIN);
+    terrimpi_pad(&c->tan_down, &c->tan_up, size[1] - 2u * TERRIMPI_CAPTURE_MARGIN,
+                 TERRIMPI_CAPTURE_MARGIN);
+    plan->border = terrimpi_capture_border(t, plan, size, texels);
+    border = 1.5f * terrimpi_capture_reach(t, plan) *
+             terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
+    c->z_near = terrimpi_max(c->z_near * 0.5f, c->z_near - border);
+    c->z_far += border;
+    plan->z_near[0] = c->z_near;
+    plan->z_far[0] = c->z_far;
+}
+
+/* ---- its layers ---- */
+
+/* How far a picture's terrain may lie from the mesh that wears it, along a ray. */
+static float terrimpi_capture_overlap(const terrimp_terrain *t, const terrimpi_capture_plan *plan)
+{
+    const terrimp_capture *c = &plan->camera;
+    float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
+    return terrimpi_min(TERRIMPI_CAPTURE_OVERLAP * t->meshes[plan->node.number].error * c->z_far /
+                            terrimpi_max(drop, 1e-20f),
+                        c->z_far);
+}
+
+/* Two layers, at a distance along forward. They overlap by what the mesh may be off. */
+static void terrimpi_capture_divide(const terrimp_terrain *t, terrimpi_capture_plan *plan,
+                                    float distance)
+{
+    float overlap = terrimpi_capture_overlap(t, plan);
+    plan->z_near[1] = terrimpi_max(plan->z_near[0], distance - overlap);
+    plan->z_far[1] = plan->z_far[0];
+    plan->z_far[0] = terrimpi_min(plan->z_far[0], distance + overlap);
+}
+
+/* The camera of a layer. */
+static terrimp_capture terrimpi_capture_layer(const terrimpi_capture_plan *plan, uint32_t layer)
+{
+    terrimp_capture camera = plan->camera;
+    camera.z_near = plan->z_near[layer];
+    camera.z_far = plan->z_far[layer];
+    return camera;
+}
+
+/* Whether a ground node reaches into a layer. */
+static int terrimpi_capture_in_layer(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                                     uint32_t node, uint32_t layer)
+{
+    const float *f = plan->camera.forward, *eye = plan->camera.eye;
+    terrimp_node place;
+    terrimp_box box;
+    float first = 0.0f, last = 0.0f;
+    int i;
+    if (plan->layer_count == 1u)
+        return 1;
+    place = terrimpi_tree_node(&t->tree, node);
+    terrimpi_node_box(t, &place, &box);
+    for (i = 0; i < 3; i++) {
+        first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - eye[i]);
+        last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - eye[i]);
+    }
+    return first < plan->z_far[layer] && last > plan->z_near[layer];
+}
+
+/* ---- its draws ---- */
+
+/* One axis of the source nodes of a picture: the border's first one is 0. */
+typedef struct terrimpi_capture_row {
+    uint32_t first, count;                /* of the nodes without the border */
+    uint8_t order[TERRIMPI_CAPTURE_ROW];  /* from the farthest to the closest */
+} terrimpi_capture_row;
+
+/* `at` is the node's place on its level, `nodes` how many nodes the source level has, and `eye` how
+   many of those the eye is away from the terrain's edge. */
+static void terrimpi_capture_order(uint32_t at, uint32_t shift, uint32_t nodes, float eye,
+                                   terrimpi_capture_row *row)
+{
+    int low = 0, high, cell;
+    uint32_t k;
+    row->first = at << shift;
+    row->count = terrimpi_min_u32(1u << shift, nodes - row->first);
+    high = (int)row->count + 1;
+    cell = (int)terrimpi_clamp(eye - (float)row->first + 1.0f, -1.0f, 99.0f);
+    for (k = 0; k < row->count + 2u; k++)
+        row->order[k] = (uint8_t)(cell - low > high - cell ? low++ : high--);
+}
+
+/* 0 and 2: in the border, before and behind the nodes of the picture. */
+static uint32_t terrimpi_capture_side(const terrimpi_capture_row *row, uint32_t cell)
+{
+    return cell == 0 ? 0u : cell == row->count + 1u ? 2u : 1u;
+}
+
+/* Lists what a picture needs, back to front. Returns how many draws. */
+static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                                      terrimpi_capture_draw draws[TERRIMPI_CAPTURE_DRAWS])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    const float *eye = plan->camera.eye;
+    uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
+    uint32_t i, j, k, count = 0;
+    float step = (float)(quads << plan->source);
+    terrimpi_pattern patterns[9];
+    terrimpi_capture_row across, along;
+    terrimpi_capture_order(plan->node.x, shift, t->tree.level_x[plan->source],
+                           (eye[0] - field->origin_x) / (step * field->spacing_x), &across);
+    terrimpi_capture_order(plan->node.z, shift, t->tree.level_z[plan->source],
+                           (eye[2] - field->origin_z) / (step * field->spacing_z), &along);
+    for (k = 0; k < 9u; k++)
+        patterns[k] = terrimpi_find_pattern(
+            quads, k == 4u ? 0u : terrimpi_strip_pattern(quads, plan->border, k > 4u ? k - 1u : k));
+    for (j = 0; j < along.count + 2u; j++)
+        for (i = 0; i < across.count + 2u; i++) {
+            uint32_t x = across.first + across.order[i] - 1u, z = along.first + along.order[j] - 1u;
+            terrimpi_capture_draw *draw = &draws[count];
+            if (!terrimpi_tree_has(&t->tree, plan->source, x, z))
+                continue;
+            k = terrimpi_capture_side(&along, along.order[j]) * 3u +
+                terrimpi_capture_side(&across, across.order[i]);
+            draw->node = terrimpi_tree_at(&t->tree, plan->source, x, z).number;
+            draw->first_index = patterns[k].first_index;
+            draw->index_count = patterns[k].index_count;
+            draw->triangle_count = patterns[k].triangle_count;
+            count++;
+        }
+    return count;
+}
+
+/* Triangles of a slice of a picture's draws, of all its layers. */
+static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
+                                           const terrimpi_capture_plan *plan,
+                                           const terrimpi_capture_draw *draws, uint32_t count)
+{
+    uint32_t i, layer, triangles = 0;
+    for (i = 0; i < count; i++)
+        for (layer = 0; layer < plan->layer_count; layer++)
+            if (terrimpi_capture_in_layer(t, plan, draws[i].node, layer))
+                triangles += draws[i].triangle_count;
+    return triangles;
+}
+
+/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. */
+static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                                  const terrimpi_capture_draw *draws, uint32_t from, uint32_t to,
+                                  uint32_t layer, terrimp_capture_command *command,
+                                  int depth_zero_to_one, const terrimp_callbacks *callbacks)
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    terrimp_capture camera = terrimpi_capture_layer(plan, layer);
+    terrimp_ground_command ground;
+    float border = terrimpi_capture_reach(t, plan);
+    command->node = plan->node.number;
+    command->level = plan->node.level;
+    command->part = layer;
+    terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
+    memcpy(command->eye, camera.eye, sizeof command->eye);
+    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x;
+    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z;
+    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x;
+    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z;
+    callbacks->begin_capture(callbacks->user, command);
+    memset(&ground, 0, sizeof ground);
+    ground.level = plan->source;
+    for (; from < to; from++) {
+        if (!terrimpi_capture_in_layer(t, plan, draws[from].node, layer))
+            continue;
+        ground.node = draws[from].node;
+        ground.first_index = draws[from].first_index;
+        ground.index_count = draws[from].index_count;
+        callbacks->draw_ground(callbacks->user, &ground);
+    }
+    callbacks->end_capture(callbacks->user, command);
+}
+
 /* ==== View =============================================================== >>impl-view */
 /* Based on: Hess 2010, chapters 3, 4 and 6; de Boer 2000, section 2.2; DESIGN of this header: one
    currency, pixels, and one cost model.
 
    A frame has two cuts through the quadtree. The ground cut is what terrimp_geomip_select draws (or
    all chunks in sight). The impostor cut is where nodes are small enough on the screen to be
-   impostors. Both are nested in one tree, so it falls apart into units: a unit is the topmost node
-   that is in either cut, and it holds leaves (ground nodes) and wants (impostors). For each unit it
-   is decided which of the two is drawn. */
+   impostors. One walk lists the nodes in sight down to the deeper of the two, closest first; all
+   else scans that list. Both cuts are nested in one tree, so it falls apart into regions: a region
+   is the topmost node that is in either cut. It can be shown by its ground nodes or by its
+   impostors: by whichever costs less. */
 
-#define TERRIMPI_MARGIN 2u /* texels around the fitted picture in its slot */
-#define TERRIMPI_SMALLEST_PICTURE 8u
-#define TERRIMPI_NO_RECORD 0xffffu
-#define TERRIMPI_NO_LEAF 0xffffffffu
-#define TERRIMPI_STALE 2.0f       /* error over tolerance from which a picture is not drawn */
-#define TERRIMPI_EARLY 0.8f       /* ... from which it may be renewed before it is due */
-#define TERRIMPI_AHEAD 0.6f       /* ... that a new picture starts with: its eye lies ahead */
-#define TERRIMPI_LONGEST_LIFE 600.0f /* [frames] of a picture, for the cost model */
-#define TERRIMPI_FLIP 1.25f       /* how much cheaper the other kind must be to be changed to */
-#define TERRIMPI_SEEN 0.4f        /* of the pixels of a picture, that the screen shows */
-#define TERRIMPI_SOURCE_LEVELS 3u /* a picture is made of up to 8 x 8 ground nodes */
-#define TERRIMPI_SOURCE_TEXELS 0.5f /* rms error of that ground at most */
-#ifndef TERRIMP_NO_SPLIT
-#define TERRIMPI_PARTS 2u         /* of a picture that hides a part of itself (Hess 6.2) */
-#else
-#define TERRIMPI_PARTS 1u
-#endif
-#define TERRIMPI_SPLIT_SMEAR 0.5f /* ... is split when its smears over tolerance exceed this */
-#define TERRIMPI_SPLIT_GAIN 0.6f  /* and fall to this at most */
-#define TERRIMPI_SPLIT_OVERLAP 0.6f /* ... unless the parts overlap in so much of their depth: then
-                                       19 of 20 splits would spare too little (seven flights) */
+#define TERRIMPI_VIEW_AHEAD 0.6f      /* of its error's limit that a new picture starts with: it is
+                                         made from ahead, so that this falls before it grows */
+#define TERRIMPI_VIEW_AHEAD_BOX 0.8f  /* ... but not so far that a node is closer than this */
+#define TERRIMPI_VIEW_EARLY 0.8f      /* error over limit from which a picture may be renewed */
+#define TERRIMPI_VIEW_STALE 2.0f      /* ... from which it is not drawn */
+#define TERRIMPI_VIEW_STALE_OTHER 4.0f /* ... in the place of another that does not exist yet */
+#define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
+#define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
+#define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
+#define TERRIMPI_VIEW_FLIP 1.25f      /* how much cheaper another kind must be to be changed to */
+#define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
+#define TERRIMPI_VIEW_SEEN 0.4f       /* of the pixels of a picture, that the screen shows */
+#define TERRIMPI_VIEW_BORDER 2.6f     /* triangles for a quad of a picture, border included */
+#define TERRIMPI_VIEW_SPREAD 1.5f     /* captures of a frame over those of the mean frame */
+#define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
+#define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
+#define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
+#define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
+                                         exceed this */
+#define TERRIMPI_VIEW_SPLIT_GAIN 0.6f /* ... and fall to this at most */
+#define TERRIMPI_VIEW_SPLIT_OVERLAP 0.6f /* ... unless these overlap in so much of their depth: then
+                                         19 of 20 would spare too little (seven flights) */
+#define TERRIMPI_NO_PICTURE 0xffffu
 
-/* A slot of an atlas. */
-typedef struct terrimpi_seat {
-    uint32_t atlas, slot;
-} terrimpi_seat;
-
-/* The picture of a node: whole, or its front and its back part. */
-typedef struct terrimpi_record {
-    uint32_t node;
-    uint32_t seen;            /* the last frame that had a use for it; 0: the record is free */
-    uint32_t listed;          /* the last frame that draws it */
-    float alpha;              /* the share of the pixels that it has in that frame */
-    uint32_t part_count;      /* 0: no picture yet */
-    uint32_t drawn_count;     /* frames that have drawn it since the capture */
-    float eye[3];             /* of the capture */
-    float sharpness;          /* texels per unit of size at distance 1 */
-    float cost;               /* of the capture */
-    terrimpi_seat parts[TERRIMPI_PARTS];
-    float texture_matrix[TERRIMPI_PARTS][16];
-} terrimpi_record;
-
-/* An impostor that would be good to have. */
-typedef struct terrimpi_want {
-    terrimp_node site;
-    float closest;    /* [wu] from the eye to its box */
-    float pixels;     /* that it covers, about */
-    float urgency;    /* error of its picture over the tolerance */
-    float priority;   /* among the captures of this frame; 0: needs none */
-    float life;       /* [frames] that a new picture would last */
-    float draw_cost, capture_cost;
-    uint32_t record;  /* or TERRIMPI_NO_RECORD */
-} terrimpi_want;
-
-/* A part of the frame: see above. */
-typedef struct terrimpi_unit {
-    terrimp_node site;
-    float closest;
-    uint32_t first_leaf, leaf_count;
-    uint32_t first_want, want_count; /* want_count 0: ground is all it can be */
-} terrimpi_unit;
-
-/* A capture of this frame. Its cells are the source nodes of the picture and those around. */
-typedef struct terrimpi_job {
-    terrimp_node site;
-    uint32_t record;
-    uint32_t part_count;
-    terrimpi_seat parts[TERRIMPI_PARTS];
-    terrimp_rect rects[TERRIMPI_PARTS];
-    terrimp_capture captures[TERRIMPI_PARTS]; /* that differ in their clip distances */
-    uint32_t source;             /* level of the ground that is drawn */
-    uint32_t strip;              /* width of the border: see terrimpi_strip_quads */
-    uint32_t cell_from, cell_to; /* of this piece */
-    uint32_t cell_count;
-    int in_pieces;               /* it may be cut: its slot is not that of a picture in use */
-    uint32_t triangles;          /* of the whole picture */
-    float wanted, cost;
-} terrimpi_job;
-
-struct terrimp_view {
+/* What the whole of a frame looks at, and nothing changes. */
+typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
-    uint32_t frame;             /* updates so far */
-    uint32_t unit_count, leaf_count, want_count, job_count, item_count;
-    terrimp_live_atlas *atlases;   /* [atlas_count] */
-    uint32_t *leaf_at;             /* [node_count] ground draw of a node, when that agrees */
-    uint16_t *record_of;           /* [node_count] */
-    unsigned char *prefers;        /* [node_count] the unit was drawn as impostors */
-    unsigned char *shown;          /* [max_ground] nonzero: the ground draw is drawn */
-    uint32_t *leaves;              /* [max_ground] ground draws, by unit */
-    terrimpi_unit *units;          /* [max_ground] front to back */
-    uint32_t *items;               /* [max_impostors] records that are drawn, front to back */
-    terrimpi_want *wants;          /* [max_impostors] by unit */
-    uint32_t *queue;               /* [max_impostors] wants to capture, most urgent first */
-    terrimpi_record *records;      /* [max_impostors] */
-    terrimpi_job *jobs;            /* [max_captures] */
-    float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
-    uint16_t *mesh_indices;        /* [index_stride] */
-    uint32_t next_record;       /* where the search for a free record goes on */
-    int outdated;               /* what this frame would draw has been forgotten */
-    int open;                   /* `opened` is a picture of which pieces are missing */
-    terrimp_geomip_view ground;
-    terrimp_view_desc desc;     /* resolved */
-    float pixel_factor;
-    float motion[3];            /* [wu] a frame, smoothed */
-    float ground_scale;         /* of the ground's tolerance: 1, or more when max_ground is short */
-    terrimp_camera camera;      /* resolved, of the last update */
+    const terrimp_view_desc *desc; /* resolved */
+    uint32_t number;               /* updates so far */
+    terrimp_camera camera;         /* resolved */
     terrimp_frustum frustum;
-    terrimp_stats stats;
-    terrimpi_job opened;
-#ifndef TERRIMP_NO_MALLOC
-    terrimp_allocator allocator;
-    size_t bytes;
-#endif
+    float pixel_factor;
+    float motion[3];               /* [wu] a frame, smoothed */
+    float speed;
+} terrimpi_frame;
+
+/* ---- settings ---- */
+
+/* Impostors of a mode. */
+enum {
+    TERRIMPI_IMPOSTORS_NEVER = 0,
+    TERRIMPI_IMPOSTORS_ALWAYS, /* from the fade band on, each chunk, of its full resolution */
+    TERRIMPI_IMPOSTORS_CHEAPER /* where they cost less than ground */
 };
 
-/* ---- settings and memory ---- */
+static int terrimpi_view_impostors(const terrimp_view_desc *d)
+{
+    return d->mode == TERRIMP_MODE_AUTO       ? TERRIMPI_IMPOSTORS_CHEAPER
+           : d->mode == TERRIMP_MODE_IMPOSTOR ? TERRIMPI_IMPOSTORS_ALWAYS
+                                              : TERRIMPI_IMPOSTORS_NEVER;
+}
+
+/* Whether ground is drawn at its full resolution, else at a tolerance. */
+static int terrimpi_view_full(const terrimp_view_desc *d)
+{
+    return d->mode == TERRIMP_MODE_FULL || d->mode == TERRIMP_MODE_IMPOSTOR;
+}
 
 /* One setting: fills in its default and checks it. *result says what is wrong with those so far:
    one that is not finite counts before one that is out of its limits. */
-static void terrimpi_setting(float *value, float otherwise, float low, float high,
-                             terrimp_result *result)
+static void terrimpi_view_setting(float *value, float otherwise, float low, float high,
+                                  terrimp_result *result)
 {
     if (!terrimpi_finite(*value)) {
         *result = TERRIMP_E_NOT_FINITE;
@@ -7174,31 +7419,33 @@ static void terrimpi_setting(float *value, float otherwise, float low, float hig
 /* In AUTO one field, tolerance_px, rules the picture: a coarse one has pictures of fewer texels
    that live for longer and begin closer to the eye. (Measured on the rough terrain of 4097 samples:
    at 4 px 0.035 of the full mesh's time at 30 dB; before that 0.075 at 32 dB.) */
-static terrimp_result terrimpi_settings_resolve(const terrimp_terrain *t, terrimp_view_desc *d)
+static terrimp_result terrimpi_view_settings(const terrimp_terrain *t, terrimp_view_desc *d)
 {
     float coarse = 1.0f; /* the tolerance, where pictures follow it */
     const float most = TERRIMPI_FLOAT_MAX;
     float chunk = (float)t->desc.chunk_quads *
                   terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
     terrimp_result result = TERRIMP_OK;
-    terrimpi_setting(&d->tolerance_px, 1.0f, 0.05f, 100.0f, &result);
+    terrimpi_view_setting(&d->tolerance_px, 1.0f, 0.05f, 100.0f, &result);
     if (d->mode == TERRIMP_MODE_AUTO)
         coarse = terrimpi_clamp(d->tolerance_px, 1.0f, 9.0f);
-    terrimpi_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px), 0.05f,
-                     100.0f, &result);
-    terrimpi_setting(&d->morph_ratio, 1.0f, 1.0f, TERRIMPI_MIP_MORPH_MOST, &result);
-    terrimpi_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
-                     &result);
-    terrimpi_setting(&d->fade_end, (d->mode == TERRIMP_MODE_AUTO ? 1.1f : 1.5f) * d->fade_start,
-                     0.0f, most, &result);
-    terrimpi_setting(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse), 0.001f, 1.5f, &result);
-    terrimpi_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
-    terrimpi_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
-    terrimpi_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
-    terrimpi_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
-    terrimpi_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
-    terrimpi_setting(&d->costs.impostor_px, 0.25f, 0.0f, most, &result);
-    terrimpi_setting(&d->costs.capture, 1400.0f, 0.0f, most, &result);
+    terrimpi_view_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px),
+                          0.05f, 100.0f, &result);
+    terrimpi_view_setting(&d->morph_ratio, 1.0f, 1.0f, TERRIMPI_MIP_MORPH_MOST, &result);
+    terrimpi_view_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
+                          &result);
+    terrimpi_view_setting(&d->fade_end,
+                          (d->mode == TERRIMP_MODE_AUTO ? 1.1f : 1.5f) * d->fade_start, 0.0f, most,
+                          &result);
+    terrimpi_view_setting(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse), 0.001f, 1.5f,
+                          &result);
+    terrimpi_view_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
+    terrimpi_view_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
+    terrimpi_view_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
+    terrimpi_view_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
+    terrimpi_view_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
+    terrimpi_view_setting(&d->costs.impostor_px, 0.25f, 0.0f, most, &result);
+    terrimpi_view_setting(&d->costs.capture, 1400.0f, 0.0f, most, &result);
     return result;
 }
 
@@ -7213,7 +7460,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     d = *desc;
     if (d.mode == TERRIMP_MODE_DEFAULT)
         d.mode = TERRIMP_MODE_AUTO;
-    TERRIMPI_TRY(terrimpi_settings_resolve(terrain, &d));
+    TERRIMPI_TRY(terrimpi_view_settings(terrain, &d));
     if (d.ground_rule == TERRIMP_GEOMIP_DEFAULT)
         d.ground_rule = TERRIMP_GEOMIP_PICTURE;
     TERRIMPI_DEFAULT(d.atlas_size, 4096);
@@ -7221,9 +7468,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     chunks = terrain->tree.level_first[1];
-    TERRIMPI_DEFAULT(d.max_ground, d.mode == TERRIMP_MODE_GEOMIP || d.mode == TERRIMP_MODE_AUTO
-                                       ? terrimpi_min_u32(chunks, 4096)
-                                       : chunks);
+    TERRIMPI_DEFAULT(d.max_ground,
+                     terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
@@ -7232,14 +7478,548 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     return TERRIMP_OK;
 }
 
-static terrimp_live_atlas_desc terrimpi_atlas_desc(const terrimp_view_desc *d)
+/* ---- the pictures: a cache ---- */
+
+/* A slot of an atlas. */
+typedef struct terrimpi_slot {
+    uint32_t atlas, slot;
+} terrimpi_slot;
+
+/* The picture of a node. */
+typedef struct terrimpi_picture {
+    terrimp_node node;
+    uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
+    uint32_t listed;          /* the last frame that draws it, */
+    uint32_t draw;            /* ... and its place on the list of that frame */
+    uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
+    uint32_t layer_count;     /* 0: not made yet */
+    uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
+    uint32_t drawn_count;     /* frames that have drawn it since the capture */
+    float eye[3];             /* of the capture */
+    float angle_rad, parallax_px, urgency;
+    float sharpness;          /* texels per unit of size at distance 1 */
+    float cost;               /* of the capture */
+    terrimpi_slot slots[TERRIMPI_CAPTURE_LAYERS];
+    float texture_matrix[TERRIMPI_CAPTURE_LAYERS][16];
+} terrimpi_picture;
+
+typedef struct terrimpi_cache {
+    terrimp_live_atlas *atlases; /* [atlas_count] */
+    terrimpi_picture *pictures;  /* [capacity] */
+    uint16_t *of_node;           /* [node_count] */
+    uint32_t atlas_count, capacity, node_count;
+    uint32_t next;               /* where the search for a free picture goes on */
+    uint32_t frame;              /* what is seen in it is not given up */
+    uint32_t failures, evictions; /* so far */
+} terrimpi_cache;
+
+static void terrimpi_cache_clear(terrimpi_cache *c)
+{
+    uint32_t i;
+    memset(c->of_node, 0xff, c->node_count * sizeof *c->of_node);
+    memset(c->pictures, 0, c->capacity * sizeof *c->pictures);
+    for (i = 0; i < c->atlas_count; i++)
+        terrimpi_live_reset(&c->atlases[i]);
+}
+
+/* The picture of a node, NULL when it has none. */
+static terrimpi_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t node)
+{
+    uint16_t index = c->of_node[node];
+    return index == TERRIMPI_NO_PICTURE ? NULL : &c->pictures[index];
+}
+
+static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, uint32_t count)
+{
+    uint32_t i;
+    for (i = 0; i < count; i++)
+        terrimp_live_atlas_free(&c->atlases[slots[i].atlas], slots[i].slot);
+}
+
+static void terrimpi_cache_drop(terrimpi_cache *c, terrimpi_picture *picture)
+{
+    terrimpi_cache_free(c, picture->slots, picture->layer_count);
+    c->of_node[picture->node.number] = TERRIMPI_NO_PICTURE;
+    memset(picture, 0, sizeof *picture);
+}
+
+/* Gives up the picture that was useful longest ago, if that was before this frame. */
+static int terrimpi_cache_evict(terrimpi_cache *c)
+{
+    terrimpi_picture *p, *oldest = NULL;
+    for (p = c->pictures; p < c->pictures + c->capacity; p++)
+        if (p->seen != 0 && p->seen != c->frame && (!oldest || p->seen < oldest->seen))
+            oldest = p;
+    if (!oldest)
+        return 0;
+    terrimpi_cache_drop(c, oldest);
+    c->evictions++;
+    return 1;
+}
+
+/* A picture for a node that has none; NULL when all are in use. */
+static terrimpi_picture *terrimpi_cache_take(terrimpi_cache *c, const terrimp_node *node)
+{
+    terrimpi_picture *found = NULL;
+    uint32_t i, turn;
+    for (turn = 0; turn < 2u && !found; turn++) {
+        for (i = 0; i < c->capacity && !found; i++) {
+            if (c->pictures[c->next].seen == 0)
+                found = &c->pictures[c->next];
+            c->next = (c->next + 1u) % c->capacity;
+        }
+        if (!found && !terrimpi_cache_evict(c))
+            return NULL;
+    }
+    found->node = *node;
+    found->seen = c->frame;
+    c->of_node[node->number] = (uint16_t)(found - c->pictures);
+    return found;
+}
+
+static terrimp_rect terrimpi_cache_rect(const terrimpi_cache *c, const terrimpi_slot *slot)
+{
+    return c->atlases[slot->atlas].slots[slot->slot];
+}
+
+/* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
+   but not less than a quarter of each side, is better than none. */
+static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slot)
+{
+    uint32_t room[2];
+    do {
+        for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
+            if (terrimpi_live_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
+                TERRIMP_OK)
+                return 1;
+    } while (terrimpi_cache_evict(c));
+    c->failures++;
+    for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++) {
+        terrimp_live_atlas *atlas = &c->atlases[slot->atlas];
+        terrimpi_live_room(atlas, size[0], size[1], room);
+        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
+            room[0] > 2u * TERRIMPI_CAPTURE_MARGIN && room[1] > 2u * TERRIMPI_CAPTURE_MARGIN)
+            return terrimpi_live_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
+    }
+    return 0;
+}
+
+/* The same for each layer. */
+static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slots,
+                                uint32_t count)
+{
+    uint32_t i;
+    for (i = 0; i < count; i++)
+        if (!terrimpi_cache_slot(c, size, &slots[i])) {
+            terrimpi_cache_free(c, slots, i);
+            return 0;
+        }
+    return 1;
+}
+
+/* Whether the slots of a picture can take another of a size: not less than 90 % of it in either
+   side, not more than half as much again. */
+static int terrimpi_cache_suits(const terrimpi_cache *c, const terrimpi_picture *picture,
+                                const uint32_t size[2], uint32_t layer_count)
+{
+    uint32_t i;
+    for (i = 0; i < layer_count && picture->layer_count == layer_count; i++) {
+        terrimp_rect rect = terrimpi_cache_rect(c, &picture->slots[i]);
+        if (rect.width * 10u < size[0] * 9u || rect.height * 10u < size[1] * 9u ||
+            rect.width * 2u > size[0] * 3u || rect.height * 2u > size[1] * 3u)
+            return 0;
+    }
+    return picture->layer_count == layer_count;
+}
+
+/* Whether a picture shows a rectangle of samples: its border is at most the node's neighbours. */
+static int terrimpi_cache_shows(const terrimpi_picture *picture, uint32_t chunk_quads, uint32_t x,
+                                uint32_t z, uint32_t cols, uint32_t rows)
+{
+    uint32_t quads = chunk_quads << picture->node.level;
+    const terrimp_node *n = &picture->node;
+    return picture->seen != 0 && x <= (n->x + 2u) * quads && x + cols + quads > n->x * quads &&
+           z <= (n->z + 2u) * quads && z + rows + quads > n->z * quads;
+}
+
+/* ---- what is in sight ---- */
+
+enum {
+    TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
+    TERRIMPI_CULL_IMPOSTOR = 2  /* the impostor cut does */
+};
+
+/* A node in sight. */
+typedef struct terrimpi_cull_node {
+    uint32_t number;
+    uint32_t end;     /* behind the last one in it */
+    float closest;    /* [wu] from the eye to its box */
+    uint8_t level;
+    uint8_t planes;   /* of the frustum, that may cut a part of it off */
+    uint8_t cuts;
+} terrimpi_cull_node;
+
+/* All of them down to both cuts, each before those in it, closest first. */
+typedef struct terrimpi_cull {
+    terrimpi_cull_node *nodes; /* [capacity] */
+    uint32_t capacity, count;
+    uint32_t ground_count, impostor_count; /* with TERRIMPI_CULL_GROUND, _IMPOSTOR */
+} terrimpi_cull;
+
+/* Whether a node is hidden. What hides nodes has its place here: nodes come closest first. */
+static int terrimpi_cull_hides(const terrimpi_frame *f, const terrimp_node *node, int *planes,
+                               terrimp_box *box)
+{
+    terrimpi_node_box(f->terrain, node, box);
+    if (*planes)
+        *planes = terrimp_frustum_test(&f->frustum, box, *planes);
+    return *planes == TERRIMP_PLANES_OUTSIDE;
+}
+
+/* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
+   that has a picture keeps its place for a little longer. */
+static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *node, float closest,
+                                  int has_picture)
+{
+    const terrimp_heightfield *field = &f->terrain->desc.field;
+    int impostors = terrimpi_view_impostors(f->desc);
+    float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
+    if (impostors == TERRIMPI_IMPOSTORS_NEVER || closest < f->desc->fade_start)
+        return 0;
+    if (node->level == 0)
+        return 1;
+    if (impostors == TERRIMPI_IMPOSTORS_ALWAYS)
+        return 0;
+    side = (float)(f->terrain->desc.chunk_quads << node->level) *
+           terrimpi_max(field->spacing_x, field->spacing_z);
+    return closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side);
+}
+
+/* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
+static int terrimpi_cull_ground(const terrimpi_mip_frame *mip, const terrimp_node *node)
+{
+    return node->level == 0 || (mip && terrimpi_mip_marked(mip, node->number) < 1.0f);
+}
+
+/* Whether any of a ground node's own terrain is in sight: not only its skirts. */
+static int terrimpi_cull_shows_ground(const terrimpi_frame *f, const terrimpi_mip_frame *mip,
+                                      const terrimp_node *node, int planes)
+{
+    terrimp_box box;
+    if (!mip || !planes)
+        return 1;
+    terrimpi_mip_box(&f->terrain->tree, node, &box);
+    return terrimp_frustum_test(&f->frustum, &box, planes) != TERRIMP_PLANES_OUTSIDE;
+}
+
+/* Says of each node where those in it end. */
+static void terrimpi_cull_close(terrimpi_cull *cull)
+{
+    uint32_t i, end;
+    for (i = cull->count; i-- > 0;) {
+        const terrimpi_cull_node *n = cull->nodes;
+        for (end = i + 1u; end < cull->count && n[end].level < n[i].level;)
+            end = n[end].end;
+        cull->nodes[i].end = end;
+    }
+}
+
+/* Which cuts run at a node in sight, of those that do not run above it. `done` gets them, and the
+   impostor cut where the ground is too close for one. */
+static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cache,
+                              const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
+                              float closest, int *done)
+{
+    int cuts = 0;
+    if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
+        cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
+        *done |= TERRIMPI_CULL_GROUND;
+        if (closest < f->desc->fade_start ||
+            terrimpi_view_impostors(f->desc) == TERRIMPI_IMPOSTORS_NEVER)
+            *done |= TERRIMPI_CULL_IMPOSTOR;
+    }
+    if (!(*done & TERRIMPI_CULL_IMPOSTOR) &&
+        terrimpi_cull_impostor(f, node, closest,
+                               cache->of_node[node->number] != TERRIMPI_NO_PICTURE)) {
+        cuts |= TERRIMPI_CULL_IMPOSTOR;
+        *done |= TERRIMPI_CULL_IMPOSTOR;
+    }
+    return cuts;
+}
+
+/* How many nodes are in sight at most, when both cuts are full. Those in one direction are a row
+   of, say, n; then those above them are n / 2 and so on, and one a level where the row ends. */
+static size_t terrimpi_cull_capacity(const terrimp_quadtree *tree, size_t cuts)
+{
+    size_t most = 2u * cuts + 4u * tree->level_count;
+    return most < tree->node_count ? most : tree->node_count;
+}
+
+/* Lists the nodes in sight. Which cuts a node lies below goes down the tree beside its planes.
+   Returns 0 when there is more ground than may be. */
+static int terrimpi_cull_list(terrimpi_cull *cull, const terrimpi_frame *f,
+                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
+{
+    const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
+    cull->count = cull->ground_count = cull->impostor_count = 0;
+    terrimpi_tree_begin(&walk, &f->terrain->tree, f->camera.eye, TERRIMP_PLANES_ALL);
+    while (terrimpi_tree_next(&walk, &v)) {
+        terrimpi_cull_node *n = &cull->nodes[cull->count];
+        int planes = v.planes % below, done = v.planes / below;
+        terrimp_box box;
+        if (terrimpi_cull_hides(f, &v.node, &planes, &box))
+            continue;
+        if (cull->count++ == cull->capacity)
+            return 0;
+        if (cull->impostor_count > f->desc->max_impostors)
+            done |= TERRIMPI_CULL_IMPOSTOR; /* of no use */
+        n->number = v.node.number;
+        n->level = (uint8_t)v.node.level;
+        n->planes = (uint8_t)planes;
+        n->closest = terrimp_box_distance(&box, f->camera.eye);
+        n->cuts = (uint8_t)terrimpi_cull_cuts(f, cache, mip, &v.node, planes, n->closest, &done);
+        cull->ground_count += n->cuts & TERRIMPI_CULL_GROUND;
+        cull->impostor_count += n->cuts & TERRIMPI_CULL_IMPOSTOR ? 1u : 0u;
+        if (cull->ground_count > f->desc->max_ground)
+            return 0;
+        v.planes = planes + done * below;
+        if (done != TERRIMPI_CULL_GROUND + TERRIMPI_CULL_IMPOSTOR)
+            terrimpi_tree_enter(&walk, &v);
+    }
+    terrimpi_cull_close(cull);
+    return 1;
+}
+
+/* ---- what things cost ---- */
+
+static float terrimpi_cost_draw(const terrimp_costs *c, float triangles)
+{
+    return c->draw + c->triangle * triangles;
+}
+
+/* What shading so many pixels of one kind costs more than those of another. */
+static float terrimpi_cost_shading(float pixels, float px, float other_px)
+{
+    return terrimpi_max(TERRIMPI_VIEW_SEEN * pixels * (px - other_px), 0.0f);
+}
+
+static float terrimpi_cost_capture(const terrimp_costs *c, float texels, float triangles)
+{
+    return c->capture + c->ground_px * texels + c->triangle * triangles;
+}
+
+/* ---- how good pictures are, and how long they last ---- */
+
+/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
+   of the mean square, which 95 of 100 samples keep to. */
+static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
+{
+    const terrimpi_mesh *mesh = &f->terrain->meshes[node];
+    return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
+               ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
+               : mesh->error;
+}
+
+/* The sine of the view angle up to which a picture may be used, by both limits. */
+static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float closest)
+{
+    float sine = TERRIMP_SINF(f->desc->max_angle_rad), error = terrimpi_view_mesh_error(f, node);
+    return terrimpi_min(sine, f->desc->tolerance_px * terrimpi_max(closest - error, 0.0f) /
+                                  terrimpi_max(error * f->pixel_factor, 1e-20f));
+}
+
+/* How many frames a new picture of a node would last. */
+static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
+{
+    float way = f->desc->no_lookahead ? 1.0f : 1.0f + TERRIMPI_VIEW_AHEAD;
+    float life = way * closest * terrimpi_view_sine(f, node, closest) /
+                 terrimpi_max(f->speed, 1e-20f);
+    return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
+}
+
+static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
+{
+    return f->pixel_factor * f->desc->texels_per_px /
+           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
+}
+
+/* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
+static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node *node,
+                                     float closest)
+{
+    if (terrimpi_view_impostors(f->desc) == TERRIMPI_IMPOSTORS_ALWAYS)
+        return 0;
+    return terrimpi_capture_source(&f->terrain->tree, node,
+                                   TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
+                                       (f->pixel_factor * f->desc->texels_per_px));
+}
+
+/* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
+static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
+                                const terrimp_box *box, float closest, float eye[3])
+{
+    float ahead;
+    uint32_t i;
+    memcpy(eye, f->camera.eye, sizeof f->camera.eye);
+    if (f->desc->no_lookahead || !(f->speed > 0.0f))
+        return;
+    ahead = TERRIMPI_VIEW_AHEAD * closest * terrimpi_view_sine(f, node->number, closest);
+    ahead = terrimpi_min(ahead, f->speed * 0.5f * TERRIMPI_VIEW_LIFE);
+    for (i = 0; i < 3u; i++)
+        eye[i] += f->motion[i] / f->speed * ahead;
+    if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
+        memcpy(eye, f->camera.eye, sizeof f->camera.eye);
+}
+
+/* How good a picture made from an eye is from the present one: its view angle and parallax error;
+   returns the larger of the two over its limit. */
+static float terrimpi_view_error(const terrimpi_frame *f, const terrimp_node *node,
+                                 const float captured_eye[3], float *angle_rad, float *parallax_px)
+{
+    terrimp_box box;
+    terrimpi_node_box(f->terrain, node, &box);
+    *angle_rad = terrimpi_view_angle(&box, captured_eye, f->camera.eye);
+    *parallax_px = terrimpi_parallax_error(&box, terrimpi_view_mesh_error(f, node->number),
+                                           captured_eye, f->camera.eye, f->pixel_factor);
+    return terrimpi_max(*angle_rad / f->desc->max_angle_rad,
+                        *parallax_px / f->desc->tolerance_px);
+}
+
+/* Judges a picture, once a frame. */
+static void terrimpi_view_judge(const terrimpi_frame *f, terrimpi_picture *picture)
+{
+    if (picture->judged == f->number)
+        return;
+    picture->judged = f->number;
+    picture->layers_now = picture->layer_count;
+    picture->urgency = terrimpi_view_error(f, &picture->node, picture->eye, &picture->angle_rad,
+                                           &picture->parallax_px);
+}
+
+/* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
+   become too coarse, or far too fine. */
+static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_picture *picture,
+                                   float closest)
+{
+    float urgency, wanted = terrimpi_view_sharpness(f, closest);
+    terrimpi_view_judge(f, picture);
+    urgency = terrimpi_max(picture->urgency, wanted / (picture->sharpness * TERRIMPI_VIEW_COARSE));
+    urgency = terrimpi_max(urgency, picture->sharpness / (wanted * TERRIMPI_VIEW_FINE));
+    return terrimpi_min(urgency, 1e6f);
+}
+
+/* ---- regions, and what shows them ---- */
+
+/* An impostor that would be good to have. */
+typedef struct terrimpi_candidate {
+    terrimp_node node;
+    float closest;              /* [wu] from the eye to its box */
+    float pixels;               /* that it covers, about */
+    float urgency;              /* error of its picture over the tolerance */
+    float life;                 /* [frames] that a new picture would last */
+    float draw_cost, capture_cost;
+    int rank;                   /* among the captures of this frame, */
+    float weight;               /* ... and within its rank */
+    terrimpi_picture *picture;  /* or NULL */
+} terrimpi_candidate;
+
+enum { TERRIMPI_RANK_EARLY = 0, TERRIMPI_RANK_DUE, TERRIMPI_RANK_MISSING };
+
+/* Kinds of draws, in the order in which they are drawn. The first ones can show a region: see
+   terrimpi_view_kinds. */
+enum {
+    TERRIMPI_KIND_GROUND = 0,
+    TERRIMPI_KIND_IMPOSTOR,
+    TERRIMPI_KIND_SHOWS, /* that many kinds show regions */
+    TERRIMPI_KIND_FLOOR = TERRIMPI_KIND_SHOWS,
+    TERRIMPI_KIND_COUNT
+};
+
+/* A part of the frame: the topmost node in one of the cuts. */
+typedef struct terrimpi_region {
+    uint32_t node;
+    float closest;
+    uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
+    uint32_t first_candidate, candidate_count; /* none: ground is all it can be */
+    float pixels;                        /* that the candidates cover, about */
+    int fits;                            /* there are some, and a camera fits round each */
+    int kind;                            /* that shows it */
+} terrimpi_region;
+
+/* What a kind would cost a region. */
+typedef struct terrimpi_offer {
+    float draw;   /* each frame */
+    float upkeep; /* captures, spread over the frames that they last */
+} terrimpi_offer;
+
+/* A command of the frame. */
+typedef struct terrimpi_draw {
+    int kind;
+    uint32_t index; /* of the ground draw or the picture */
+    float alpha;
+} terrimpi_draw;
+
+/* A capture of this frame, or a piece of one. */
+typedef struct terrimpi_job {
+    terrimpi_capture_plan plan;
+    terrimpi_picture *picture;
+    terrimpi_slot slots[TERRIMPI_CAPTURE_LAYERS];
+    uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
+    int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
+    uint32_t triangles, texels;    /* of the whole picture */
+    float sharpness, cost;
+} terrimpi_job;
+
+struct terrimp_view {
+    const terrimp_terrain *terrain;
+    uint32_t region_count, candidate_count, job_count, draw_count;
+    terrimpi_cache cache;
+    terrimpi_cull cull;
+    unsigned char *kind_of;        /* [node_count] that showed the region */
+    terrimpi_region *regions;      /* [max_ground + 1] front to back */
+    terrimpi_candidate *candidates; /* [max_impostors] by region */
+    uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
+    terrimpi_job *jobs;            /* [max_captures] */
+    terrimpi_draw *draws;          /* [max_ground + max_impostors + 1] front to back */
+    terrimpi_capture_draw *capture_draws; /* of one capture */
+    float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
+    uint16_t *mesh_indices;        /* [index_stride] */
+    uint32_t open;                 /* 1 + the job of which pieces are missing */
+    int outdated;                  /* what this frame would draw has been forgotten */
+    terrimp_geomip_view ground;
+    float ground_scale;            /* of its tolerance: 1, or more when max_ground is short */
+    terrimp_view_desc desc;        /* resolved */
+    terrimpi_frame frame;
+    terrimp_stats stats;
+#ifndef TERRIMP_NO_MALLOC
+    terrimp_allocator allocator;
+    size_t bytes;
+#endif
+};
+
+/* ---- memory ---- */
+
+static terrimp_live_atlas_desc terrimpi_view_atlas_desc(const terrimp_view_desc *d)
 {
     terrimp_live_atlas_desc atlas;
     memset(&atlas, 0, sizeof atlas);
     atlas.width = atlas.height = d->atlas_size;
     atlas.max_slots = (d->max_impostors + d->max_captures) * /* old and new of what is renewed */
-                      TERRIMPI_PARTS;
+                      TERRIMPI_CAPTURE_LAYERS;
     return atlas;
+}
+
+/* What captures are prepared with, in the place of the nodes in sight: by then these are not needed
+   any more. */
+static void terrimpi_view_layout_captures(terrimp_view *v, terrimpi_arena *l)
+{
+    v->capture_draws = (terrimpi_capture_draw *)terrimpi_take(l, TERRIMPI_CAPTURE_DRAWS,
+                                                              sizeof *v->capture_draws);
+    v->mesh_xyz = (float *)terrimpi_take(l, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz);
+    v->mesh_indices = (uint16_t *)terrimpi_take(l, v->terrain->index_stride,
+                                                sizeof *v->mesh_indices);
 }
 
 /* The one description of a view's block; as terrimpi_terrain_layout. */
@@ -7247,34 +8027,42 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
 {
     size_t nodes = v->terrain->tree.node_count, impostors = v->desc.max_impostors;
     size_t ground = v->desc.max_ground, slots;
-    terrimp_live_atlas_desc atlas = terrimpi_atlas_desc(&v->desc);
+    terrimp_live_atlas_desc atlas = terrimpi_view_atlas_desc(&v->desc);
     terrimpi_arena l = terrimpi_arena_at(base);
+    terrimpi_cache *c = &v->cache;
+    terrimpi_arena captures;
+    size_t scratch;
     uint32_t i;
+    c->atlas_count = v->desc.atlas_count;
+    c->capacity = v->desc.max_impostors;
+    c->node_count = v->terrain->tree.node_count;
     slots = terrimp_live_atlas_bytes(&atlas);
     terrimpi_take(&l, 1, sizeof *v);
-    v->atlases = (terrimp_live_atlas *)terrimpi_take(&l, v->desc.atlas_count, sizeof *v->atlases);
-    for (i = 0; i < v->desc.atlas_count; i++) {
+    c->atlases = (terrimp_live_atlas *)terrimpi_take(&l, c->atlas_count, sizeof *c->atlases);
+    for (i = 0; i < c->atlas_count; i++) {
         void *memory = terrimpi_take(&l, slots, 1);
         if (memory)
-            terrimpi_live_init(&v->atlases[i], &atlas, memory);
+            terrimpi_live_init(&c->atlases[i], &atlas, memory);
     }
+    c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
+    c->pictures = (terrimpi_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
-    v->leaf_at = (uint32_t *)terrimpi_take(&l, nodes, sizeof *v->leaf_at);
-    v->record_of = (uint16_t *)terrimpi_take(&l, nodes, sizeof *v->record_of);
-    v->prefers = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->prefers);
-    v->shown = (unsigned char *)terrimpi_take(&l, ground, sizeof *v->shown);
-    v->leaves = (uint32_t *)terrimpi_take(&l, ground, sizeof *v->leaves);
-    v->units = (terrimpi_unit *)terrimpi_take(&l, ground, sizeof *v->units);
-    v->items = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->items);
-    v->wants = (terrimpi_want *)terrimpi_take(&l, impostors, sizeof *v->wants);
+    v->cull.capacity = (uint32_t)terrimpi_cull_capacity(&v->terrain->tree, ground + impostors);
+    captures = terrimpi_arena_at(NULL);
+    terrimpi_view_layout_captures(v, &captures);
+    scratch = v->cull.capacity * sizeof *v->cull.nodes;
+    scratch = captures.bytes > scratch ? captures.bytes : scratch;
+    v->cull.nodes = (terrimpi_cull_node *)terrimpi_take(&l, scratch, 1);
+    captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
+    terrimpi_view_layout_captures(v, &captures);
+    v->kind_of = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
+    v->regions = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *v->regions);
+    v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
-    v->records = (terrimpi_record *)terrimpi_take(&l, impostors, sizeof *v->records);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->mesh_xyz = (float *)terrimpi_take(&l, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz);
-    v->mesh_indices = (uint16_t *)terrimpi_take(&l, v->terrain->index_stride,
-                                                sizeof *v->mesh_indices);
+    v->draws = (terrimpi_draw *)terrimpi_take(&l, ground + impostors + 1u, sizeof *v->draws);
     return l.ok && slots ? l.bytes : 0;
 }
 
@@ -7291,7 +8079,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view)
 {
-    terrimp_view v;
+    terrimp_view v, *made = (terrimp_view *)memory;
     size_t needed;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
@@ -7304,183 +8092,52 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     terrimpi_view_layout(&v, (unsigned char *)memory);
     v.ground.rule = v.desc.ground_rule;
     v.ground.morph_ratio = v.desc.morph_ratio;
-    v.ground.hysteresis = 0.1f;
+    v.ground.tolerance_px = v.desc.ground_tolerance_px;
+    v.ground.hysteresis = TERRIMPI_VIEW_HYSTERESIS;
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
-    *(terrimp_view *)memory = v;
-    *view = (terrimp_view *)memory;
-    return terrimp_view_invalidate(*view);
+    v.frame.terrain = terrain;
+    v.frame.desc = &made->desc;
+    *made = v;
+    *view = made;
+    return terrimp_view_invalidate(made);
 }
 
-/* ---- places in the quadtree ---- */
+/* ---- captures that are not made ---- */
 
-/* The children of a node, nearest to the eye first. Returns how many there are. */
-static uint32_t terrimpi_children(const terrimp_view *v, const terrimp_node *s,
-                                  terrimp_node children[4])
+/* Gives back what a job has taken, unless that is what its picture has. */
+static void terrimpi_job_cancel(terrimpi_cache *cache, const terrimpi_job *job)
 {
-    return terrimpi_tree_children(&v->terrain->tree, s, v->camera.eye, children);
+    const terrimpi_picture *p = job->picture;
+    if (p->layer_count != job->plan.layer_count ||
+        memcmp(job->slots, p->slots, p->layer_count * sizeof *p->slots) != 0)
+        terrimpi_cache_free(cache, job->slots, job->plan.layer_count);
 }
 
-static void terrimpi_site_box(const terrimp_view *v, const terrimp_node *s, terrimp_box *box)
-{
-    terrimpi_node_box(v->terrain, s, box);
-}
-
-/* A node's box, and which of the planes in `mask` its parts have to be tested against. */
-static int terrimpi_sight(const terrimp_view *v, const terrimp_node *s, int mask, terrimp_box *box)
-{
-    terrimpi_site_box(v, s, box);
-    return mask ? terrimp_frustum_test(&v->frustum, box, mask) : 0;
-}
-
-/* Does something with a node, of which the planes in `mask` may cut a part off, and goes on to its
-   children. Returns 0 to end the walk. */
-typedef int (*terrimpi_visit)(terrimp_view *v, const terrimp_node *s, int mask);
-
-static int terrimpi_visit_children(terrimp_view *v, const terrimp_node *s, int mask,
-                                   terrimpi_visit visit)
-{
-    terrimp_node children[4];
-    uint32_t i, count = s->level > 0 ? terrimpi_children(v, s, children) : 0;
-    for (i = 0; i < count; i++)
-        if (!visit(v, &children[i], mask))
-            return 0;
-    return 1;
-}
-
-/* Visits the root. */
-static void terrimpi_visit_tree(terrimp_view *v, terrimpi_visit visit)
-{
-    terrimp_node root = terrimpi_tree_root(&v->terrain->tree);
-    visit(v, &root, TERRIMP_PLANES_ALL);
-}
-
-/* ---- pictures and their slots ---- */
-
-static void terrimpi_drop_seats(terrimp_view *v, const terrimpi_seat *seats, uint32_t count)
-{
-    uint32_t i;
-    for (i = 0; i < count; i++)
-        terrimp_live_atlas_free(&v->atlases[seats[i].atlas], seats[i].slot);
-}
-
-static void terrimpi_drop_record(terrimp_view *v, uint32_t index)
-{
-    terrimpi_record *record = &v->records[index];
-    if (record->seen == 0)
-        return;
-    if (v->open && v->opened.record == index) {
-        terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
-        v->open = 0;
-    }
-    terrimpi_drop_seats(v, record->parts, record->part_count);
-    v->record_of[record->node] = TERRIMPI_NO_RECORD;
-    memset(record, 0, sizeof *record);
-}
-
-/* The record that was useful longest ago, if that was before this frame. */
-static uint32_t terrimpi_oldest_record(const terrimp_view *v)
-{
-    uint32_t i, oldest = TERRIMPI_NO_RECORD;
-    for (i = 0; i < v->desc.max_impostors; i++) {
-        uint32_t seen = v->records[i].seen;
-        if (seen != 0 && seen != v->frame &&
-            (oldest == TERRIMPI_NO_RECORD || seen < v->records[oldest].seen))
-            oldest = i;
-    }
-    return oldest;
-}
-
-/* A record for a node that has none. */
-static uint32_t terrimpi_take_record(terrimp_view *v, uint32_t node)
-{
-    uint32_t i, index = TERRIMPI_NO_RECORD;
-    for (i = 0; i < v->desc.max_impostors && index == TERRIMPI_NO_RECORD; i++) {
-        if (v->records[v->next_record].seen == 0)
-            index = v->next_record;
-        v->next_record = (v->next_record + 1u) % v->desc.max_impostors;
-    }
-    if (index == TERRIMPI_NO_RECORD) {
-        index = terrimpi_oldest_record(v);
-        if (index == TERRIMPI_NO_RECORD)
-            return index;
-        terrimpi_drop_record(v, index);
-        v->stats.evictions++;
-    }
-    v->records[index].node = node;
-    v->records[index].seen = v->frame;
-    v->record_of[node] = (uint16_t)index;
-    return index;
-}
-
-/* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
-   but not less than a quarter of each side, is better than none. */
-static int terrimpi_take_seat(terrimp_view *v, const uint32_t size[2], terrimpi_seat *seat)
-{
-    uint32_t room[2], oldest;
-    for (;;) {
-        for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++)
-            if (terrimpi_live_alloc(&v->atlases[seat->atlas], size[0], size[1], &seat->slot) ==
-                TERRIMP_OK)
-                return 1;
-        oldest = terrimpi_oldest_record(v);
-        if (oldest == TERRIMPI_NO_RECORD)
-            break;
-        terrimpi_drop_record(v, oldest);
-        v->stats.evictions++;
-    }
-    v->stats.atlas_failures++;
-    for (seat->atlas = 0; seat->atlas < v->desc.atlas_count; seat->atlas++) {
-        terrimp_live_atlas *atlas = &v->atlases[seat->atlas];
-        terrimpi_live_room(atlas, size[0], size[1], room);
-        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
-            room[0] > 2u * TERRIMPI_MARGIN && room[1] > 2u * TERRIMPI_MARGIN)
-            return terrimpi_live_alloc(atlas, room[0], room[1], &seat->slot) == TERRIMP_OK;
-    }
-    return 0;
-}
-
-/* Gives back seats of a job or of its record, unless the two have the same. */
-static void terrimpi_drop_unshared(terrimp_view *v, const terrimpi_job *job,
-                                   const terrimpi_seat *seats, uint32_t count)
-{
-    const terrimpi_record *record = &v->records[job->record];
-    if (record->part_count != job->part_count ||
-        memcmp(job->parts, record->parts, job->part_count * sizeof *job->parts) != 0)
-        terrimpi_drop_seats(v, seats, count);
-}
-
-/* Gives back what a job has taken and not used. */
-static void terrimpi_cancel_job(terrimp_view *v, const terrimpi_job *job)
-{
-    terrimpi_drop_unshared(v, job, job->parts, job->part_count);
-}
-
-/* The same for all jobs of a frame that is not rendered, but for a picture that has been begun. */
-static void terrimpi_cancel_jobs(terrimp_view *v)
+/* Forgets the jobs of a frame that is not rendered, but for a picture that has been begun: that one
+   becomes the first. */
+static void terrimpi_view_cancel(terrimp_view *v)
 {
     uint32_t i;
     for (i = 0; i < v->job_count; i++) {
-        int opened = v->open && v->opened.record == v->jobs[i].record;
-        if (opened && v->opened.cell_from > 0)
+        if (v->open == i + 1u && v->jobs[i].from > 0)
             continue;
-        terrimpi_cancel_job(v, &v->jobs[i]);
-        if (opened)
+        terrimpi_job_cancel(&v->cache, &v->jobs[i]);
+        if (v->open == i + 1u)
             v->open = 0;
     }
     v->job_count = 0;
+    if (v->open) {
+        v->jobs[0] = v->jobs[v->open - 1u];
+        v->open = 1;
+    }
 }
 
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
-    uint32_t i;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
-    memset(view->record_of, 0xff, view->terrain->tree.node_count * sizeof *view->record_of);
-    memset(view->records, 0, view->desc.max_impostors * sizeof *view->records);
-    for (i = 0; i < view->desc.atlas_count; i++)
-        terrimpi_live_reset(&view->atlases[i]);
-    view->job_count = 0;
-    view->open = 0;
+    terrimpi_cache_clear(&view->cache);
+    view->job_count = view->open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
 }
@@ -7489,752 +8146,597 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
                                               uint32_t cols, uint32_t rows)
 {
     const terrimp_quadtree *tree;
-    uint32_t i;
+    terrimpi_picture *p;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     tree = &view->terrain->tree;
     TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
-    terrimpi_cancel_jobs(view);
+    terrimpi_view_cancel(view);
     view->outdated = 1;
-    for (i = 0; i < view->desc.max_impostors; i++) {
-        terrimp_node s;
-        uint32_t quads, reach;
-        if (view->records[i].seen == 0)
+    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++) {
+        if (!terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
             continue;
-        s = terrimpi_tree_node(tree, view->records[i].node);
-        quads = view->terrain->desc.chunk_quads << s.level;
-        reach = quads; /* the border in the picture is at most the node's neighbours */
-        if (x <= (s.x + 1u) * quads + reach && x + cols + reach > s.x * quads &&
-            z <= (s.z + 1u) * quads + reach && z + rows + reach > s.z * quads)
-            terrimpi_drop_record(view, i);
+        if (view->open && view->jobs[0].picture == p) {
+            terrimpi_job_cancel(&view->cache, &view->jobs[0]);
+            view->open = 0;
+        }
+        terrimpi_cache_drop(&view->cache, p);
     }
     return TERRIMP_OK;
 }
 
-/* ---- the ground cut ---- */
+/* ---- the regions ---- */
 
-/* Counts the chunks in sight in draws_needed, and lists the first draw_count of them, front to
-   back, at full resolution. */
-static int terrimpi_visit_chunks(terrimp_view *v, const terrimp_node *s, int mask)
+/* Makes the ground draw of a node in the ground cut. */
+static void terrimpi_view_add_ground(terrimp_geomip_view *ground, terrimpi_mip_frame *mip,
+                                     const terrimp_node *node)
 {
-    terrimp_geomip_view *g = &v->ground;
-    terrimp_box box;
-    mask = terrimpi_sight(v, s, mask, &box);
-    if (mask == TERRIMP_PLANES_OUTSIDE)
-        return 1;
-    if (s->level == 0 && g->draws_needed++ < g->draw_count) {
-        terrimp_geomip_draw *draw = &g->draws[g->draws_needed - 1u];
-        memset(draw, 0, sizeof *draw);
-        draw->node = *s;
-    }
-    return terrimpi_visit_children(v, s, mask, terrimpi_visit_chunks);
-}
-
-static void terrimpi_list_chunks(terrimp_view *v, uint32_t count)
-{
-    v->ground.draw_count = count;
-    v->ground.draws_needed = 0;
-    terrimpi_visit_tree(v, terrimpi_visit_chunks);
-}
-
-/* Makes the ground cut; where max_ground is too small, at a larger tolerance. */
-static terrimp_result terrimpi_cut_ground(terrimp_view *v)
-{
-    uint32_t i;
-    if (v->desc.mode == TERRIMP_MODE_FULL || v->desc.mode == TERRIMP_MODE_IMPOSTOR) {
-        uint32_t before = v->ground.draw_count;
-        terrimpi_list_chunks(v, 0);
-        if (v->ground.draws_needed > v->desc.max_ground) { /* the frame before stays */
-            v->ground.draw_count = before;
-            return TERRIMP_E_CAPACITY;
-        }
-        terrimpi_list_chunks(v, v->ground.draws_needed);
-    } else {
-        terrimp_result result = TERRIMP_E_CAPACITY;
-        v->ground_scale = terrimpi_max(1.0f, v->ground_scale * 0.95f);
-        while (result == TERRIMP_E_CAPACITY) {
-            float tolerance = v->desc.ground_tolerance_px * v->ground_scale;
-            v->ground.tolerance_px = terrimpi_min(tolerance, 1000.0f);
-            result = terrimpi_mip_select(&v->terrain->tree, &v->ground, &v->camera);
-            if (result == TERRIMP_E_CAPACITY && tolerance >= 1000.0f) {
-                v->outdated = 1; /* select has written over the list of the frame before */
-                return result;
-            }
-            if (result == TERRIMP_E_CAPACITY)
-                v->ground_scale *= 1.3f;
-        }
-    }
-    for (i = 0; i < v->ground.draw_count; i++)
-        v->leaf_at[v->ground.draws[i].node.number] = i;
-    return TERRIMP_OK;
-}
-
-/* The ground draw of a node, or TERRIMPI_NO_LEAF when the ground cut is not there. */
-static uint32_t terrimpi_leaf(const terrimp_view *v, uint32_t node)
-{
-    uint32_t i = v->leaf_at[node];
-    return i < v->ground.draw_count && v->ground.draws[i].node.number == node ? i
-                                                                              : TERRIMPI_NO_LEAF;
-}
-
-/* ---- the impostor cut and the units ---- */
-
-/* Whether a node is where the impostor cut runs: far enough away, and small enough on the screen.
-   A node that has a picture keeps its place for a little longer. */
-static int terrimpi_wanted(const terrimp_view *v, const terrimp_node *s, float closest)
-{
-    const terrimp_heightfield *field = &v->terrain->desc.field;
-    float side, sides = terrimpi_max(2.0f, v->pixel_factor / v->desc.impostor_px);
-    if (closest < v->desc.fade_start)
-        return 0;
-    if (s->level == 0)
-        return 1;
-    if (v->desc.mode == TERRIMP_MODE_IMPOSTOR)
-        return 0;
-    side = (float)(v->terrain->desc.chunk_quads << s->level) *
-           terrimpi_max(field->spacing_x, field->spacing_z);
-    if (v->record_of[s->number] != TERRIMPI_NO_RECORD)
-        side /= 1.15f;
-    return closest >= sides * side;
-}
-
-/* Adds the ground draws below a node to the last unit. */
-static int terrimpi_gather_leaves(terrimp_view *v, const terrimp_node *s, int mask)
-{
-    terrimp_box box;
-    uint32_t leaf = terrimpi_leaf(v, s->number);
-    if (leaf != TERRIMPI_NO_LEAF) {
-        v->leaves[v->leaf_count++] = leaf;
-        v->units[v->unit_count].leaf_count++;
-        return 1;
-    }
-    if (mask && s->level > 0)
-        mask = terrimpi_sight(v, s, mask, &box);
-    return mask == TERRIMP_PLANES_OUTSIDE ||
-           terrimpi_visit_children(v, s, mask, terrimpi_gather_leaves);
-}
-
-/* Adds the impostors wanted below a node to the last unit. Returns 0 when a part of it that is in
-   sight cannot be one. */
-static int terrimpi_gather_wants(terrimp_view *v, const terrimp_node *s, int mask)
-{
-    terrimpi_want *want = &v->wants[v->want_count];
-    terrimp_box box;
-    float closest;
-    mask = terrimpi_sight(v, s, mask, &box);
-    if (mask == TERRIMP_PLANES_OUTSIDE)
-        return 1;
-    closest = terrimp_box_distance(&box, v->camera.eye);
-    if (!terrimpi_wanted(v, s, closest))
-        return s->level > 0 && terrimpi_visit_children(v, s, mask, terrimpi_gather_wants);
-    if (v->want_count == v->desc.max_impostors)
-        return 0;
-    memset(want, 0, sizeof *want);
-    want->site = *s;
-    want->closest = closest;
-    v->want_count++;
-    v->units[v->unit_count].want_count++;
-    return 1;
-}
-
-/* Makes a unit of a node in one of the cuts. What is in sight has ground leaves. */
-static void terrimpi_add_unit(terrimp_view *v, const terrimp_node *s, int mask, float closest)
-{
-    terrimpi_unit *unit = &v->units[v->unit_count];
-    memset(unit, 0, sizeof *unit);
-    unit->site = *s;
-    unit->closest = closest;
-    unit->first_leaf = v->leaf_count;
-    unit->first_want = v->want_count;
-    terrimpi_gather_leaves(v, s, mask);
-    if (unit->leaf_count == 0)
+    terrimp_geomip_draw *draw = &ground->draws[ground->draws_needed];
+    if (mip) {
+        terrimpi_mip_emit(mip, node);
         return;
-    if (closest >= v->desc.fade_start && v->desc.mode >= TERRIMP_MODE_IMPOSTOR &&
-        !terrimpi_gather_wants(v, s, mask)) {
-        v->want_count = unit->first_want;
-        unit->want_count = 0;
     }
-    v->unit_count++;
+    memset(draw, 0, sizeof *draw);
+    draw->node = *node;
+    ground->draws_needed++;
 }
 
-/* Goes down to where one of the cuts runs, until all ground has its unit. */
-static int terrimpi_visit_units(terrimp_view *v, const terrimp_node *s, int mask)
+/* Makes a region of the nodes [at, end) in sight, of which the first is in one of the cuts. What is
+   in sight has ground. With too many impostors it has none. */
+static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_frame *mip)
 {
-    terrimp_box box;
-    float closest;
-    if (v->leaf_count == v->ground.draw_count)
-        return 0;
-    mask = terrimpi_sight(v, s, mask, &box);
-    if (mask == TERRIMP_PLANES_OUTSIDE)
-        return 1;
-    closest = terrimp_box_distance(&box, v->camera.eye);
-    if (terrimpi_leaf(v, s->number) == TERRIMPI_NO_LEAF &&
-        (v->desc.mode < TERRIMP_MODE_IMPOSTOR || !terrimpi_wanted(v, s, closest)))
-        return terrimpi_visit_children(v, s, mask, terrimpi_visit_units);
-    terrimpi_add_unit(v, s, mask, closest);
-    return 1;
-}
-
-/* ---- what a picture would cost, and how long it would last ---- */
-
-/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
-   of the mean square, which 95 of 100 samples keep to. */
-static float terrimpi_mesh_error(const terrimp_view *v, uint32_t node)
-{
-    terrimp_mesh_info mesh;
-    terrimpi_mesh_place(v->terrain, node, &mesh);
-    return v->desc.ground_rule == TERRIMP_GEOMIP_PICTURE
-               ? terrimpi_min(mesh.error, 2.0f * mesh.error_rms)
-               : mesh.error;
-}
-
-/* The view angle up to which a picture may be used, by both limits. */
-static float terrimpi_sine_limit(const terrimp_view *v, float error, float closest)
-{
-    float sine = TERRIMP_SINF(v->desc.max_angle_rad);
-    return terrimpi_min(sine, v->desc.tolerance_px * terrimpi_max(closest - error, 0.0f) /
-                                  terrimpi_max(error * v->pixel_factor, 1e-20f));
-}
-
-/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
-static float terrimpi_source_error(const terrimp_quadtree *tree, const terrimp_node *s,
-                                   uint32_t level)
-{
-    uint32_t shift = s->level - level, x, z;
-    uint32_t x1 = terrimpi_min_u32((s->x + 1u) << shift, tree->level_x[level]);
-    uint32_t z1 = terrimpi_min_u32((s->z + 1u) << shift, tree->level_z[level]);
-    float worst = 0.0f;
-    for (z = s->z << shift; z < z1; z++)
-        for (x = s->x << shift; x < x1; x++)
-            worst = terrimpi_max(worst, tree->nodes[tree->level_first[level] +
-                                                    z * tree->level_x[level] + x].rms);
-    return worst;
-}
-
-/* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
-static uint32_t terrimpi_source_level(const terrimp_view *v, const terrimp_node *s, float closest)
-{
-    float limit = TERRIMPI_SOURCE_TEXELS * closest / (v->pixel_factor * v->desc.texels_per_px);
-    uint32_t level = s->level;
-    if (v->desc.mode == TERRIMP_MODE_IMPOSTOR)
-        return 0;
-    while (level > 0 && s->level - level < TERRIMPI_SOURCE_LEVELS &&
-           terrimpi_source_error(&v->terrain->tree, s, level) > limit)
-        level--;
-    return level;
-}
-
-/* How fast the eye moves [wu a frame]. */
-static float terrimpi_speed(const terrimp_view *v)
-{
-    return terrimpi_length(v->motion);
-}
-
-/* How good a picture is from the present eye: its view angle and parallax error, and the larger of
-   the two over its limit. */
-static float terrimpi_judge(const terrimp_view *v, const float captured_eye[3],
-                            const terrimp_node *s, float *angle_rad, float *parallax_px)
-{
-    terrimp_box box;
-    terrimpi_site_box(v, s, &box);
-    *angle_rad = terrimpi_view_angle(&box, captured_eye, v->camera.eye);
-    *parallax_px = terrimpi_parallax_error(&box, terrimpi_mesh_error(v, s->number), captured_eye,
-                                           v->camera.eye, v->pixel_factor);
-    return terrimpi_max(*angle_rad / v->desc.max_angle_rad,
-                        *parallax_px / v->desc.tolerance_px);
-}
-
-static float terrimpi_sharpness(const terrimp_view *v, float closest)
-{
-    return v->pixel_factor * v->desc.texels_per_px / terrimpi_max(closest, 1e-6f * v->desc.fade_start);
-}
-
-/* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
-   become too coarse, or far too fine. */
-static float terrimpi_urgency(const terrimp_view *v, const terrimpi_record *record,
-                              const terrimp_node *s, float closest)
-{
-    float angle, parallax, urgency, wanted = terrimpi_sharpness(v, closest);
-    urgency = terrimpi_judge(v, record->eye, s, &angle, &parallax);
-    urgency = terrimpi_max(urgency, wanted / (record->sharpness * 1.3f));
-    urgency = terrimpi_max(urgency, record->sharpness / (wanted * 3.0f));
-    return terrimpi_min(urgency, 1e6f);
-}
-
-/* Whether a record has a picture that may be drawn at an urgency. */
-static int terrimpi_usable(const terrimp_view *v, uint32_t record, float urgency)
-{
-    return record != TERRIMPI_NO_RECORD && v->records[record].part_count > 0 &&
-           urgency < TERRIMPI_STALE;
-}
-
-/* Fills in what a want costs. Returns 0 when no frustum fits: the eye is too close. */
-static int terrimpi_appraise(terrimp_view *v, terrimpi_want *want)
-{
-    const terrimp_costs *costs = &v->desc.costs;
-    terrimp_capture capture;
-    terrimp_mesh_info mesh;
-    terrimp_box box;
-    float speed = terrimpi_speed(v), k = v->pixel_factor, texels, sine;
-    terrimpi_site_box(v, &want->site, &box);
-    if (terrimpi_capture_fit(&box, v->camera.eye, &capture) != TERRIMP_OK)
-        return 0;
-    terrimpi_mesh_place(v->terrain, want->site.number, &mesh);
-    want->record = v->record_of[want->site.number];
-    want->pixels = k * k * (capture.tan_right - capture.tan_left) *
-                   (capture.tan_up - capture.tan_down);
-    want->draw_cost = costs->draw + costs->triangle * (float)(mesh.index_count / 3u);
-    sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.number), want->closest);
-    want->life = v->desc.no_lookahead ? 1.0f : 1.0f + TERRIMPI_AHEAD;
-    want->life = terrimpi_min(TERRIMPI_LONGEST_LIFE,
-                              want->life * want->closest * sine / terrimpi_max(speed, 1e-20f));
-    want->life = terrimpi_max(1.0f, want->life);
-    if (want->record != TERRIMPI_NO_RECORD && v->records[want->record].part_count > 0) {
-        want->capture_cost = v->records[want->record].cost;
-        want->urgency = terrimpi_urgency(v, &v->records[want->record], &want->site, want->closest);
-        return 1;
+    const terrimp_quadtree *tree = &v->terrain->tree;
+    const terrimpi_cull_node *nodes = v->cull.nodes;
+    terrimpi_region *region = &v->regions[v->region_count];
+    uint32_t first = v->candidate_count, i, end;
+    memset(region, 0, sizeof *region);
+    region->node = nodes[at].number;
+    region->closest = nodes[at].closest;
+    region->first_ground = v->ground.draws_needed;
+    region->first_candidate = first;
+    for (i = at, end = nodes[at].end; i < end; i++) {
+        terrimp_node node = terrimpi_tree_node(tree, nodes[i].number);
+        if (nodes[i].cuts & TERRIMPI_CULL_GROUND)
+            terrimpi_view_add_ground(&v->ground, mip, &node);
+        if (!(nodes[i].cuts & TERRIMPI_CULL_IMPOSTOR))
+            continue;
+        if (v->candidate_count < v->desc.max_impostors) {
+            terrimpi_candidate *c = &v->candidates[v->candidate_count];
+            memset(c, 0, sizeof *c);
+            c->node = node;
+            c->closest = nodes[i].closest;
+        }
+        v->candidate_count++;
     }
-    want->urgency = 1e9f;
-    texels = want->pixels * v->desc.texels_per_px * v->desc.texels_per_px;
-    {
-        uint32_t source = terrimpi_source_level(v, &want->site, want->closest);
-        uint32_t quads = v->terrain->desc.chunk_quads << (want->site.level - source);
-        want->capture_cost = costs->capture + costs->ground_px * texels +
-                             costs->triangle * 2.6f * (float)(quads * quads);
+    region->ground_count = v->ground.draws_needed - region->first_ground;
+    if (region->ground_count == 0 || v->candidate_count > v->desc.max_impostors)
+        v->candidate_count = first;
+    region->candidate_count = v->candidate_count - first;
+    v->region_count += region->ground_count > 0 ? 1u : 0u;
+}
+
+static void terrimpi_view_make_regions(terrimp_view *v, terrimpi_mip_frame *mip)
+{
+    uint32_t i = 0;
+    v->region_count = v->candidate_count = 0;
+    v->ground.draws_needed = v->ground.triangle_count = 0;
+    while (i < v->cull.count)
+        if (v->cull.nodes[i].cuts) {
+            terrimpi_view_add_region(v, i, mip);
+            i = v->cull.nodes[i].end;
+        } else {
+            i++;
+        }
+    v->ground.draw_count = v->ground.draws_needed;
+}
+
+/* Finds what is in sight and makes both cuts through it; where max_ground is too small, at a larger
+   tolerance. The frame before is only written over when that has succeeded. */
+static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f)
+{
+    terrimpi_mip_frame mip;
+    if (terrimpi_view_full(&v->desc)) {
+        if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
+            return TERRIMP_E_CAPACITY;
+        terrimpi_view_make_regions(v, NULL);
+        return TERRIMP_OK;
     }
-    return 1;
+    v->ground_scale = terrimpi_max(1.0f, v->ground_scale * TERRIMPI_VIEW_FINER);
+    for (;;) {
+        float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
+        float scale = terrimpi_min(v->ground_scale, most);
+        terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
+        if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
+            break;
+        if (v->ground_scale >= most)
+            return TERRIMP_E_CAPACITY;
+        v->ground_scale *= TERRIMPI_VIEW_COARSER;
+    }
+    terrimpi_view_make_regions(v, &mip);
+    return TERRIMP_OK;
 }
 
 /* ---- ground or impostors? ---- */
 
-static float terrimpi_ground_cost(const terrimp_view *v, const terrimpi_unit *unit)
+/* Fills in what a candidate costs. Returns 0 when no camera fits: the eye is too close. */
+static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_cache *cache,
+                                       terrimpi_candidate *c)
+{
+    const terrimp_costs *costs = &f->desc->costs;
+    float k = f->pixel_factor, density = f->desc->texels_per_px;
+    terrimp_capture camera;
+    terrimp_mesh_info mesh;
+    terrimp_box box;
+    uint32_t quads;
+    terrimpi_node_box(f->terrain, &c->node, &box);
+    if (terrimpi_capture_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
+        return 0;
+    terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
+    c->picture = terrimpi_cache_find(cache, c->node.number);
+    c->pixels = k * k * (camera.tan_right - camera.tan_left) * (camera.tan_up - camera.tan_down);
+    c->draw_cost = terrimpi_cost_draw(costs, (float)(mesh.index_count / 3u));
+    c->life = terrimpi_view_life(f, c->node.number, c->closest);
+    if (c->picture && c->picture->layer_count > 0) {
+        c->capture_cost = c->picture->cost;
+        c->urgency = terrimpi_view_urgency(f, c->picture, c->closest);
+        return 1;
+    }
+    c->urgency = 1e9f;
+    quads = f->terrain->desc.chunk_quads
+            << (c->node.level - terrimpi_view_source(f, &c->node, c->closest));
+    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
+                                            TERRIMPI_VIEW_BORDER * (float)(quads * quads));
+    return 1;
+}
+
+/* Whether a candidate has a picture that may be drawn. */
+static int terrimpi_candidate_ready(const terrimpi_candidate *c)
+{
+    return c->picture && c->picture->layer_count > 0 && c->urgency < TERRIMPI_VIEW_STALE;
+}
+
+/* Fills in a region's candidates and the pixels that they cover. Both kinds shade the same ones:
+   what that costs alike is left out, or it would hide how much dearer the rest of one is. */
+static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cache *cache,
+                                    terrimpi_candidate *candidates, terrimpi_region *region)
+{
+    uint32_t i;
+    region->fits = region->candidate_count > 0;
+    region->pixels = 0.0f;
+    for (i = 0; i < region->candidate_count && region->fits; i++) {
+        region->fits = terrimpi_candidate_estimate(f, cache, &candidates[i]);
+        region->pixels += candidates[i].pixels;
+    }
+}
+
+static int terrimpi_ground_estimate(const terrimp_view *v, const terrimpi_region *region,
+                                    terrimpi_offer *offer)
 {
     const terrimp_costs *costs = &v->desc.costs;
     float quads = (float)v->terrain->desc.chunk_quads;
-    return (float)unit->leaf_count * (costs->draw + costs->triangle * 2.0f * quads * quads);
+    offer->draw = (float)region->ground_count * terrimpi_cost_draw(costs, 2.0f * quads * quads) +
+                  terrimpi_cost_shading(region->pixels, costs->ground_px, costs->impostor_px);
+    offer->upkeep = 0.0f;
+    return 1;
 }
 
-/* Decides for a unit whether impostors pay: their draws, and their captures spread over the frames
-   that they last, against the ground's draws. Both shade the same pixels: what that costs alike is
-   left out, or it would hide how much dearer the rest of one is. */
-static void terrimpi_decide(terrimp_view *v, terrimpi_unit *unit, float *spread, float *drawn)
+static int terrimpi_impostor_estimate(const terrimp_view *v, const terrimpi_region *region,
+                                      terrimpi_offer *offer)
 {
-    float impostors = 0.0f, captures = 0.0f, pixels = 0.0f, ground;
-    uint32_t i, node = unit->site.number;
-    int pays = 1, ready = 1;
-    for (i = 0; i < unit->want_count && pays; i++) {
-        terrimpi_want *want = &v->wants[unit->first_want + i];
-        pays = terrimpi_appraise(v, want);
-        impostors += want->draw_cost;
-        captures += want->capture_cost / want->life;
-        pixels += want->pixels;
-        ready &= terrimpi_usable(v, want->record, want->urgency);
+    const terrimp_costs *costs = &v->desc.costs;
+    const terrimpi_candidate *c = &v->candidates[region->first_candidate];
+    uint32_t i;
+    offer->draw = offer->upkeep = 0.0f;
+    for (i = 0; i < region->candidate_count && region->fits; i++, c++) {
+        offer->draw += c->draw_cost;
+        offer->upkeep += c->capture_cost / c->life;
     }
-    ground = terrimpi_ground_cost(v, unit);
-    pixels *= TERRIMPI_SEEN * (v->desc.costs.impostor_px - v->desc.costs.ground_px);
-    impostors += terrimpi_max(pixels, 0.0f);
-    ground += terrimpi_max(-pixels, 0.0f);
-    if (v->desc.mode == TERRIMP_MODE_AUTO && pays) {
-        float all = impostors + captures;
-        pays = v->prefers[node] ? all < ground * TERRIMPI_FLIP : all * TERRIMPI_FLIP < ground;
+    offer->draw += terrimpi_cost_shading(region->pixels, costs->impostor_px, costs->ground_px);
+    return region->fits;
+}
+
+static int terrimpi_ground_ready(const terrimp_view *v, const terrimpi_region *region)
+{
+    (void)v;
+    (void)region;
+    return 1;
+}
+
+static int terrimpi_impostor_ready(const terrimp_view *v, const terrimpi_region *region)
+{
+    uint32_t i;
+    for (i = 0; i < region->candidate_count; i++)
+        if (!terrimpi_candidate_ready(&v->candidates[region->first_candidate + i]))
+            return 0;
+    return 1;
+}
+
+/* ---- the draw list ---- */
+
+static void terrimpi_view_add(terrimp_view *v, int kind, uint32_t index)
+{
+    terrimpi_draw *draw = &v->draws[v->draw_count++];
+    draw->kind = kind;
+    draw->index = index;
+    draw->alpha = 1.0f;
+}
+
+static int terrimpi_ground_list(terrimp_view *v, const terrimpi_region *region)
+{
+    uint32_t i;
+    for (i = 0; i < region->ground_count; i++)
+        terrimpi_view_add(v, TERRIMPI_KIND_GROUND, region->first_ground + i);
+    return 1;
+}
+
+/* Lists a node's impostor, once, if it has a picture that is good. One that is drawn for several
+   regions does not fade. */
+static int terrimpi_impostor_add(terrimp_view *v, const terrimp_node *node, float most_urgent)
+{
+    terrimpi_picture *p = terrimpi_cache_find(&v->cache, node->number);
+    if (!p)
+        return 0;
+    if (p->listed == v->frame.number) {
+        v->draws[p->draw].alpha = 1.0f;
+        return 1;
     }
-    if (unit->want_count == 0 || !pays) {
-        unit->want_count = 0;
-        v->prefers[node] = 0;
-        *drawn += ground;
+    terrimpi_view_judge(&v->frame, p);
+    if (p->layers_now == 0 || p->urgency > most_urgent)
+        return 0;
+    p->listed = p->seen = v->frame.number;
+    p->draw = v->draw_count;
+    terrimpi_view_add(v, TERRIMPI_KIND_IMPOSTOR, (uint32_t)(p - v->cache.pictures));
+    return 1;
+}
+
+/* Lists the impostors of a node's children; all or none of them has a picture. */
+static int terrimpi_impostor_add_children(terrimp_view *v, const terrimp_node *node)
+{
+    terrimp_node children[4];
+    uint32_t i, count;
+    if (node->level == 0)
+        return 0;
+    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.camera.eye, children);
+    for (i = 0; i < count; i++) {
+        const terrimpi_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
+        if (!p || p->layer_count == 0)
+            return 0;
+    }
+    for (i = 0; i < count; i++)
+        if (!terrimpi_impostor_add(v, &children[i], TERRIMPI_VIEW_STALE_OTHER))
+            return 0;
+    return 1;
+}
+
+/* Lists a candidate, or in its place what shows the same: its children, of which it was put
+   together, or its parents, of which it is a part. Returns 0 when there is no picture. */
+static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
+{
+    const terrimp_quadtree *tree = &v->terrain->tree;
+    terrimp_node node = c->node;
+    uint32_t up;
+    if (terrimpi_impostor_add(v, &node, TERRIMPI_VIEW_STALE))
+        return 1;
+    v->stats.waiting++;
+    if (terrimpi_view_impostors(&v->desc) != TERRIMPI_IMPOSTORS_CHEAPER)
+        return 0;
+    if (terrimpi_impostor_add_children(v, &node))
+        return 1;
+    for (up = 0; up < 2u && node.level + 1u < tree->level_count; up++) {
+        terrimp_box box;
+        node = terrimpi_tree_parent(tree, &node);
+        terrimpi_node_box(v->terrain, &node, &box);
+        if (terrimp_box_distance(&box, v->frame.camera.eye) >= v->desc.fade_start &&
+            terrimpi_impostor_add(v, &node, TERRIMPI_VIEW_STALE_OTHER))
+            return 1;
+    }
+    return 0;
+}
+
+/* Lists a region's impostors, and in the fade band its ground, over which they appear; or nothing,
+   when one of them has no picture. */
+static int terrimpi_impostor_list(terrimp_view *v, const terrimpi_region *region)
+{
+    float band = v->desc.fade_end - v->desc.fade_start;
+    uint32_t before = v->draw_count, i;
+    int covered = 1;
+    for (i = 0; i < region->candidate_count; i++)
+        covered &= terrimpi_candidate_list(v, &v->candidates[region->first_candidate + i]);
+    if (!covered) {
+        while (v->draw_count > before)
+            v->cache.pictures[v->draws[--v->draw_count].index].listed = 0;
+        return 0;
+    }
+    for (i = before; i < v->draw_count; i++)
+        v->draws[i].alpha = terrimpi_min(1.0f, (region->closest - v->desc.fade_start) / band);
+    return region->closest >= v->desc.fade_end || terrimpi_ground_list(v, region);
+}
+
+/* ---- the commands ---- */
+
+/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
+static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrimp_pattern *found)
+{
+    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
+    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST,
+                         v->ground.draws[draw].pattern, found);
+}
+
+static void terrimpi_ground_emit(const terrimp_view *v, const terrimpi_draw *draw,
+                                 const terrimp_callbacks *callbacks)
+{
+    const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
+    terrimp_ground_command command;
+    terrimp_pattern pattern;
+    terrimpi_ground_pattern(v, draw->index, &pattern);
+    memset(&command, 0, sizeof command);
+    command.node = ground->node.number;
+    command.level = ground->node.level;
+    command.first_index = pattern.first_index;
+    command.index_count = pattern.index_count;
+    command.morph = ground->morph;
+    memcpy(command.side, ground->side, sizeof command.side);
+    memcpy(command.side_coarse, ground->side_coarse, sizeof command.side_coarse);
+    callbacks->draw_ground(callbacks->user, &command);
+}
+
+static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *draw,
+                                   const terrimp_callbacks *callbacks)
+{
+    terrimpi_picture *picture = &v->cache.pictures[draw->index];
+    terrimp_impostor_command command;
+    terrimp_mesh_info mesh;
+    uint32_t layer;
+    terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
+    memset(&command, 0, sizeof command);
+    command.node = picture->node.number;
+    command.level = picture->node.level;
+    command.part_count = picture->layer_count;
+    command.base_vertex = mesh.base_vertex;
+    command.first_index = mesh.first_index;
+    command.index_count = mesh.index_count;
+    command.alpha = draw->alpha;
+    memcpy(command.eye, picture->eye, sizeof command.eye);
+    picture->drawn_count++;
+    for (layer = 0; layer < picture->layer_count; layer++) {
+        command.part = layer;
+        command.atlas = picture->slots[layer].atlas;
+        memcpy(command.texture_matrix, picture->texture_matrix[layer],
+               sizeof command.texture_matrix);
+        callbacks->draw_impostor(callbacks->user, &command);
+    }
+}
+
+static void terrimpi_floor_emit(const terrimp_view *v, const terrimpi_draw *draw,
+                                const terrimp_callbacks *callbacks)
+{
+    terrimp_floor_command command;
+    (void)draw;
+    if (!callbacks->draw_floor)
         return;
+    memset(&command, 0, sizeof command);
+    command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
+    command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
+    command.index_count = terrimpi_floor_indices(v->terrain);
+    callbacks->draw_floor(callbacks->user, &command);
+}
+
+/* What can show a region. */
+typedef struct terrimpi_view_kind {
+    /* What it costs; returns 0 when it cannot show the region. */
+    int (*estimate)(const terrimp_view *v, const terrimpi_region *region, terrimpi_offer *offer);
+    /* Whether it can do so in this frame, before captures. */
+    int (*ready)(const terrimp_view *v, const terrimpi_region *region);
+    /* Puts its draws on the list; returns 0 when it is not ready: then the kind before it does. */
+    int (*list)(terrimp_view *v, const terrimpi_region *region);
+    void (*emit)(const terrimp_view *v, const terrimpi_draw *draw,
+                 const terrimp_callbacks *callbacks);
+} terrimpi_view_kind;
+
+static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_KIND_COUNT] = {
+    {terrimpi_ground_estimate, terrimpi_ground_ready, terrimpi_ground_list, terrimpi_ground_emit},
+    {terrimpi_impostor_estimate, terrimpi_impostor_ready, terrimpi_impostor_list,
+     terrimpi_impostor_emit},
+    {NULL, NULL, NULL, terrimpi_floor_emit}
+};
+
+/* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
+   TERRIMPI_VIEW_FLIP. Adds to what captures cost in the mean frame, and draws in this one. */
+static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float *spread,
+                                 float *drawn)
+{
+    terrimpi_offer offers[TERRIMPI_KIND_SHOWS];
+    int possible[TERRIMPI_KIND_SHOWS], kind, best = TERRIMPI_KIND_GROUND;
+    int before = v->kind_of[region->node];
+    float total[TERRIMPI_KIND_SHOWS];
+    uint32_t i;
+    terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
+    for (kind = 0; kind < TERRIMPI_KIND_SHOWS; kind++) {
+        possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
+        total[kind] = offers[kind].draw + offers[kind].upkeep;
+        if (possible[kind] && total[kind] < total[best])
+            best = kind;
     }
-    v->prefers[node] = 1;
-    *spread += captures;
-    *drawn += ready ? impostors : ground;
-    for (i = 0; i < unit->want_count; i++) {
-        terrimpi_want *want = &v->wants[unit->first_want + i];
-        if (want->record != TERRIMPI_NO_RECORD)
-            v->records[want->record].seen = v->frame;
+    if (possible[before] && total[before] < total[best] * TERRIMPI_VIEW_FLIP)
+        best = before;
+    if (possible[TERRIMPI_KIND_IMPOSTOR] &&
+        terrimpi_view_impostors(&v->desc) == TERRIMPI_IMPOSTORS_ALWAYS)
+        best = TERRIMPI_KIND_IMPOSTOR;
+    region->kind = best;
+    v->kind_of[region->node] = (unsigned char)best;
+    *spread += offers[best].upkeep;
+    *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
+    for (i = 0; i < region->candidate_count && best == TERRIMPI_KIND_IMPOSTOR; i++) {
+        terrimpi_picture *p = v->candidates[region->first_candidate + i].picture;
+        if (p)
+            p->seen = v->frame.number;
     }
 }
 
 /* ---- the schedule of captures ---- */
 
-/* Steps along a row of cells from the farthest to the nearest: the k-th one of `count`, for an eye
-   beside or above cell `eye`. */
-static uint32_t terrimpi_farthest(uint32_t count, int eye, uint32_t k)
+/* Whether the picture of a node is better made in two layers, and where: when smears of what hides
+   behind its ridges would show before it is renewed, and a split spares most of them. The node's
+   mesh is in xyz. */
+static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_plan *plan,
+                               float closest, const float *xyz, const uint16_t *indices,
+                               float *distance)
 {
-    int low = 0, high = (int)count - 1;
-    for (;; k--) {
-        int take_low = eye - low > high - eye;
-        if (k == 0)
-            return (uint32_t)(take_low ? low : high);
-        if (take_low)
-            low++;
-        else
-            high--;
-    }
-}
-
-/* The source nodes of a picture along x or z, and one more on each side for the border. */
-typedef struct terrimpi_cells {
-    uint32_t first, count; /* without the border */
-} terrimpi_cells;
-
-/* `nodes` is how many the source level has. */
-static terrimpi_cells terrimpi_source_cells(const terrimpi_job *job, uint32_t at, uint32_t nodes)
-{
-    uint32_t shift = job->site.level - job->source;
-    terrimpi_cells c;
-    c.first = at << shift;
-    c.count = terrimpi_min_u32(1u << shift, nodes - c.first);
-    return c;
-}
-
-static terrimpi_cells terrimpi_cells_x(const terrimp_view *v, const terrimpi_job *job)
-{
-    return terrimpi_source_cells(job, job->site.x, v->terrain->tree.level_x[job->source]);
-}
-
-static terrimpi_cells terrimpi_cells_z(const terrimp_view *v, const terrimpi_job *job)
-{
-    return terrimpi_source_cells(job, job->site.z, v->terrain->tree.level_z[job->source]);
-}
-
-/* The k-th cell along x or z, from back to front, for an eye that is `eye` cells from the
-   terrain's edge. *place: 0 and 2 are the border's, before and behind the block. */
-static uint32_t terrimpi_cell_along(terrimpi_cells c, float eye, uint32_t k, uint32_t *place)
-{
-    int eye_cell = (int)terrimpi_clamp(eye - (float)c.first + 1.0f, -1.0f, 99.0f);
-    uint32_t cell = terrimpi_farthest(c.count + 2u, eye_cell, k);
-    *place = cell == 0 ? 0u : cell == c.count + 1u ? 2u : 1u;
-    return c.first + cell - 1u; /* wraps below 0, and is then too large */
-}
-
-/* Cell k of a job, cells ordered from back to front: its node and the pattern to draw, the whole
-   node or in the border a strip of it. Returns 0 where there is no node. */
-static int terrimpi_cell(const terrimp_view *v, const terrimpi_job *job, uint32_t k, uint32_t *node,
-                         terrimpi_pattern *pattern)
-{
-    const terrimp_terrain *t = v->terrain;
-    const terrimp_heightfield *field = &t->desc.field;
-    const float *eye = job->captures[0].eye;
-    terrimpi_cells across = terrimpi_cells_x(v, job);
-    uint32_t quads = t->desc.chunk_quads, x, z, dx, dz, direction, which = 0;
-    float step = (float)(quads << job->source);
-    x = terrimpi_cell_along(across, (eye[0] - field->origin_x) / (step * field->spacing_x),
-                            k % (across.count + 2u), &dx);
-    z = terrimpi_cell_along(terrimpi_cells_z(v, job),
-                            (eye[2] - field->origin_z) / (step * field->spacing_z),
-                            k / (across.count + 2u), &dz);
-    if (x >= t->tree.level_x[job->source] || z >= t->tree.level_z[job->source])
+#ifndef TERRIMP_NO_SPLIT
+    const terrimpi_mesh *mesh = &f->terrain->meshes[plan->node.number];
+    float sine = terrimpi_view_sine(f, plan->node.number, closest);
+    float overlap = terrimpi_capture_overlap(f->terrain, plan);
+    terrimp_split split;
+    if (f->desc->no_splits || terrimpi_view_impostors(f->desc) != TERRIMPI_IMPOSTORS_CHEAPER ||
+        !(sine * closest > 0.0f) ||
+        2.0f * overlap >
+            TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
         return 0;
-    direction = dz * 3u + dx;
-    if (direction != 4u)
-        which = terrimpi_strip_pattern(quads, job->strip,
-                                       direction > 4u ? direction - 1u : direction);
-    *pattern = terrimpi_find_pattern(quads, which);
-    *node = terrimpi_tree_at(&t->tree, job->source, x, z).number;
-    return 1;
-}
-
-static uint32_t terrimpi_cell_count(const terrimp_view *v, const terrimpi_job *job)
-{
-    return (terrimpi_cells_x(v, job).count + 2u) * (terrimpi_cells_z(v, job).count + 2u);
-}
-
-/* Whether a cell's node reaches into the clip distances of a part. */
-static int terrimpi_cell_in_part(const terrimp_view *v, const terrimpi_job *job, uint32_t node,
-                                 uint32_t part)
-{
-    const terrimp_capture *c = &job->captures[part];
-    const float *f = c->forward;
-    terrimp_box box;
-    float first = 0.0f, last = 0.0f;
-    int i;
-    if (TERRIMPI_PARTS == 1u || job->part_count == 1u)
-        return 1;
-    {
-        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, node);
-        terrimpi_site_box(v, &s, &box);
-    }
-    for (i = 0; i < 3; i++) {
-        first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - c->eye[i]);
-        last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - c->eye[i]);
-    }
-    return first < c->z_far && last > c->z_near;
-}
-
-/* Triangles of the piece of a job that this frame makes. */
-static uint32_t terrimpi_piece_triangles(const terrimp_view *v, const terrimpi_job *job)
-{
-    uint32_t k, part, node, triangles = 0;
-    terrimpi_pattern pattern;
-    for (k = job->cell_from; k < job->cell_to; k++)
-        if (terrimpi_cell(v, job, k, &node, &pattern))
-            for (part = 0; part < job->part_count; part++)
-                if (terrimpi_cell_in_part(v, job, node, part))
-                    triangles += pattern.triangle_count;
-    return triangles;
-}
-
-/* The strip of neighbours that a capture needs, as a number of terrimpi_strip_quads: the texels
-   that bilinear reads and the parallax can reach, in world units. At a grazing angle a texel is as
-   many times longer on the ground as the sine of that angle is smaller. */
-static uint32_t terrimpi_strip_width(const terrimp_view *v, const terrimpi_job *job,
-                                     const terrimp_box *box, const uint32_t size[2])
-{
-    const terrimp_heightfield *field = &v->terrain->desc.field;
-    const terrimp_capture *capture = &job->captures[0];
-    uint32_t quads = v->terrain->desc.chunk_quads, width = 0, strips = terrimpi_strip_count(quads);
-    float texels = 1.5f + v->desc.tolerance_px * v->desc.texels_per_px;
-    float per_texel_x = (capture->tan_right - capture->tan_left) / (float)size[0];
-    float per_texel_y = (capture->tan_up - capture->tan_down) / (float)size[1];
-    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    float sine = terrimpi_max(drop / capture->z_far, 0.1f);
-    float reach = texels * capture->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
-    float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << job->source);
-    while (width < strips && (float)terrimpi_strip_quads(quads, width) * step < reach)
-        width++;
-    return width;
-}
-
-/* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
-static void terrimpi_capture_eye(const terrimp_view *v, const terrimpi_want *want,
-                                 const terrimp_box *box, float eye[3])
-{
-    float speed = terrimpi_speed(v), ahead;
-    uint32_t i;
-    memcpy(eye, v->camera.eye, sizeof v->camera.eye);
-    if (v->desc.no_lookahead || !(speed > 0.0f))
-        return;
-    ahead = TERRIMPI_AHEAD * want->closest *
-            terrimpi_sine_limit(v, terrimpi_mesh_error(v, want->site.number), want->closest);
-    ahead = terrimpi_min(ahead, speed * 0.5f * TERRIMPI_LONGEST_LIFE);
-    for (i = 0; i < 3u; i++)
-        eye[i] += v->motion[i] / speed * ahead;
-    if (terrimp_box_distance(box, eye) < 0.8f * want->closest)
-        memcpy(eye, v->camera.eye, sizeof v->camera.eye);
-}
-
-/* The frustum around a node's mesh, and the size of the slot that it needs. Returns 0 when none
-   fits. */
-static int terrimpi_slot_size(terrimp_view *v, const terrimp_node *s, const terrimp_box *box,
-                              const float eye[3], terrimp_capture *capture, uint32_t size[2])
-{
-    uint32_t largest = terrimpi_max_u32(TERRIMPI_SMALLEST_PICTURE,
-                                        v->desc.atlas_size / 2u - 2u * TERRIMPI_MARGIN);
-    float density = v->pixel_factor * v->desc.texels_per_px, width, height;
-    terrimp_mesh_info mesh;
-    terrimpi_mesh_place(v->terrain, s->number, &mesh);
-    terrimpi_fill_mesh(v->terrain, s->number, v->mesh_xyz, v->mesh_indices);
-    if (terrimpi_capture_fit(box, eye, capture) != TERRIMP_OK ||
-        !terrimpi_capture_tighten(capture, v->mesh_xyz, mesh.vertex_count))
-        return 0;
-    width = (capture->tan_right - capture->tan_left) * density;
-    height = (capture->tan_up - capture->tan_down) * density;
-    if (!terrimpi_finite2(width, height)) /* the eye is almost beside a vertex */
-        return 0;
-    terrimpi_picture_size(width, height, TERRIMPI_SMALLEST_PICTURE, largest, size);
-    size[0] += 2u * TERRIMPI_MARGIN;
-    size[1] += 2u * TERRIMPI_MARGIN;
-    return 1;
-}
-
-/* Whether the slots of a record can take a picture of a size: not less than 90 % of it in either
-   side, not more than half as much again. */
-static int terrimpi_seats_suit(const terrimp_view *v, const terrimpi_record *record,
-                               const uint32_t size[2], uint32_t part_count)
-{
-    uint32_t i;
-    if (record->part_count != part_count)
-        return 0;
-    for (i = 0; i < part_count; i++) {
-        terrimp_rect rect;
-        rect = v->atlases[record->parts[i].atlas].slots[record->parts[i].slot];
-        if (rect.width * 10u < size[0] * 9u || rect.height * 10u < size[1] * 9u ||
-            rect.width * 2u > size[0] * 3u || rect.height * 2u > size[1] * 3u)
-            return 0;
-    }
-    return 1;
+    terrimpi_capture_split(&plan->camera, xyz, mesh->vertex_count, indices,
+                           3u * mesh->triangle_count, sine * closest, overlap, &split);
+    *distance = split.distance;
+    return split.gap * sine * f->pixel_factor >
+               TERRIMPI_VIEW_SPLIT_SMEAR * f->desc->tolerance_px &&
+           split.gap_left < split.gap * TERRIMPI_VIEW_SPLIT_GAIN;
+#else
+    (void)f, (void)plan, (void)closest, (void)xyz, (void)indices, (void)distance;
+    return 0;
+#endif
 }
 
 /* Finds slots for a job: those of the old picture, unless the new one is made in pieces and the old
    one is drawn meanwhile. */
-static int terrimpi_seat_job(terrimp_view *v, const uint32_t size[2], terrimpi_job *job)
+static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], terrimpi_job *job)
 {
-    const terrimpi_record *record = &v->records[job->record];
-    uint32_t i, wanted = job->part_count;
-    if (!job->in_pieces && terrimpi_seats_suit(v, record, size, wanted))
-        memcpy(job->parts, record->parts, sizeof job->parts);
-    else
-        for (job->part_count = 0; job->part_count < wanted; job->part_count++)
-            if (!terrimpi_take_seat(v, size, &job->parts[job->part_count])) {
-                terrimpi_drop_seats(v, job->parts, job->part_count);
-                return 0;
-            }
-    for (i = 0; i < wanted; i++)
-        job->rects[i] = v->atlases[job->parts[i].atlas].slots[job->parts[i].slot];
-    return 1;
-}
-
-/* How far a picture's terrain may lie from the mesh that wears it, along a ray. */
-static float terrimpi_depth_error(const terrimp_view *v, uint32_t node,
-                                  const terrimp_capture *capture, const terrimp_box *box)
-{
-    float drop = terrimpi_abs(capture->eye[1] - 0.5f * (box->min[1] + box->max[1]));
-    return terrimpi_min(1.1f * v->terrain->meshes[node].error * capture->z_far /
-                            terrimpi_max(drop, 1e-20f),
-                        capture->z_far);
-}
-
-/* Whether the picture of a node is better made in two parts, and where: when smears of what hides
-   behind its ridges would show before it is renewed, and a split spares most of them. The parts
-   overlap by what the mesh may be off. The node's mesh is in mesh_xyz. */
-static int terrimpi_split_at(terrimp_view *v, const terrimpi_want *want, const terrimp_box *box,
-                             const terrimp_capture *capture, float *distance)
-{
-    uint32_t node = want->site.number;
-    const terrimpi_mesh *mesh = &v->terrain->meshes[node];
-    float sine = terrimpi_sine_limit(v, terrimpi_mesh_error(v, node), want->closest);
-    float overlap = terrimpi_depth_error(v, node, capture, box);
-    terrimp_split split;
-    if (TERRIMPI_PARTS == 1u || v->desc.no_splits || v->desc.mode != TERRIMP_MODE_AUTO ||
-        !(sine * want->closest > 0.0f) ||
-        2.0f * overlap > TERRIMPI_SPLIT_OVERLAP * (capture->z_far - capture->z_near))
-        return 0;
-    terrimpi_capture_split(capture, v->mesh_xyz, mesh->vertex_count, v->mesh_indices,
-                           3u * mesh->triangle_count, sine * want->closest, overlap, &split);
-    *distance = split.distance;
-    return split.gap * sine * v->pixel_factor >
-               TERRIMPI_SPLIT_SMEAR * v->desc.tolerance_px &&
-           split.gap_left < split.gap * TERRIMPI_SPLIT_GAIN;
+    const terrimpi_picture *picture = job->picture;
+    if (!job->in_pieces && terrimpi_cache_suits(cache, picture, size, job->plan.layer_count)) {
+        memcpy(job->slots, picture->slots, sizeof job->slots);
+        return 1;
+    }
+    return terrimpi_cache_slots(cache, size, job->slots, job->plan.layer_count);
 }
 
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
-   `room` triangles it may be cut. Returns 0 when it cannot be made. */
-static int terrimpi_prepare_job(terrimp_view *v, const terrimpi_want *want, uint32_t room,
+   `room` triangles it may be cut, if no other one is. Returns 0 when it cannot be made. */
+static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, uint32_t room,
                                 terrimpi_job *job)
 {
-    const terrimp_costs *costs = &v->desc.costs;
-    terrimp_capture *front = &job->captures[0], *back = &job->captures[TERRIMPI_PARTS - 1u];
-    terrimp_box box;
-    float eye[3], border, split = 0.0f;
-    uint32_t size[2], i;
+    const terrimpi_frame *f = &v->frame;
+    const terrimp_costs *costs = &f->desc->costs;
+    terrimpi_capture_plan *plan = &job->plan;
+    float eye[3], distance, split = 0.0f;
+    float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
+    uint32_t size[2], i, largest = terrimpi_max_u32(
+        TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
+    terrimp_mesh_info mesh;
     memset(job, 0, sizeof *job);
-    job->site = want->site;
-    terrimpi_site_box(v, &want->site, &box);
-    terrimpi_capture_eye(v, want, &box, eye);
-    if (!terrimpi_slot_size(v, &want->site, &box, eye, front, size))
+    plan->node = c->node;
+    plan->layer_count = 1;
+    terrimpi_node_box(f->terrain, &c->node, &plan->box);
+    terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, eye);
+    terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
+    terrimpi_fill_mesh(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
+    if (!terrimpi_capture_aim(&plan->box, eye, v->mesh_xyz, mesh.vertex_count,
+                              f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
+                              size))
         return 0;
-    job->record = v->record_of[want->site.number];
-    if (job->record == TERRIMPI_NO_RECORD)
-        job->record = terrimpi_take_record(v, want->site.number);
-    if (job->record == TERRIMPI_NO_RECORD)
+    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
+    if (!job->picture)
+        job->picture = terrimpi_cache_take(&v->cache, &c->node);
+    if (!job->picture)
         return 0;
-    job->part_count = 1;
-    job->source = terrimpi_source_level(v, &want->site, terrimp_box_distance(&box, eye));
-    job->strip = terrimpi_strip_width(v, job, &box, size);
-    job->cell_count = job->cell_to = terrimpi_cell_count(v, job);
-    job->triangles = terrimpi_piece_triangles(v, job);
-    job->in_pieces = v->desc.max_capture_triangles || (job->triangles > room && !v->open);
+    distance = terrimp_box_distance(&plan->box, eye);
+    plan->source = terrimpi_view_source(f, &c->node, distance);
+    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
+    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
+    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
-        terrimpi_split_at(v, want, &box, front, &split))
-        job->part_count = TERRIMPI_PARTS;
-    if (!terrimpi_seat_job(v, size, job))
+        terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
+        plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
+    if (!terrimpi_job_slots(&v->cache, size, job))
         return 0;
-    size[0] = job->rects[0].width;
-    size[1] = job->rects[0].height;
-    terrimpi_pad(&front->tan_left, &front->tan_right, size[0] - 2u * TERRIMPI_MARGIN,
-                 TERRIMPI_MARGIN);
-    terrimpi_pad(&front->tan_down, &front->tan_up, size[1] - 2u * TERRIMPI_MARGIN,
-                 TERRIMPI_MARGIN);
-    job->strip = terrimpi_strip_width(v, job, &box, size);
-    /* The border lies in front of and behind the box that was fitted. */
-    border = 1.5f * (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
-                            << job->source) *
-             terrimpi_max(v->terrain->desc.field.spacing_x, v->terrain->desc.field.spacing_z);
-    front->z_near = terrimpi_max(front->z_near * 0.5f, front->z_near - border);
-    front->z_far += border;
-    if (job->part_count > 1u) {
-        float overlap = terrimpi_depth_error(v, want->site.number, front, &box);
-        *back = *front;
-        front->z_far = terrimpi_min(front->z_far, split + overlap);
-        back->z_near = terrimpi_max(back->z_near, split - overlap);
-    }
-    job->triangles = terrimpi_piece_triangles(v, job);
-    job->wanted = terrimpi_sharpness(v, terrimp_box_distance(&box, eye));
+    size[0] = terrimpi_cache_rect(&v->cache, &job->slots[0]).width;
+    size[1] = terrimpi_cache_rect(&v->cache, &job->slots[0]).height;
+    terrimpi_capture_spread(f->terrain, plan, size, texels);
+    if (plan->layer_count > 1u)
+        terrimpi_capture_divide(f->terrain, plan, split);
+    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
+    job->sharpness = terrimpi_view_sharpness(f, distance);
     job->cost = costs->triangle * (float)job->triangles;
-    for (i = 0; i < job->part_count; i++)
-        job->cost += costs->capture + costs->ground_px * (float)job->rects[i].width *
-                                          (float)job->rects[i].height;
+    for (i = 0; i < plan->layer_count; i++) {
+        terrimp_rect rect = terrimpi_cache_rect(&v->cache, &job->slots[i]);
+        job->texels += rect.width * rect.height;
+        job->cost += terrimpi_cost_capture(costs, (float)rect.width * (float)rect.height, 0.0f);
+    }
     return 1;
 }
 
-/* Takes the cells of a picture that still fit into a number of triangles: one at least. */
-static void terrimpi_cut_piece(const terrimp_view *v, terrimpi_job *job, uint32_t triangles)
+/* Takes the draws of a picture that still fit into a number of triangles: one at least. */
+static void terrimpi_job_cut(const terrimpi_capture_draw *draws, uint32_t triangles,
+                             terrimpi_job *job)
 {
-    uint32_t used = 0, node;
-    terrimpi_pattern pattern;
-    job->cell_to = job->cell_from;
-    while (job->cell_to < job->cell_count) {
-        if (terrimpi_cell(v, job, job->cell_to, &node, &pattern)) {
-            used += pattern.triangle_count;
-            if (used > triangles && job->cell_to > job->cell_from)
-                break;
-        }
-        job->cell_to++;
+    uint32_t used = 0;
+    for (job->to = job->from; job->to < job->draw_count; job->to++) {
+        used += draws[job->to].triangle_count;
+        if (used > triangles && job->to > job->from)
+            break;
     }
 }
 
-static uint32_t terrimpi_job_texels(const terrimpi_job *job)
+/* Whether a candidate is to be captured before another: what is missing first, then what is due,
+   then what soon will be; among equals the lower node. */
+static int terrimpi_candidate_before(const terrimpi_candidate *a, const terrimpi_candidate *b)
 {
-    uint32_t i, texels = 0;
-    for (i = 0; i < job->part_count; i++)
-        texels += job->rects[i].width * job->rects[i].height;
-    return texels;
+    if (a->rank != b->rank)
+        return a->rank > b->rank;
+    if (a->weight > b->weight || a->weight < b->weight)
+        return a->weight > b->weight;
+    return a->node.number < b->node.number;
 }
 
-/* Sorts the queue, highest priority first; among equals the lower node. */
-static void terrimpi_sort_queue(terrimp_view *v, uint32_t count)
+static void terrimpi_view_sort_queue(const terrimpi_candidate *candidates, uint32_t *queue,
+                                     uint32_t count)
 {
     uint32_t gap, i, k;
     for (gap = count / 2u; gap > 0; gap /= 2u)
         for (i = gap; i < count; i++) {
-            uint32_t moved = v->queue[i];
-            const terrimpi_want *m = &v->wants[moved];
-            for (k = i; k >= gap; k -= gap) {
-                const terrimpi_want *w = &v->wants[v->queue[k - gap]];
-                if (w->priority > m->priority ||
-                    (w->priority == m->priority && w->site.number < m->site.number))
-                    break;
-                v->queue[k] = v->queue[k - gap];
-            }
-            v->queue[k] = moved;
+            uint32_t moved = queue[i];
+            for (k = i; k >= gap && terrimpi_candidate_before(&candidates[moved],
+                                                              &candidates[queue[k - gap]]);
+                 k -= gap)
+                queue[k] = queue[k - gap];
+            queue[k] = moved;
         }
 }
 
-/* Lists what could be captured: what is missing first, then what is due, then what soon will be;
-   each by its error on the screen times the pixels that show it. Returns how many. */
-static uint32_t terrimpi_fill_queue(terrimp_view *v)
+/* Lists what could be captured, most urgent first; each rank by the error on the screen times the
+   pixels that show it. Returns how many. */
+static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
 {
-    uint32_t u, i, count = 0;
-    for (u = 0; u < v->unit_count; u++)
-        for (i = 0; i < v->units[u].want_count; i++) {
-            uint32_t index = v->units[u].first_want + i;
-            terrimpi_want *want = &v->wants[index];
-            float weight = want->pixels / (1.0f + want->pixels); /* never 0 */
-            if (v->open && v->opened.site.number == want->site.number)
+    uint32_t r, i, count = 0;
+    for (r = 0; r < v->region_count; r++)
+        for (i = 0; i < v->regions[r].candidate_count; i++) {
+            uint32_t index = v->regions[r].first_candidate + i;
+            terrimpi_candidate *c = &v->candidates[index];
+            float weight = terrimpi_max(c->pixels / (1.0f + c->pixels), 1e-3f) + c->pixels;
+            if (v->regions[r].kind != TERRIMPI_KIND_IMPOSTOR ||
+                (v->open && v->jobs[0].plan.node.number == c->node.number) ||
+                (c->urgency < 1.0f &&
+                 (v->desc.no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
                 continue;
-            if (want->urgency < 1.0f && (v->desc.no_spreading || want->urgency < TERRIMPI_EARLY))
-                continue;
-            weight = terrimpi_max(weight, 1e-3f) + want->pixels;
-            if (!terrimpi_usable(v, want->record, want->urgency))
-                want->priority = 1e20f + 1e12f * weight;
-            else
-                want->priority = (want->urgency >= 1.0f ? 1e9f : 1.0f) *
-                                 terrimpi_min(want->urgency, 2.0f) * weight;
+            c->rank = !terrimpi_candidate_ready(c) ? TERRIMPI_RANK_MISSING
+                      : c->urgency >= 1.0f         ? TERRIMPI_RANK_DUE
+                                                   : TERRIMPI_RANK_EARLY;
+            c->weight = c->rank == TERRIMPI_RANK_MISSING
+                            ? weight
+                            : weight * terrimpi_min(c->urgency, 2.0f);
             v->queue[count++] = index;
         }
-    terrimpi_sort_queue(v, count);
+    terrimpi_view_sort_queue(v->candidates, v->queue, count);
     return count;
 }
 
@@ -8245,100 +8747,114 @@ typedef struct terrimpi_spending {
 } terrimpi_spending;
 
 /* Triangles of a whole source node: no piece of a picture is worth less. */
-static uint32_t terrimpi_cell_triangles(const terrimp_view *v)
+static uint32_t terrimpi_spending_least(const terrimpi_frame *f)
 {
-    return 2u * v->terrain->desc.chunk_quads * v->terrain->desc.chunk_quads;
+    return 2u * f->terrain->desc.chunk_quads * f->terrain->desc.chunk_quads;
 }
 
 /* How many triangles the next capture may draw. What is more is left to the next frames. */
-static uint32_t terrimpi_triangles_left(const terrimp_view *v, const terrimpi_spending *s)
+static uint32_t terrimpi_spending_left(const terrimpi_frame *f, const terrimpi_spending *s)
 {
-    uint32_t hard = v->desc.max_capture_triangles, left = 0xffffffffu;
-    if (!v->desc.no_spreading) {
-        float room = (s->allowance - s->cost) / v->desc.costs.triangle;
+    uint32_t hard = f->desc->max_capture_triangles, left = 0xffffffffu;
+    if (!f->desc->no_spreading) {
+        float room = (s->allowance - s->cost) / f->desc->costs.triangle;
         left = (uint32_t)terrimpi_clamp(room, 0.0f, 1e9f);
         if (s->cost == 0.0f)
-            left = terrimpi_max_u32(left, terrimpi_cell_triangles(v));
+            left = terrimpi_max_u32(left, terrimpi_spending_least(f));
     }
     if (hard)
         left = terrimpi_min_u32(left, hard - terrimpi_min_u32(hard, s->triangles));
     return left;
 }
 
-/* Adds a job, or a piece of one, to what this frame spends. */
-static void terrimpi_spend(const terrimp_view *v, const terrimpi_job *job, terrimpi_spending *s)
+/* Adds a job, or a piece of one, of which the draws are in draws. A picture that will be complete
+   is judged anew: it is drawn in this frame. */
+static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
+                                  const terrimpi_job *job, terrimpi_spending *s)
 {
-    uint32_t triangles = terrimpi_piece_triangles(v, job);
-    s->texels += terrimpi_job_texels(job);
+    terrimpi_picture *p = job->picture;
+    uint32_t triangles = terrimpi_capture_triangles(f->terrain, &job->plan, draws + job->from,
+                                                    job->to - job->from);
+    s->texels += job->texels;
     s->triangles += triangles;
     s->cost += job->cost * (float)triangles / (float)terrimpi_max_u32(job->triangles, 1u);
+    if (job->to < job->draw_count)
+        return;
+    p->judged = f->number;
+    p->layers_now = job->plan.layer_count;
+    p->urgency = terrimpi_view_error(f, &p->node, job->plan.camera.eye, &p->angle_rad,
+                                     &p->parallax_px);
 }
 
-/* Takes the capture of a want as the next job, whole or its first piece, if the limits allow.
+/* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
-static int terrimpi_take_job(terrimp_view *v, const terrimpi_want *want, terrimpi_spending *s)
+static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
 {
     const terrimp_view_desc *d = &v->desc;
     terrimpi_job *job = &v->jobs[v->job_count];
-    uint32_t room = terrimpi_triangles_left(v, s);
+    uint32_t room = terrimpi_spending_left(&v->frame, s);
     if (v->job_count == d->max_captures ||
-        (s->cost > 0.0f && room < terrimpi_cell_triangles(v)) ||
-        (want->urgency < 1.0f && s->cost + want->capture_cost > s->spread) ||
+        (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
+        (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
-        !terrimpi_prepare_job(v, want, room, job))
+        !terrimpi_job_prepare(v, c, room, job))
         return 0;
-    if (d->max_capture_texels && s->texels > 0 &&
-        s->texels + terrimpi_job_texels(job) > d->max_capture_texels) {
-        terrimpi_cancel_job(v, job);
-        return 0;
-    }
-    if (job->triangles > room && job->in_pieces && !v->open) {
-        terrimpi_cut_piece(v, job, room);
-        v->opened = *job;
-        v->open = job->cell_to < job->cell_count;
-    } else if (job->triangles > room && v->open) {
-        terrimpi_cancel_job(v, job);
+    if ((d->max_capture_texels && s->texels > 0 &&
+         s->texels + job->texels > d->max_capture_texels) ||
+        (job->triangles > room && v->open)) {
+        terrimpi_job_cancel(&v->cache, job);
         return 0;
     }
-    terrimpi_spend(v, job, s);
     v->job_count++;
+    if (job->triangles > room && job->in_pieces) {
+        terrimpi_job_cut(v->capture_draws, room, job);
+        v->open = job->to < job->draw_count ? v->job_count : 0u;
+    }
+    terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
     return 1;
+}
+
+/* Makes the next piece of the picture that has been begun, unless it has become useless. */
+static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
+{
+    terrimpi_job *job = &v->jobs[0];
+    float angle, parallax;
+    if (terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
+        TERRIMPI_VIEW_STALE) {
+        terrimpi_job_cancel(&v->cache, job);
+        v->open = 0;
+        return;
+    }
+    v->job_count = 1;
+    job->picture->seen = v->frame.number;
+    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    terrimpi_job_cut(v->capture_draws, terrimpi_spending_left(&v->frame, s), job);
+    terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
 }
 
 /* Continues the picture that is being made in pieces; then takes captures from the queue as the
    limits allow. `spread` is what captures cost in the mean frame, `drawn` what the draws of this
    frame cost: together with captures for as much as that, no frame is much worse than the last. */
-static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
+static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 {
     terrimpi_spending s;
     uint32_t i, count, put_off = 0, due = 0;
-    float angle, parallax;
     memset(&s, 0, sizeof s);
-    s.allowance = terrimpi_max(1.5f * spread, drawn);
+    s.allowance = terrimpi_max(TERRIMPI_VIEW_SPREAD * spread, drawn);
     s.spread = spread;
-    if (v->open && terrimpi_judge(v, v->opened.captures[0].eye, &v->opened.site, &angle,
-                                  &parallax) >= TERRIMPI_STALE) {
-        terrimpi_drop_seats(v, v->opened.parts, v->opened.part_count);
-        v->open = 0;
-    }
-    count = terrimpi_fill_queue(v);
-    if (v->open) {
-        terrimpi_job *job = &v->jobs[v->job_count++];
-        v->records[v->opened.record].seen = v->frame;
-        *job = v->opened;
-        terrimpi_cut_piece(v, job, terrimpi_triangles_left(v, &s));
-        terrimpi_spend(v, job, &s);
-    }
+    if (v->open)
+        terrimpi_view_continue(v, &s);
+    count = terrimpi_view_fill_queue(v);
     for (i = 0; i < count; i++) {
-        const terrimpi_want *want = &v->wants[v->queue[i]];
-        int is_due = want->urgency >= 1.0f;
-        int taken = terrimpi_take_job(v, want, &s);
+        const terrimpi_candidate *c = &v->candidates[v->queue[i]];
+        int is_due = c->urgency >= 1.0f;
+        int taken = terrimpi_view_take(v, c, &s);
         due += is_due ? 1u : 0u;
         put_off += is_due && !taken ? 1u : 0u;
     }
     for (i = 0; i < v->job_count; i++) {
-        v->stats.captures += v->jobs[i].part_count;
-        v->stats.splits += v->jobs[i].part_count - 1u;
+        v->stats.captures += v->jobs[i].plan.layer_count;
+        v->stats.splits += v->jobs[i].plan.layer_count - 1u;
     }
     v->stats.captured_texels = s.texels;
     v->stats.captured_triangles = s.triangles;
@@ -8346,421 +8862,215 @@ static void terrimpi_schedule(terrimp_view *v, float spread, float drawn)
     v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
 }
 
-/* ---- what is drawn ---- */
-
-/* The picture that a record will have when impostors are drawn: the eye of its capture, NULL when
-   there is none, and its parts. */
-static const float *terrimpi_picture(const terrimp_view *v, uint32_t index, uint32_t *part_count)
-{
-    const terrimpi_record *record = &v->records[index];
-    const terrimpi_job *job;
-    for (job = v->jobs; job < v->jobs + v->job_count; job++)
-        if (job->record == index && job->cell_to == job->cell_count) {
-            *part_count = job->part_count;
-            return job->captures[0].eye;
-        }
-    *part_count = record->part_count;
-    return record->part_count > 0 ? record->eye : NULL;
-}
-
-/* Puts a node's impostor on the list of this frame, once, if it has a picture that is good. */
-static int terrimpi_list_impostor(terrimp_view *v, uint32_t node, float most_urgent)
-{
-    uint32_t index = v->record_of[node];
-    terrimp_node s;
-    terrimpi_record *record;
-    const float *eye;
-    float angle, parallax;
-    uint32_t parts;
-    if (index == TERRIMPI_NO_RECORD)
-        return 0;
-    record = &v->records[index];
-    if (record->listed == v->frame) {
-        record->alpha = 1.0f;
-        return 1;
-    }
-    s = terrimpi_tree_node(&v->terrain->tree, node);
-    eye = terrimpi_picture(v, index, &parts);
-    if (!eye || terrimpi_judge(v, eye, &s, &angle, &parallax) > most_urgent)
-        return 0;
-    record->listed = record->seen = v->frame;
-    record->alpha = 1.0f;
-    v->items[v->item_count++] = index;
-    v->stats.impostors++;
-    v->stats.impostors_by_level[s.level]++;
-    return 1;
-}
-
-/* Draws a wanted impostor, or in its place what shows the same: its children, of which it was put
-   together, or its parent, of which it is a part. Returns 0 when there is no picture. */
-static int terrimpi_list_want(terrimp_view *v, const terrimpi_want *want)
-{
-    const terrimp_quadtree *tree = &v->terrain->tree;
-    terrimp_node children[4];
-    uint32_t i, count, level = want->site.level, up;
-    if (terrimpi_list_impostor(v, want->site.number, TERRIMPI_STALE))
-        return 1;
-    v->stats.waiting++;
-    if (v->desc.mode != TERRIMP_MODE_AUTO)
-        return 0;
-    if (level > 0) {
-        count = terrimpi_children(v, &want->site, children);
-        for (i = 0; i < count; i++) {
-            uint32_t record = v->record_of[children[i].number];
-            if (record == TERRIMPI_NO_RECORD || v->records[record].part_count == 0)
-                break;
-        }
-        if (i == count) {
-            for (i = 0; i < count; i++)
-                if (!terrimpi_list_impostor(v, children[i].number, 2.0f * TERRIMPI_STALE))
-                    break;
-            if (i == count)
-                return 1;
-        }
-    }
-    for (up = 1; up <= 2u && level + up < tree->level_count; up++) {
-        terrimp_node s = terrimpi_tree_at(tree, level + up, want->site.x >> up,
-                                           want->site.z >> up);
-        terrimp_box box;
-        terrimpi_site_box(v, &s, &box);
-        if (terrimp_box_distance(&box, v->camera.eye) >= v->desc.fade_start &&
-            terrimpi_list_impostor(v, s.number, 2.0f * TERRIMPI_STALE))
-            return 1;
-    }
-    return 0;
-}
-
-/* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
-static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrimp_pattern *found)
-{
-    memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
-    terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST,
-                         v->ground.draws[draw].pattern, found);
-}
-
-/* Shows a unit's ground. */
-static void terrimpi_show_ground(terrimp_view *v, const terrimpi_unit *unit)
-{
-    terrimp_pattern pattern;
-    uint32_t i;
-    for (i = 0; i < unit->leaf_count; i++) {
-        uint32_t leaf = v->leaves[unit->first_leaf + i];
-        v->shown[leaf] = 1;
-        terrimpi_ground_pattern(v, leaf, &pattern);
-        v->stats.ground++;
-        v->stats.triangles += pattern.triangle_count;
-    }
-}
-
-/* Takes back the impostors from an item on: ground is drawn in their place. */
-static void terrimpi_unlist(terrimp_view *v, uint32_t first)
-{
-    while (v->item_count > first) {
-        terrimpi_record *record = &v->records[v->items[--v->item_count]];
-        record->listed = 0;
-        v->stats.impostors--;
-        v->stats.impostors_by_level[terrimpi_tree_node(&v->terrain->tree, record->node).level]--;
-    }
-}
-
-/* Settles what each unit is drawn as, now that it is known which pictures will exist. An impostor
-   that is drawn for other units too does not fade. */
-static void terrimpi_settle(terrimp_view *v)
-{
-    float band = v->desc.fade_end - v->desc.fade_start;
-    uint32_t u, i;
-    v->item_count = 0;
-    for (u = 0; u < v->unit_count; u++) {
-        const terrimpi_unit *unit = &v->units[u];
-        uint32_t before = v->item_count;
-        int covered = unit->want_count > 0;
-        for (i = 0; i < unit->want_count; i++)
-            covered &= terrimpi_list_want(v, &v->wants[unit->first_want + i]);
-        if (!covered)
-            terrimpi_unlist(v, before);
-        if (!covered || unit->closest < v->desc.fade_end)
-            terrimpi_show_ground(v, unit);
-        for (i = before; i < v->item_count; i++)
-            v->records[v->items[i]].alpha =
-                terrimpi_min(1.0f, (unit->closest - v->desc.fade_start) / band);
-    }
-    for (i = 0; i < v->item_count; i++) {
-        terrimp_node s = terrimpi_tree_node(&v->terrain->tree, v->records[v->items[i]].node);
-        float angle, parallax;
-        terrimp_mesh_info mesh;
-        uint32_t parts;
-        terrimpi_judge(v, terrimpi_picture(v, v->items[i], &parts), &s, &angle, &parallax);
-        terrimpi_mesh_place(v->terrain, s.number, &mesh);
-        v->stats.triangles += mesh.index_count / 3u * parts;
-        v->stats.draws += parts;
-        v->stats.worst_angle_rad = terrimpi_max(v->stats.worst_angle_rad, angle);
-        v->stats.worst_parallax_px = terrimpi_max(v->stats.worst_parallax_px, parallax);
-    }
-}
+/* ---- a frame ---- */
 
 /* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
    that starts there above the ground passes through the ground before it meets the floor; one that
    comes in below the terrain's outer border does not. */
-static int terrimpi_floor_wanted(const terrimp_view *v)
+static int terrimpi_view_over(const terrimpi_frame *f)
 {
-    const terrimp_terrain *t = v->terrain;
-    terrimp_node root = terrimpi_tree_root(&t->tree);
+    const float *eye = f->camera.eye;
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_box box;
-    terrimpi_node_box(t, &root, &box);
-    return v->stats.impostors > 0 && v->camera.eye[0] >= box.min[0] &&
-           v->camera.eye[0] <= box.max[0] && v->camera.eye[2] >= box.min[2] &&
-           v->camera.eye[2] <= box.max[2] && v->camera.eye[1] >= box.min[1];
+    terrimpi_node_box(f->terrain, &root, &box);
+    return eye[0] >= box.min[0] && eye[0] <= box.max[0] && eye[2] >= box.min[2] &&
+           eye[2] <= box.max[2] && eye[1] >= box.min[1];
+}
+
+/* Lists what each region is drawn as, now that it is known which pictures will exist. */
+static void terrimpi_view_list(terrimp_view *v)
+{
+    uint32_t i, impostors = 0;
+    v->draw_count = 0;
+    for (i = 0; i < v->region_count; i++) {
+        int kind = v->regions[i].kind;
+        while (!terrimpi_view_kinds[kind].list(v, &v->regions[i]))
+            kind--;
+    }
+    for (i = 0; i < v->draw_count; i++)
+        impostors += v->draws[i].kind == TERRIMPI_KIND_IMPOSTOR ? 1u : 0u;
+    if (impostors > 0 && terrimpi_view_over(&v->frame))
+        terrimpi_view_add(v, TERRIMPI_KIND_FLOOR, 0);
+}
+
+/* What a draw adds to the statistics. */
+static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_draw *draw,
+                                     terrimp_stats *s)
+{
+    if (draw->kind == TERRIMPI_KIND_GROUND) {
+        terrimp_pattern pattern;
+        terrimpi_ground_pattern(v, draw->index, &pattern);
+        s->ground++;
+        s->draws++;
+        s->triangles += pattern.triangle_count;
+    } else if (draw->kind == TERRIMPI_KIND_IMPOSTOR) {
+        const terrimpi_picture *p = &v->cache.pictures[draw->index];
+        terrimp_mesh_info mesh;
+        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
+        s->impostors++;
+        s->impostors_by_level[p->node.level]++;
+        s->draws += p->layers_now;
+        s->triangles += mesh.index_count / 3u * p->layers_now;
+        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
+        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
+    } else {
+        s->draws++;
+        s->triangles += terrimpi_floor_indices(v->terrain) / 3u;
+    }
 }
 
 /* The rest of the statistics. */
-static void terrimpi_count_frame(terrimp_view *v)
+static void terrimpi_view_count_frame(terrimp_view *v)
 {
-    const terrimp_terrain *t = v->terrain;
     terrimp_stats *s = &v->stats;
     float tan_x, tan_y;
-    uint32_t i, u;
-    s->visible = v->unit_count;
-    s->ground_tolerance_px = v->ground.tolerance_px;
-    s->draws += s->ground;
-    if (terrimpi_floor_wanted(v)) {
-        s->draws++;
-        s->triangles += terrimpi_floor_indices(t) / 3u;
-    }
-    for (u = 0; u < v->unit_count; u++) {
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        terrimpi_view_count_draw(v, &v->draws[i], s);
+    s->visible = v->region_count;
+    s->evictions = v->cache.evictions;
+    s->atlas_failures = v->cache.failures;
+    for (i = 0; i < v->region_count; i++) {
+        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
         terrimp_box box;
-        terrimpi_site_box(v, &v->units[u].site, &box);
-        if (u == 0 || v->units[u].closest < s->z_near)
-            s->z_near = v->units[u].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->camera.eye));
+        terrimpi_node_box(v->terrain, &node, &box);
+        if (i == 0 || v->regions[i].closest < s->z_near)
+            s->z_near = v->regions[i].closest;
+        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->frame.camera.eye));
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(&v->camera, &tan_x, &tan_y);
+    terrimpi_camera_tangents(&v->frame.camera, &tan_x, &tan_y);
     s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
-        s->texels_used += v->atlases[i].texels_used;
+        s->texels_used += v->cache.atlases[i].texels_used;
     s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
                      s->texels_used;
 }
 
-/* Follows the eye's motion; a jump is none. */
-static void terrimpi_follow(terrimp_view *v, const float before[3])
+/* The next frame for a camera. It follows the eye's motion; a jump is none. */
+static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
+                                          const terrimp_camera *camera)
 {
+    terrimpi_frame f = *before;
     float step[3];
     uint32_t i;
+    f.number++;
+    f.camera = *camera;
+    terrimpi_camera_frustum(camera, &f.frustum);
+    f.pixel_factor = terrimpi_camera_pixel_factor(camera);
     for (i = 0; i < 3u; i++) {
-        step[i] = v->camera.eye[i] - before[i];
-        v->motion[i] = 0.75f * v->motion[i] + 0.25f * step[i];
+        step[i] = camera->eye[i] - before->camera.eye[i];
+        f.motion[i] = 0.75f * before->motion[i] + 0.25f * step[i];
     }
-    if (v->frame <= 1u || terrimpi_length(step) > 0.5f * v->desc.fade_start ||
-        terrimpi_length(v->motion) < 1e-6f * v->desc.fade_start)
-        memset(v->motion, 0, sizeof v->motion);
+    if (f.number <= 1u || terrimpi_length(step) > TERRIMPI_VIEW_JUMP * f.desc->fade_start ||
+        terrimpi_length(f.motion) < 1e-6f * f.desc->fade_start)
+        memset(f.motion, 0, sizeof f.motion);
+    f.speed = terrimpi_length(f.motion);
+    return f;
 }
 
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera)
 {
-    terrimp_camera resolved, before;
-    terrimp_frustum frustum;
-    terrimp_result result;
+    terrimp_camera resolved;
+    terrimpi_frame frame;
     float reuse, spread = 0.0f, drawn = 0.0f;
-    uint32_t i, evictions, failures;
+    uint32_t i;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
-    before = view->camera;
-    frustum = view->frustum;
-    view->camera = resolved;
-    terrimpi_camera_frustum(&resolved, &view->frustum);
-    view->pixel_factor = terrimpi_camera_pixel_factor(&resolved);
-    result = terrimpi_cut_ground(view);
-    if (result != TERRIMP_OK) {
-        view->camera = before;
-        view->frustum = frustum;
-        return result;
-    }
-    view->frame++;
+    frame = terrimpi_frame_next(&view->frame, &resolved);
+    TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
+    view->frame = frame;
+    view->cache.frame = frame.number;
     view->outdated = 0;
-    terrimpi_cancel_jobs(view);
-    reuse = view->stats.reuse; /* these go on */
-    evictions = view->stats.evictions;
-    failures = view->stats.atlas_failures;
+    terrimpi_view_cancel(view);
+    reuse = view->stats.reuse; /* goes on */
     memset(&view->stats, 0, sizeof view->stats);
     view->stats.reuse = reuse;
-    view->stats.evictions = evictions;
-    view->stats.atlas_failures = failures;
-    terrimpi_follow(view, before.eye);
-    view->unit_count = view->leaf_count = view->want_count = 0;
-    terrimpi_visit_tree(view, terrimpi_visit_units);
-    for (i = 0; i < view->unit_count; i++)
-        terrimpi_decide(view, &view->units[i], &spread, &drawn);
-    terrimpi_schedule(view, spread, drawn);
-    memset(view->shown, 0, view->ground.draw_count * sizeof *view->shown);
-    terrimpi_settle(view);
-    terrimpi_count_frame(view);
+    if (!terrimpi_view_full(&view->desc))
+        view->stats.ground_tolerance_px = terrimpi_min(
+            view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
+    for (i = 0; i < view->region_count; i++)
+        terrimpi_view_decide(view, &view->regions[i], &spread, &drawn);
+    terrimpi_view_schedule(view, spread, drawn);
+    terrimpi_view_list(view);
+    terrimpi_view_count_frame(view);
     return TERRIMP_OK;
 }
 
-/* ---- the commands ---- */
-
-/* Notes that a record has a new picture. */
-static void terrimpi_finish_job(terrimp_view *v, const terrimpi_job *job)
+/* Notes that a picture has been made. */
+static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
 {
-    terrimpi_record *record = &v->records[job->record];
+    terrimpi_picture *p = job->picture;
     uint32_t i;
-    if (record->part_count > 0) {
-        float frames = (float)record->drawn_count;
+    if (p->layer_count > 0) {
+        float frames = (float)p->drawn_count;
         v->stats.reuse += (frames - v->stats.reuse) * (v->stats.reuse > 0.0f ? 0.02f : 1.0f);
+        if (memcmp(job->slots, p->slots, sizeof p->slots) != 0)
+            terrimpi_cache_free(&v->cache, p->slots, p->layer_count);
     }
-    terrimpi_drop_unshared(v, job, record->parts, record->part_count);
-    record->part_count = job->part_count;
-    memcpy(record->parts, job->parts, sizeof record->parts);
-    record->drawn_count = 0;
-    record->sharpness = job->wanted;
-    record->cost = job->cost;
-    memcpy(record->eye, job->captures[0].eye, sizeof record->eye);
-    for (i = 0; i < job->part_count; i++)
-        terrimpi_texture_matrix(&job->captures[i], &job->rects[i], v->desc.atlas_size,
-                                v->desc.atlas_size, record->texture_matrix[i]);
-}
-
-/* Makes a part of a picture, or a piece of one. */
-static void terrimpi_render_part(const terrimp_view *v, const terrimpi_job *job, uint32_t part,
-                                 const terrimp_callbacks *callbacks)
-{
-    const terrimp_heightfield *field = &v->terrain->desc.field;
-    terrimp_capture_command command;
-    terrimp_ground_command ground;
-    terrimpi_pattern pattern;
-    terrimp_box box;
-    float border;
-    uint32_t k;
-    memset(&command, 0, sizeof command);
-    command.node = job->site.number;
-    command.level = job->site.level;
-    command.part = part;
-    command.atlas = job->parts[part].atlas;
-    command.slot = job->rects[part];
-    command.clear = job->cell_from == 0;
-    command.complete = job->cell_to == job->cell_count;
-    terrimp_capture_matrices(&job->captures[part], v->camera.depth_zero_to_one, command.view,
-                             command.projection);
-    memcpy(command.eye, job->captures[part].eye, sizeof command.eye);
-    terrimpi_site_box(v, &job->site, &box);
-    border = (float)(terrimpi_strip_quads(v->terrain->desc.chunk_quads, job->strip)
-                     << job->source);
-    command.clip_min[0] = box.min[0] - border * field->spacing_x;
-    command.clip_min[1] = box.min[2] - border * field->spacing_z;
-    command.clip_max[0] = box.max[0] + border * field->spacing_x;
-    command.clip_max[1] = box.max[2] + border * field->spacing_z;
-    callbacks->begin_capture(callbacks->user, &command);
-    memset(&ground, 0, sizeof ground);
-    ground.level = job->source;
-    for (k = job->cell_from; k < job->cell_to; k++) {
-        if (!terrimpi_cell(v, job, k, &ground.node, &pattern) ||
-            !terrimpi_cell_in_part(v, job, ground.node, part))
-            continue;
-        ground.first_index = pattern.first_index;
-        ground.index_count = pattern.index_count;
-        callbacks->draw_ground(callbacks->user, &ground);
+    p->layer_count = job->plan.layer_count;
+    memcpy(p->slots, job->slots, sizeof p->slots);
+    p->drawn_count = 0;
+    p->sharpness = job->sharpness;
+    p->cost = job->cost;
+    memcpy(p->eye, job->plan.camera.eye, sizeof p->eye);
+    for (i = 0; i < p->layer_count; i++) {
+        terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
+        terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
+        terrimpi_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                p->texture_matrix[i]);
     }
-    callbacks->end_capture(callbacks->user, &command);
 }
 
 /* Makes a picture, or a piece of one. */
-static void terrimpi_render_capture(terrimp_view *v, const terrimpi_job *job,
-                                    const terrimp_callbacks *callbacks)
+static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
+                                  const terrimp_callbacks *callbacks)
 {
-    uint32_t part;
-    for (part = 0; part < job->part_count; part++)
-        terrimpi_render_part(v, job, part, callbacks);
-    if (job->cell_to < job->cell_count) {
-        v->opened.cell_from = job->cell_to;
+    terrimp_capture_command command;
+    uint32_t layer;
+    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    for (layer = 0; layer < job->plan.layer_count; layer++) {
+        memset(&command, 0, sizeof command);
+        command.atlas = job->slots[layer].atlas;
+        command.slot = terrimpi_cache_rect(&v->cache, &job->slots[layer]);
+        command.clear = job->from == 0;
+        command.complete = job->to == job->draw_count;
+        terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
+                              &command, v->frame.camera.depth_zero_to_one, callbacks);
+    }
+    job->from = job->to;
+    if (job->to < job->draw_count)
         return;
-    }
-    terrimpi_finish_job(v, job);
-    if (v->open && v->opened.record == job->record)
+    terrimpi_view_finish(v, job);
+    if (v->open && &v->jobs[v->open - 1u] == job)
         v->open = 0;
-}
-
-static void terrimpi_render_impostor(terrimp_view *v, terrimpi_record *record,
-                                     const terrimp_callbacks *callbacks)
-{
-    terrimp_impostor_command command;
-    terrimp_mesh_info mesh;
-    uint32_t part;
-    terrimpi_mesh_place(v->terrain, record->node, &mesh);
-    memset(&command, 0, sizeof command);
-    command.node = record->node;
-    command.level = terrimpi_tree_node(&v->terrain->tree, record->node).level;
-    command.part_count = record->part_count;
-    command.base_vertex = mesh.base_vertex;
-    command.first_index = mesh.first_index;
-    command.index_count = mesh.index_count;
-    command.alpha = record->alpha;
-    record->drawn_count++;
-    for (part = 0; part < record->part_count; part++) {
-        command.part = part;
-        command.atlas = record->parts[part].atlas;
-        memcpy(command.eye, record->eye, sizeof command.eye);
-        memcpy(command.texture_matrix, record->texture_matrix[part],
-               sizeof command.texture_matrix);
-        callbacks->draw_impostor(callbacks->user, &command);
-    }
-}
-
-static void terrimpi_render_floor(const terrimp_view *v, const terrimp_callbacks *callbacks)
-{
-    terrimp_floor_command command;
-    memset(&command, 0, sizeof command);
-    command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
-    command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_indices(v->terrain);
-    callbacks->draw_floor(callbacks->user, &command);
-}
-
-static void terrimpi_render_ground(const terrimp_view *v, uint32_t index,
-                                   const terrimp_callbacks *callbacks)
-{
-    const terrimp_geomip_draw *draw = &v->ground.draws[index];
-    terrimp_ground_command command;
-    terrimp_pattern pattern;
-    terrimpi_ground_pattern(v, index, &pattern);
-    memset(&command, 0, sizeof command);
-    command.node = draw->node.number;
-    command.level = draw->node.level;
-    command.first_index = pattern.first_index;
-    command.index_count = pattern.index_count;
-    command.morph = draw->morph;
-    memcpy(command.side, draw->side, sizeof command.side);
-    memcpy(command.side_coarse, draw->side_coarse, sizeof command.side_coarse);
-    callbacks->draw_ground(callbacks->user, &command);
 }
 
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks)
 {
     uint32_t i;
+    int kind;
     TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(view->frame == 0 || view->outdated, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
     if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
     for (i = 0; i < view->job_count; i++)
-        terrimpi_render_capture(view, &view->jobs[i], callbacks);
+        terrimpi_view_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
-    for (i = 0; i < view->leaf_count; i++)
-        if (view->shown[view->leaves[i]])
-            terrimpi_render_ground(view, view->leaves[i], callbacks);
-    for (i = 0; i < view->item_count; i++)
-        terrimpi_render_impostor(view, &view->records[view->items[i]], callbacks);
-    if (callbacks->draw_floor && terrimpi_floor_wanted(view))
-        terrimpi_render_floor(view, callbacks);
+    for (kind = 0; kind < TERRIMPI_KIND_COUNT; kind++)
+        for (i = 0; i < view->draw_count; i++)
+            if (view->draws[i].kind == kind)
+                terrimpi_view_kinds[kind].emit(view, &view->draws[i], callbacks);
     return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats)
 {
     TERRIMPI_REFUSE(!view || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(view->frame == 0, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
     *stats = view->stats;
     return TERRIMP_OK;
 }

@@ -75,7 +75,7 @@ static void draw_nodes(const terrimp_quadtree *tree, const terrimp_geomip_view *
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
         const terrimp_pattern *pattern = &patterns[draw->pattern];
-        const float *colour = gl_geomip_colour(draw->node.level);
+        const float *colour = gl_level_colour(draw->node.level);
         if (!arrays[draw->node.number])
             fill_vertices(tree, draw->node.number);
         glUniform4f(tint, colour[0], colour[1], colour[2], outlined);

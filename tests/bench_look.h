@@ -34,7 +34,7 @@ static void look_open(look *l, int kind, scene *s)
     s->shading = kind == LOOK_MATERIALS ? shading_source : NULL;
     if (kind == LOOK_TREES) {
         l->chunks = scene_terrain(s, scene_chunk_quads[0]);
-        look_need(trees_open(&l->trees, s->terrain[l->chunks], &s->tour.field, LOOK_TREE_COUNT));
+        look_need(trees_open(&l->trees, s->terrain[l->chunks], &s->tour.field, LOOK_TREE_COUNT, 0));
     }
 }
 

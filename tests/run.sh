@@ -192,6 +192,7 @@ if compiler=$(thread_sanitizer); then
 else
     skip "threads, ThreadSanitizer: no compiler here has one that runs"
 fi
+suite "the viewer" "sh tests/viewer.sh"
 suite "documentation" "sh tests/docs.sh"
 suite "hygiene" "sh tests/hygiene.sh"
 suite "examples" "sh tests/examples.sh"

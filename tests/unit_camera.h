@@ -174,7 +174,7 @@ static void camera_pixel_factor_is_pixels_at_distance_one(void)
     int i;
     for (i = 0; i < 1000; i++) {
         terrimp_camera camera;
-        float factor;
+        float factor = 0.0f;
         double wanted;
         random_camera(1.0f, &camera);
         CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);

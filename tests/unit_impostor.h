@@ -22,7 +22,7 @@ static void impostor_size_is_that_of_hess(void)
         terrimp_capture c;
         terrimp_camera camera;
         uint32_t size[2];
-        float factor, scale = 0.0f, texels = random_float(0.2f, 4.0f);
+        float factor = 0.0f, scale = 0.0f, texels = random_float(0.2f, 4.0f);
         double tan_y, tan_x, wide, high;
         if (!random_capture(i % 7, &box, &c))
             continue;
@@ -299,7 +299,7 @@ static void view_angle_is_the_worst_of_the_corners(void)
     int i, small = 0;
     for (i = 0; i < 20000; i++) {
         terrimp_box box;
-        float eye[3], other[3], angle;
+        float eye[3], other[3], angle = 0.0f;
         double wanted;
         random_sight(i % 6, &box, eye);
         moved_eye(&box, eye, other);

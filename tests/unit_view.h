@@ -1694,7 +1694,7 @@ static void geomip_draws_the_selection(void)
             const terrimp_camera *camera = pilot_next(&p, &l);
             flight_update(f, camera);
             flight_render(f);
-            CHECK(terrimp_geomip_select(&tree, &view, &f->camera) == TERRIMP_OK);
+            CHECK(terrimp_geomip_select(&tree, &view, camera) == TERRIMP_OK);
             CHECK(f->item_count == view.draw_count);
             CHECK(f->stats.triangles == view.triangle_count);
             for (i = 0; i < f->item_count && i < view.draw_count; i++) {

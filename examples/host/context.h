@@ -1,5 +1,6 @@
 /* An OpenGL context without a window, 3.3 or an old one, and one framebuffer to draw frames into.
-   OSMesa (-DHOST_OSMESA) or EGL without a surface (-DHOST_EGL): only context.c knows which. */
+   OSMesa (-DHOST_OSMESA) or EGL without a surface (-DHOST_EGL): only context.c knows which. A
+   program with a window fills in a context of its own, and uses context_bind and context_read. */
 #ifndef HOST_CONTEXT_H
 #define HOST_CONTEXT_H
 
@@ -11,7 +12,8 @@ typedef struct context {
     int width, height;     /* of the frame, pixels */
     GLuint framebuffer;    /* RGBA8 colour with 24-bit depth, own making: alike on both systems */
     GLuint colour, depth;  /* its renderbuffers */
-    uint8_t *reading;      /* RGBA rows on their way to context_read */
+    int clip_x, clip_width; /* only these columns are drawn; width 0: all */
+    uint8_t *reading;      /* [height][width][4] on its way to context_read */
     void *system;          /* what the windowless system keeps */
 } context;
 
@@ -24,7 +26,8 @@ const char *context_open(context *c, int width, int height);
    8 bits of alpha and 24 of depth. */
 const char *context_open_old(context *c, int width, int height);
 
-/* Draw calls go to the frame again (after a capture); the viewport is all of it. */
+/* Draw calls go to the frame again (after a capture); the viewport is all of it, the
+   scissor its clip. */
 void context_bind(const context *c);
 
 /* Waits for the frame and copies it to rgb[height][width][3], top row first. */

@@ -233,7 +233,7 @@ static void draw_node(const gl_geomip *g, const gl_program *p, const terrimp_geo
 {
     const terrimp_pattern *pattern = &g->patterns[draw->pattern];
     if (p == &g->line)
-        glUniform3fv(p->tint, 1, gl_geomip_colour(draw->node.level));
+        glUniform3fv(p->tint, 1, gl_level_colour(draw->node.level));
     if (is_morphing(g)) {
         glUniform1f(p->morph, draw->morph);
         glUniform4fv(p->side, 1, draw->side);
@@ -282,10 +282,3 @@ terrimp_result gl_geomip_wireframe(gl_geomip *g)
     return result;
 }
 
-const float *gl_geomip_colour(uint32_t level)
-{
-    static const float colours[6][3] = { { 0.80f, 0.10f, 0.05f }, { 0.05f, 0.20f, 0.75f },
-                                         { 0.95f, 0.75f, 0.05f }, { 0.55f, 0.05f, 0.60f },
-                                         { 0.05f, 0.60f, 0.65f }, { 0.05f, 0.05f, 0.05f } };
-    return colours[level % 6];
-}

@@ -35,9 +35,6 @@ terrimp_result gl_geomip_draw(gl_geomip *g);
 /* Draws the triangles as lines over the frame, coloured by level. */
 terrimp_result gl_geomip_wireframe(gl_geomip *g);
 
-/* A colour for a level, each component 0 to 1. */
-const float *gl_geomip_colour(uint32_t level);
-
 void gl_geomip_close(gl_geomip *g);
 
 #endif

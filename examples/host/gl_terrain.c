@@ -8,8 +8,8 @@
 /* ---- Shaders ------------------------------------------------------------ */
 
 /* All positions are taken relative to the eye first: large coordinates keep their precision. */
-#define VERTEX_HEAD                           \
-    "#version 330 core\n"                     \
+#define VERTEX_HEAD                            \
+    GL_SHADER_HEAD "invariant gl_Position;\n"  \
     "layout(location = 0) in vec3 position;\n"
 
 #define VERTEX_MAIN                                               \
@@ -46,7 +46,7 @@ const char gl_morphing_vertex[] = VERTEX_HEAD
 
 /* Fragment shaders of terrain: this head, the text that shades, as in gl_terrain_desc, a main. */
 #define FRAGMENT_HEAD               \
-    "#version 330 core\n"           \
+    GL_SHADER_HEAD                  \
     "uniform sampler2D lightmap;\n" \
     "uniform float on_screen;\n"    \
     "in vec2 uv;\n"                 \
@@ -69,9 +69,7 @@ static const char fragment_head[] = FRAGMENT_HEAD, lightmap_alone[] = LIGHTMAP_A
 
 const char gl_ground_fragment[] = FRAGMENT_HEAD LIGHTMAP_ALONE GROUND_MAIN;
 
-static const char impostor_vertex[] =
-    "#version 330 core\n"
-    "in vec3 position;\n"
+static const char impostor_vertex[] = VERTEX_HEAD
     "uniform mat4 matrix, texture_matrix;\n"
     "uniform vec3 eye, picture_eye;\n"
     "out vec2 uv;\n"
@@ -97,8 +95,7 @@ static const char impostor_main[] =
     "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
     "}\n";
 
-const char gl_line_fragment[] =
-    "#version 330 core\n"
+const char gl_line_fragment[] = GL_SHADER_HEAD
     "uniform vec3 tint;\n"
     "out vec4 colour;\n"
     "void main() { colour = vec4(tint, 1.0); }\n";
@@ -180,11 +177,17 @@ void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t of
 
 /* ---- Buffers and textures ----------------------------------------------- */
 
-/* Indices are sent as if they were vertices: the other target belongs to the bound vertex array. */
 static void send(GLuint buffer, size_t first, size_t bytes, const void *data)
 {
     glBindBuffer(GL_ARRAY_BUFFER, buffer);
     glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)bytes, data);
+}
+
+/* Indices belong to a vertex array; WebGL lets them be sent in no other way. */
+static void send_indices(GLuint array, size_t first, size_t bytes, const void *data)
+{
+    glBindVertexArray(array);
+    glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)bytes, data);
 }
 
 /* A pool for as many nodes as fit into so many bytes, at least one and at most all. */
@@ -219,6 +222,12 @@ static void make_buffers(gl_pool *p, size_t vertices, size_t indices)
     glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(indices * sizeof(uint16_t)), NULL,
                  GL_STATIC_DRAW);
     gl_point(0, 3, GL_FLOAT, 0, 0);
+}
+
+static void close_lines(gl_lines *lines)
+{
+    glDeleteVertexArrays(1, &lines->array);
+    glDeleteBuffers(1, &lines->indices);
 }
 
 static void close_pool(gl_pool *p)
@@ -300,7 +309,8 @@ static terrimp_result send_triangles(gl_terrain *g, uint32_t node, uint32_t slot
     if (result != TERRIMP_OK)
         return result;
     send(p->vertices, slot * p->node_vertices * vertex_bytes, vertex_count * vertex_bytes, g->xyz);
-    send(p->indices, slot * p->node_indices * index_bytes, index_count * index_bytes, g->indices);
+    send_indices(p->array, slot * p->node_indices * index_bytes, index_count * index_bytes,
+                 g->indices);
     return TERRIMP_OK;
 }
 
@@ -326,10 +336,12 @@ static terrimp_result fill_ground(gl_terrain *g, const terrimp_terrain_info *inf
     if (!open_pool(p, info->node_count, bytes))
         return result;
     make_buffers(p, 0, info->ground_index_count);
-    indices = glMapBuffer(GL_ELEMENT_ARRAY_BUFFER, GL_WRITE_ONLY);
+    indices = malloc(info->ground_index_count * sizeof *indices);
     if (indices)
         result = terrimp_terrain_fill_indices(g->terrain, indices, info->ground_index_count);
-    glUnmapBuffer(GL_ELEMENT_ARRAY_BUFFER);
+    if (result == TERRIMP_OK)
+        send_indices(p->array, 0, info->ground_index_count * sizeof *indices, indices);
+    free(indices);
     fill_pool(g, p);
     return result;
 }
@@ -359,7 +371,7 @@ static int make_room(gl_terrain *g, const terrimp_terrain_info *info)
     g->floor_vertices = info->mesh_vertex_count - info->node_count * info->mesh_vertex_stride;
     g->floor_indices = info->mesh_index_count - info->node_count * info->mesh_index_stride;
     vertices = larger(vertices, g->floor_vertices);
-    indices = larger(info->mesh_index_stride, g->floor_indices);
+    indices = larger((size_t)info->mesh_index_stride * 3, g->floor_indices); /* and its lines */
     g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
     g->indices = malloc(indices * sizeof *g->indices);
     g->morph = malloc(info->ground_vertex_count * sizeof *g->morph);
@@ -446,7 +458,7 @@ static int make_lightmap(gl_terrain *g, const terrimp_heightfield *field, const 
     g->field[3] = 0.5f / (float)depth - field->origin_z * step_z;
     g->lightmap = make_texture(GL_LINEAR_MIPMAP_LINEAR, GL_LINEAR);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, (GLsizei)width, (GLsizei)depth, 0, GL_RGB,
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, (GLsizei)width, (GLsizei)depth, 0, GL_RGB,
                  GL_UNSIGNED_BYTE, rgb);
     glGenerateMipmap(GL_TEXTURE_2D);
     free(smaller);
@@ -527,6 +539,8 @@ void gl_terrain_close(gl_terrain *g)
 {
     close_pool(&g->ground_pool);
     close_pool(&g->mesh_pool);
+    close_lines(&g->ground_lines);
+    close_lines(&g->mesh_lines);
     glDeleteVertexArrays(1, &g->morphing_array);
     glDeleteBuffers(1, &g->moves);
     glDeleteBuffers(1, &g->weights);
@@ -575,19 +589,48 @@ void gl_program_use(const gl_program *p, const float matrix[16], const float eye
     glUniform1f(p->on_screen, (float)on_screen);
 }
 
+/* Where an index stands in the bound index buffer, as OpenGL wants it: a number in a pointer. */
+static const void *index_offset(uint32_t first_index)
+{
+    return (const void *)(uintptr_t)(first_index * sizeof(uint16_t));
+}
+
+/* Draws indices of a slot. OpenGL ES has no base vertex: there the attribute is pointed at it. */
+static void draw_slot(GLuint array, const gl_pool *p, GLenum primitive, uint32_t slot,
+                      uint32_t index_count, const void *offset)
+{
+    glBindVertexArray(array);
+#ifdef HOST_ES
+    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
+    gl_point(0, 3, GL_FLOAT, 0, (size_t)slot * p->node_vertices * 3 * sizeof(float));
+    glDrawElements(primitive, (GLsizei)index_count, GL_UNSIGNED_SHORT, offset);
+#else
+    glDrawElementsBaseVertex(primitive, (GLsizei)index_count, GL_UNSIGNED_SHORT, offset,
+                             (GLint)(slot * p->node_vertices));
+#endif
+}
+
 /* Sends the waiting ground draws; they all have one state. */
 static void flush(gl_terrain *g)
 {
     gl_batch *b = &g->batch;
-    const gl_program *p = g->lines ? &g->line : &g->ground;
+    const gl_pool *p = &g->ground_pool;
     if (!b->count)
         return;
-    glUseProgram(p->id);
-    glBindVertexArray(g->ground_pool.array);
+    glUseProgram(g->ground.id);
     glBindTexture(GL_TEXTURE_2D, g->lightmap);
-    glUniform3f(p->tint, 0.05f, 0.10f, 0.25f);
+#ifdef HOST_ES
+    {
+        GLsizei i;
+        for (i = 0; i < b->count; i++)
+            draw_slot(p->array, p, GL_TRIANGLES, (uint32_t)b->base_vertices[i] / p->node_vertices,
+                      (uint32_t)b->counts[i], b->offsets[i]);
+    }
+#else
+    glBindVertexArray(p->array);
     glMultiDrawElementsBaseVertex(GL_TRIANGLES, b->counts, GL_UNSIGNED_SHORT, b->offsets,
                                   b->count, b->base_vertices);
+#endif
     b->count = 0;
 }
 
@@ -598,7 +641,6 @@ void gl_terrain_turn_to_frame(gl_terrain *g)
     flush(g);
     g->target = GL_TO_FRAME;
     context_bind(g->frame);
-    glDisable(GL_SCISSOR_TEST);
     if (!g->cleared) {
         glClearColor((float)g->sky[0] / 255.0f, (float)g->sky[1] / 255.0f,
                      (float)g->sky[2] / 255.0f, 1.0f);
@@ -633,7 +675,7 @@ static void begin_capture(void *user, const terrimp_capture_command *command)
     const terrimp_rect *slot = &command->slot;
     float matrix[16];
     g->capturing = 1;
-    if (g->lines)
+    if (g->over)
         return;
     turn_to_atlas(g, (int)command->atlas);
     glViewport((GLint)slot->x, (GLint)slot->y, (GLsizei)slot->width, (GLsizei)slot->height);
@@ -651,42 +693,41 @@ static void end_capture(void *user, const terrimp_capture_command *command)
     g->capturing = 0;
 }
 
-/* Where an index stands in the bound index buffer, as OpenGL wants it: a number in a pointer. */
-static const void *index_offset(uint32_t first_index)
-{
-    return (const void *)(uintptr_t)(first_index * sizeof(uint16_t));
-}
-
 /* Draws a slot of the coarse meshes; the program has its own uniforms already. */
 static void draw_mesh(gl_terrain *g, GLuint texture, uint32_t slot, uint32_t index_count)
 {
     const gl_pool *meshes = &g->mesh_pool;
-    glBindVertexArray(meshes->array);
     glBindTexture(GL_TEXTURE_2D, texture);
-    glDrawElementsBaseVertex(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT,
-                             index_offset(slot * meshes->node_indices),
-                             (GLint)(slot * meshes->node_vertices));
+    draw_slot(meshes->array, meshes, GL_TRIANGLES, slot, index_count,
+              index_offset(slot * meshes->node_indices));
 }
+
+static void draw_mesh_over(gl_terrain *g, const terrimp_impostor_command *c, uint32_t slot);
 
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     gl_terrain *g = (gl_terrain *)user;
-    const gl_program *p = g->lines ? &g->line : &g->impostor;
+    const gl_program *p = &g->impostor;
+    uint32_t slot;
     gl_terrain_turn_to_frame(g);
     flush(g);
+    slot = slot_of(g, &g->mesh_pool, c->node);
+    if (g->over) {
+        draw_mesh_over(g, c, slot);
+        return;
+    }
     glUseProgram(p->id);
-    glUniform3f(p->tint, 0.85f, 0.10f, 0.05f);
     glUniform1f(p->alpha, c->alpha);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
     glUniform3fv(p->picture_eye, 1, c->eye);
-    draw_mesh(g, g->atlas[c->atlas], slot_of(g, &g->mesh_pool, c->node), c->index_count);
+    draw_mesh(g, g->atlas[c->atlas], slot, c->index_count);
 }
 
 /* The floor only fills what would else be holes: its outlines would hide those that matter. */
 static void draw_floor(void *user, const terrimp_floor_command *c)
 {
     gl_terrain *g = (gl_terrain *)user;
-    if (g->lines)
+    if (g->over)
         return;
     gl_terrain_turn_to_frame(g);
     flush(g);
@@ -715,18 +756,24 @@ static void draw_morphing(gl_terrain *g, const terrimp_ground_command *c, uint32
                    index_offset(c->first_index));
 }
 
+static void draw_ground_over(gl_terrain *g, const terrimp_ground_command *c, uint32_t slot);
+
 static void draw_ground(void *user, const terrimp_ground_command *command)
 {
     gl_terrain *g = (gl_terrain *)user;
     gl_batch *b = &g->batch;
     uint32_t slot;
     GLsizei i;
-    if (g->capturing && g->lines)
+    if (g->capturing && g->over)
         return;
     if (!g->capturing)
         gl_terrain_turn_to_frame(g);
     slot = slot_of(g, &g->ground_pool, command->node);
-    if (g->morphing.id && !g->capturing && !g->lines) {
+    if (g->over) {
+        draw_ground_over(g, command, slot);
+        return;
+    }
+    if (g->morphing.id && !g->capturing) {
         draw_morphing(g, command, slot);
         return;
     }
@@ -751,6 +798,16 @@ terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node)
         return send_floor(g);
     result = resend(g, &g->ground_pool, node);
     return result == TERRIMP_OK ? resend(g, &g->mesh_pool, node) : result;
+}
+
+int gl_terrain_relight(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *lightmap)
+{
+    terrimp_heightfield resolved;
+    GLint limit = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
+    glDeleteTextures(1, &g->lightmap);
+    return terrimp_heightfield_resolve(field, &resolved) == TERRIMP_OK
+           && make_lightmap(g, &resolved, lightmap, (uint32_t)limit);
 }
 
 /* ---- A frame ------------------------------------------------------------ */
@@ -787,27 +844,142 @@ terrimp_callbacks gl_terrain_callbacks(gl_terrain *g)
     return callbacks;
 }
 
-void gl_terrain_end(gl_terrain *g)
+void gl_terrain_send(gl_terrain *g)
 {
     gl_terrain_turn_to_frame(g);
     flush(g);
+}
+
+void gl_terrain_end(gl_terrain *g)
+{
+    gl_terrain_send(g);
     glFinish();
+}
+
+/* ---- Over the frame ----------------------------------------------------- */
+
+const float *gl_level_colour(uint32_t level)
+{
+    static const float colours[6][3] = { { 0.80f, 0.10f, 0.05f }, { 0.05f, 0.20f, 0.75f },
+                                         { 0.95f, 0.75f, 0.05f }, { 0.55f, 0.05f, 0.60f },
+                                         { 0.05f, 0.60f, 0.65f }, { 0.05f, 0.05f, 0.05f } };
+    return colours[level % 6];
+}
+
+/* Each triangle becomes three lines. OpenGL ES has no other way to draw outlines. */
+static void outline(const uint16_t *triangles, size_t index_count, uint16_t *lines)
+{
+    size_t i;
+    for (i = 0; i < index_count; i++) {
+        *lines++ = triangles[i];
+        *lines++ = triangles[i % 3 == 2 ? i - 2 : i + 1];
+    }
+}
+
+/* A vertex array of a pool's vertices with room for so many indices of lines. */
+static void make_line_array(const gl_pool *p, gl_lines *lines, size_t index_count)
+{
+    glGenVertexArrays(1, &lines->array);
+    glBindVertexArray(lines->array);
+    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
+    gl_point(0, 3, GL_FLOAT, 0, 0);
+    glGenBuffers(1, &lines->indices);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, lines->indices);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(index_count * sizeof(uint16_t)), NULL,
+                 GL_DYNAMIC_DRAW);
+}
+
+/* Once, when outlines are first wanted: the lines of all ground. */
+static terrimp_result make_lines(gl_terrain *g)
+{
+    terrimp_terrain_info info;
+    terrimp_result result = terrimp_terrain_get_info(g->terrain, &info);
+    size_t count = info.ground_index_count;
+    uint16_t *indices = malloc(count * 3 * sizeof *indices);
+    if (result == TERRIMP_OK && !indices)
+        result = TERRIMP_E_MEMORY;
+    if (result == TERRIMP_OK)
+        result = terrimp_terrain_fill_indices(g->terrain, indices, info.ground_index_count);
+    if (result == TERRIMP_OK) {
+        make_line_array(&g->ground_pool, &g->ground_lines, count * 2);
+        make_line_array(&g->mesh_pool, &g->mesh_lines, (size_t)g->mesh_pool.node_indices * 2);
+        outline(indices, count, indices + count);
+        send_indices(g->ground_lines.array, 0, count * 2 * sizeof *indices, indices + count);
+    }
+    free(indices);
+    return result;
+}
+
+static void draw_ground_over(gl_terrain *g, const terrimp_ground_command *c, uint32_t slot)
+{
+    glUseProgram(g->line.id);
+    if (g->over == GL_OVER_LEVELS) {
+        glUniform3fv(g->line.tint, 1, gl_level_colour(c->level));
+        draw_slot(g->ground_pool.array, &g->ground_pool, GL_TRIANGLES, slot, c->index_count,
+                  index_offset(c->first_index));
+    } else {
+        glUniform3f(g->line.tint, 0.05f, 0.10f, 0.25f);
+        draw_slot(g->ground_lines.array, &g->ground_pool, GL_LINES, slot, c->index_count * 2,
+                  index_offset(c->first_index * 2));
+    }
+}
+
+/* The lines of one mesh are sent when it is drawn: there are few, of few triangles. */
+static void draw_mesh_over(gl_terrain *g, const terrimp_impostor_command *c, uint32_t slot)
+{
+    const gl_pool *p = &g->mesh_pool;
+    uint16_t *lines = g->indices + p->node_indices;
+    if (c->part > 0) /* the same mesh again */
+        return;
+    glUseProgram(g->line.id);
+    if (g->over == GL_OVER_LEVELS) {
+        glUniform3fv(g->line.tint, 1, gl_level_colour(c->level));
+        draw_mesh(g, 0, slot, c->index_count);
+        return;
+    }
+    if (terrimp_terrain_fill_mesh(g->terrain, c->node, g->xyz, (size_t)p->node_vertices * 3,
+                                  g->indices, p->node_indices) != TERRIMP_OK)
+        return;
+    outline(g->indices, c->index_count, lines);
+    send_indices(g->mesh_lines.array, 0, (size_t)c->index_count * 2 * sizeof *lines, lines);
+    glUniform3f(g->line.tint, 0.85f, 0.10f, 0.05f);
+    draw_slot(g->mesh_lines.array, p, GL_LINES, slot, c->index_count * 2, NULL);
+}
+
+/* Lines are drawn a little nearer than they stand, or the triangles would hide half of them.
+   Levels are blended over the very pixels that their triangles have drawn. */
+terrimp_result gl_terrain_draw_over(gl_terrain *g, terrimp_view *view, gl_over over)
+{
+    terrimp_callbacks callbacks = gl_terrain_callbacks(g);
+    terrimp_result result = TERRIMP_OK;
+    float matrix[16];
+    int i;
+    if (!g->ground_lines.array)
+        result = make_lines(g);
+    if (result != TERRIMP_OK)
+        return result;
+    gl_terrain_send(g);
+    for (i = 0; i < 16; i++)
+        matrix[i] = g->camera_matrix[i] * (over == GL_OVER_LINES && i < 12 ? 0.998f : 1.0f);
+    gl_program_use(&g->line, matrix, g->camera_eye, 1);
+    if (over == GL_OVER_LEVELS) {
+        glEnable(GL_BLEND);
+        glBlendColor(0.0f, 0.0f, 0.0f, 0.4f);
+        glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
+        glDepthFunc(GL_EQUAL);
+    }
+    g->over = over;
+    result = terrimp_view_render(view, &callbacks);
+    g->over = GL_OVER_NOTHING;
+    glDisable(GL_BLEND);
+    glDepthFunc(GL_LEQUAL);
+    return result;
 }
 
 terrimp_result gl_terrain_wireframe(gl_terrain *g, terrimp_view *view)
 {
-    terrimp_callbacks callbacks = gl_terrain_callbacks(g);
-    terrimp_result result;
-    gl_terrain_turn_to_frame(g);
-    g->lines = 1;
-    glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
-    glEnable(GL_POLYGON_OFFSET_LINE);
-    glPolygonOffset(-1.0f, -8.0f);
-    result = terrimp_view_render(view, &callbacks);
-    gl_terrain_end(g);
-    glDisable(GL_POLYGON_OFFSET_LINE);
-    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-    g->lines = 0;
+    terrimp_result result = gl_terrain_draw_over(g, view, GL_OVER_LINES);
+    glFinish();
     return result;
 }
 
@@ -817,8 +989,8 @@ int gl_terrain_read_atlas(const gl_terrain *g, int atlas, uint8_t *rgb)
     uint8_t *rgba = malloc(count * 4);
     if (!rgba)
         return 0;
-    glBindTexture(GL_TEXTURE_2D, g->atlas[atlas]);
-    glGetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+    glBindFramebuffer(GL_FRAMEBUFFER, g->atlas_frame[atlas]);
+    glReadPixels(0, 0, g->atlas_size, g->atlas_size, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
     for (i = 0; i < count * 3; i++) {
         const uint8_t *texel = rgba + i / 3 * 4;
         rgb[i] = (uint8_t)(texel[i % 3] + (255 - texel[3]) / 2);

@@ -45,6 +45,14 @@ void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t of
 
 enum { GL_TO_FRAME = -1, GL_TO_NOTHING = -2 };
 
+/* What may be drawn over a frame: outlines, or its pixels tinted by the level of what drew them. */
+typedef enum gl_over { GL_OVER_NOTHING, GL_OVER_LINES, GL_OVER_LEVELS } gl_over;
+
+/* Outlines of what is in a pool. */
+typedef struct gl_lines {
+    GLuint array, indices;
+} gl_lines;
+
 /* Ground draws of one state, waiting to be sent as one call. */
 enum { GL_BATCH = 256 };
 typedef struct gl_batch {
@@ -112,7 +120,8 @@ typedef struct gl_terrain {
     int target;                      /* where draws go: an atlas, GL_TO_FRAME or GL_TO_NOTHING */
     int cleared;                     /* the frame has been cleared */
     int capturing;                   /* between begin and end of a capture */
-    int lines;                       /* draw outlines, and no captures */
+    gl_over over;                    /* draw that over the frame, and no captures */
+    gl_lines ground_lines, mesh_lines; /* made when they are first wanted */
 } gl_terrain;
 
 /* Fills buffers and textures. Returns null, or one line that says what is wrong; then there is
@@ -125,6 +134,10 @@ const char *gl_terrain_use_morphing(gl_terrain *g);
 /* After an edit: sends a node's ground and its coarse mesh anew; with the number of nodes for a
    node, the floor. */
 terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node);
+
+/* Another lightmap of the same field. Returns 0 when memory runs out. Pictures keep the old light
+   until terrimp_view_invalidate. */
+int gl_terrain_relight(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *lightmap);
 
 /* Starts a frame: clears it to the sky's colour and takes the camera's matrices. */
 terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
@@ -139,7 +152,17 @@ terrimp_callbacks gl_terrain_callbacks(gl_terrain *g);
 /* Sends what is waiting and waits until the frame is drawn. */
 void gl_terrain_end(gl_terrain *g);
 
-/* Draws the view's triangles as lines over the frame. Its captures are not repeated. */
+/* The same without waiting, for frames that go to a window. */
+void gl_terrain_send(gl_terrain *g);
+
+/* A colour for a level, each component 0 to 1. */
+const float *gl_level_colour(uint32_t level);
+
+/* Draws the view once more over the frame, as lines (blue for ground, red for coarse meshes) or in
+   the colours of the levels. Its captures are not repeated. */
+terrimp_result gl_terrain_draw_over(gl_terrain *g, terrimp_view *view, gl_over over);
+
+/* Lines, and waits for them. */
 terrimp_result gl_terrain_wireframe(gl_terrain *g, terrimp_view *view);
 
 /* Copies an atlas to rgb[atlas_size][atlas_size][3], row 0 of the texture first; what is

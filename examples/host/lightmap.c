@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The way to the sun: it stands in the north-west, so that a sweep from the first row to the last
-   meets whatever casts a shadow before what it falls on. */
-static const float sun[3] = { -0.485f, 0.640f, -0.596f };
+/* The way to the sun, unless it is given. It stands in the north, so that a sweep from the first
+   row to the last meets whatever casts a shadow before what it falls on. */
+static const float north_west[3] = { -0.485f, 0.640f, -0.596f };
 
 #define AMBIENT 0.42f
 #define DIFFUSE 0.78f
@@ -15,6 +15,7 @@ static const float sun[3] = { -0.485f, 0.640f, -0.596f };
 /* Three rows of heights around the row that is baked, and the edge of the shadow over it. */
 typedef struct sweep {
     const terrimp_heightfield *field;
+    const float *sun;
     float low, high;               /* of all heights [wu] */
     const float *north, *here, *south; /* heights of rows z - 1, z, z + 1 */
     float *shadow, *next_shadow;   /* height of the shadow's edge over rows z and z + 1 */
@@ -78,7 +79,7 @@ static void bake_texel(const sweep *s, uint32_t x, uint8_t *rgb)
     int i;
     slopes(s, x, &along_x, &along_z);
     upward = 1.0f / sqrtf(1.0f + along_x * along_x + along_z * along_z);
-    facing = (sun[1] - along_x * sun[0] - along_z * sun[2]) * upward;
+    facing = (s->sun[1] - along_x * s->sun[0] - along_z * s->sun[2]) * upward;
     shade = ramp(0.0f, s->softness, s->shadow[x] - s->here[x]);
     light = AMBIENT + DIFFUSE * (facing > 0.0f ? facing : 0.0f) * (1.0f - SHADOW_DEPTH * shade);
     material(height, upward, colour);
@@ -91,15 +92,19 @@ static void bake_texel(const sweep *s, uint32_t x, uint8_t *rgb)
 static void sweep_shadow(sweep *s)
 {
     const terrimp_heightfield *field = s->field;
-    float shift = field->spacing_z / field->spacing_x * sun[0] / sun[2];
-    float sink = field->spacing_z * sun[1] / -sun[2];
-    uint32_t x, whole = (uint32_t)shift;
-    float part = shift - (float)whole, *swap;
+    float shift = field->spacing_z / field->spacing_x * s->sun[0] / s->sun[2];
+    float sink = field->spacing_z * s->sun[1] / -s->sun[2], way = fabsf(shift);
+    uint32_t x, whole = (uint32_t)way, last = field->width - 1;
+    float part = way - (float)whole, *swap;
     for (x = 0; x < field->width; x++)
         if (s->shadow[x] < s->here[x])
             s->shadow[x] = s->here[x];
     for (x = 0; x < field->width; x++) {
         uint32_t a = x > whole ? x - whole : 0, b = a ? a - 1 : 0;
+        if (shift < 0.0f) {
+            a = last - x > whole ? x + whole : last;
+            b = a < last ? a + 1 : last;
+        }
         s->next_shadow[x] = s->shadow[a] + part * (s->shadow[b] - s->shadow[a]) - sink;
     }
     swap = s->shadow;
@@ -160,9 +165,15 @@ static int sweep_begin(sweep *s, const terrimp_heightfield *field)
 
 uint8_t *lightmap_bake(const terrimp_heightfield *field)
 {
+    return lightmap_bake_under(field, north_west);
+}
+
+uint8_t *lightmap_bake_under(const terrimp_heightfield *field, const float sun[3])
+{
     terrimp_heightfield resolved;
     uint8_t *rgb;
     sweep s;
+    s.sun = sun;
     if (terrimp_heightfield_resolve(field, &resolved) != TERRIMP_OK || !sweep_begin(&s, &resolved))
         return NULL;
     rgb = malloc((size_t)field->width * field->depth * 3);

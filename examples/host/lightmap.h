@@ -12,4 +12,7 @@
    voids. */
 uint8_t *lightmap_bake(const terrimp_heightfield *field);
 
+/* The same under another sun: the unit vector towards it. [Limits: y > 0, z < 0] */
+uint8_t *lightmap_bake_under(const terrimp_heightfield *field, const float sun[3]);
+
 #endif

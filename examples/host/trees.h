@@ -16,7 +16,9 @@ typedef struct trees {
     uint32_t *first;         /* [chunks + 1] where a chunk's instances begin */
     GLuint array, vertices, instances;
     gl_program program;
-    GLint clip;              /* its uniform */
+    GLint clip, house;       /* its uniforms */
+    GLsizei vertex_count;    /* of one */
+    int houses;
     gl_terrain *gl;          /* for the callbacks, with what they go round */
     terrimp_callbacks inner;
     trees_draw *draws;       /* [chunks] of the frame, in the order of the ground commands */
@@ -24,10 +26,11 @@ typedef struct trees {
     const terrimp_capture_command *capture; /* within one */
 } trees;
 
-/* Plants up to count trees, the same ones for the same terrain, where it is not too steep. Field:
-   that of the terrain. Returns null, or what is wrong; then there is nothing to close. */
+/* Plants up to count trees, the same ones for the same terrain, where it is not too steep; or
+   builds houses. Field: that of the terrain. Returns null, or what is wrong; then there is nothing
+   to close. */
 const char *trees_open(trees *t, const terrimp_terrain *terrain, const terrimp_heightfield *field,
-                       uint32_t count);
+                       uint32_t count, int houses);
 
 /* Callbacks around gl_terrain's, or around others that are around those: each capture gets its
    trees, and the ground on the screen is taken down for trees_end. */
