@@ -142,7 +142,7 @@
        What moves on the terrain belongs into the host's own draws, not into captures. Ground and
        impostors of one place are alike to within the tolerances, not to the bit: where a node
        changes from one to the other beyond the fade band, that much can be seen to change. From
-       beside the terrain no floor is drawn, since it would show below the border.
+       beside and from under the terrain no floor is drawn, since it would show where the sky is.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -1298,10 +1298,11 @@ typedef struct terrimp_impostor_command {
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
-   below all of the terrain and has no gap. It comes after the impostors and shows only where none
-   of them does: a slope that was hidden when its picture was made, or a seam. Its pixels are
-   terrain in truth too: no holes are left. (An eye beside the terrain could see it below the
-   border: there it is not drawn.) Vertices and indices as for impostors. */
+   below all of the terrain, with walls up to its outer border, without a gap. It comes after the
+   impostors and shows only where none of them does: a slope that was hidden when its picture was
+   made. Its pixels are terrain in truth too: no holes are left. (An eye beside the terrain, or
+   under the ground, could see it where the sky is: there it is not drawn.) Vertices and indices as
+   for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
@@ -5395,6 +5396,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
 
 #define TERRIMPI_DIRECTIONS 8u      /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u    /* along a side of the floor at most: 2048 triangles in all */
+#define TERRIMPI_WALL_POINTS 2u     /* of the walls round it, for each of these */
 #define TERRIMPI_HEIGHT_STEPS 65535 /* of the heights of meshes */
 
 /* What is kept of a node's coarse mesh. Skirts are not stored: they follow from the border loop. */
@@ -5471,15 +5473,31 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     return TERRIMP_OK;
 }
 
-/* Vertices and indices of the floor. */
-static uint32_t terrimpi_floor_vertices(const terrimp_terrain *t)
+/* Vertices and indices of the floor, and of its ground alone. */
+static uint32_t terrimpi_floor_ground_vertices(const terrimp_terrain *t)
 {
     return (t->tree.level_x[t->floor_level] + 1u) * (t->tree.level_z[t->floor_level] + 1u);
 }
 
-static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
+static uint32_t terrimpi_floor_ground_indices(const terrimp_terrain *t)
 {
     return t->tree.level_x[t->floor_level] * t->tree.level_z[t->floor_level] * 6u;
+}
+
+static uint32_t terrimpi_wall_points(const terrimp_terrain *t)
+{
+    return 2u * TERRIMPI_WALL_POINTS *
+           (t->tree.level_x[t->floor_level] + t->tree.level_z[t->floor_level]);
+}
+
+static uint32_t terrimpi_floor_vertices(const terrimp_terrain *t)
+{
+    return terrimpi_floor_ground_vertices(t) + 2u * terrimpi_wall_points(t);
+}
+
+static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
+{
+    return terrimpi_floor_ground_indices(t) + 6u * terrimpi_wall_points(t);
 }
 
 /* Inner points that a border keeps: those of 64 quads are the simplifier's default, and a budget
@@ -5867,14 +5885,14 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
 }
 
-/* Writes the floor: a quad for each node of its level. A corner has the height of the lowest point
-   of the up to four nodes around it, so no quad rises over a sample of its node; and nodes share
-   their corners, so the floor has no gap. */
-static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *indices)
+/* Writes the floor's ground: a quad for each node of its level. A corner has the height of the
+   lowest sample of the up to four nodes around it, so no quad rises over a sample of its node; and
+   nodes share their corners, so it has no gap. */
+static void terrimpi_fill_floor_ground(const terrimp_terrain *t, float *xyz, uint16_t *indices)
 {
     uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
     uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level], x, z, i, k;
-    const terrimpi_mesh *nodes = t->meshes + t->tree.level_first[level];
+    const terrimp_geomip_node *nodes = t->tree.nodes + t->tree.level_first[level];
     terrimpi_pattern all;
     for (z = 0; z <= deep; z++)
         for (x = 0; x <= wide; x++) {
@@ -5892,16 +5910,85 @@ static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *
     terrimpi_emit_quads(indices, &all, wide + 1u);
 }
 
-/* Where a lower skirt ends that hangs from a height of the border: a quarter of the node's heights
-   below it, or twice the mesh's error. Of the borders of 43,680 nodes of 16 quads and more, on
-   three terrains, two were further from the border of a coarser neighbour. Down to the node's
-   lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough terrain, at the
-   same PSNR. */
-static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, float height)
+/* The sample of point k of the floor's walls, round the outer border as round a mesh's. */
+static void terrimpi_wall_place(const terrimp_terrain *t, uint32_t k, uint32_t *x, uint32_t *z)
+{
+    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
+    uint32_t along_x = t->tree.level_x[level] * TERRIMPI_WALL_POINTS;
+    uint32_t along_z = t->tree.level_z[level] * TERRIMPI_WALL_POINTS, col, row;
+    k %= 2u * (along_x + along_z);
+    col = k < along_z                  ? 0
+          : k < along_z + along_x      ? k - along_z
+          : k < 2u * along_z + along_x ? along_x
+                                       : 2u * (along_x + along_z) - k;
+    row = k < along_z                  ? k
+          : k < along_z + along_x      ? along_z
+          : k < 2u * along_z + along_x ? 2u * along_z + along_x - k
+                                       : 0;
+    *x = terrimpi_min_u32(col * quads / TERRIMPI_WALL_POINTS, t->desc.field.width - 1u);
+    *z = terrimpi_min_u32(row * quads / TERRIMPI_WALL_POINTS, t->desc.field.depth - 1u);
+}
+
+/* The lowest sample of a rectangle that two of its corners span. */
+static float terrimpi_lowest(const terrimp_terrain *t, const uint32_t a[2], const uint32_t b[2])
+{
+    float low, high;
+    terrimp_rect r;
+    r.x = terrimpi_min_u32(a[0], b[0]);
+    r.y = terrimpi_min_u32(a[1], b[1]);
+    r.width = terrimpi_max_u32(a[0], b[0]) - r.x + 1u;
+    r.height = terrimpi_max_u32(a[1], b[1]) - r.y + 1u;
+    return terrimpi_height_range(&t->desc.field, r, 0, &low, &high) == TERRIMP_OK
+               ? low : t->sample_low;
+}
+
+/* Writes the floor and its walls. These stand on the outer border and face inwards, from below the
+   floor up to the lowest samples between the points beside, so nowhere over the border. */
+static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *indices)
+{
+    uint32_t ground = terrimpi_floor_ground_vertices(t), i, k, points;
+    uint32_t first = terrimpi_floor_ground_indices(t);
+    terrimp_node root = terrimpi_tree_root(&t->tree);
+    points = terrimpi_wall_points(t);
+    terrimpi_fill_floor_ground(t, xyz, indices);
+    xyz += 3u * ground;
+    for (k = 0; k < points; k++) {
+        uint32_t before[2], at[2], after[2];
+        float *top = xyz + 3u * (points + k);
+        terrimpi_wall_place(t, k + points - 1u, &before[0], &before[1]);
+        terrimpi_wall_place(t, k, &at[0], &at[1]);
+        terrimpi_wall_place(t, k + 1u, &after[0], &after[1]);
+        xyz[3u * k] = top[0] = terrimpi_world_x(t, at[0]);
+        xyz[3u * k + 1u] = t->meshes[root.number].low;
+        xyz[3u * k + 2u] = top[2] = terrimpi_world_z(t, at[1]);
+        top[1] = terrimpi_min(terrimpi_lowest(t, before, at), terrimpi_lowest(t, at, after));
+    }
+    terrimpi_write_wall(indices + first, points, points, 1);
+    for (i = first; i < terrimpi_floor_indices(t); i++)
+        indices[i] = (uint16_t)(indices[i] + ground);
+}
+
+/* Where a lower skirt ends that hangs from border vertex i: a quarter of the node's heights below
+   it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
+   beside it would end below that. So the line of feet is below every sample, and no neighbour
+   leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
+   (terrimpi_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
+   there. When one of them is within D of L, both end at L <= s; else each hangs by D or, since then
+   L is deeper, by more, and the line is <= s + e - D <= s - e.
+   Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
+   terrain, at the same PSNR. */
+static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
+                                 uint32_t i)
 {
     const terrimp_geomip_node *range = &t->tree.nodes[node];
+    uint32_t n = t->meshes[node].border_count;
+    float height = border[i * 3u + 1u];
+    float lowest = terrimpi_min(border[(i + 1u) % n * 3u + 1u],
+                                border[(i + n - 1u) % n * 3u + 1u]);
     float depth = terrimpi_max(2.0f * t->meshes[node].error, 0.25f * (range->high - range->low));
-    return terrimpi_min(height, terrimpi_max(range->low, height - depth));
+    if (terrimpi_min(lowest, height) - depth <= range->low)
+        return terrimpi_min(height, range->low);
+    return height - depth;
 }
 
 /* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
@@ -5934,7 +6021,7 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
         memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
         for (i = 0; i < mesh->border_count; i++)
             rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
-                                     : terrimpi_skirt_foot(t, node, rim[i * 3u + 1u]);
+                                     : terrimpi_skirt_foot(t, node, xyz, i);
         terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
         vertices += mesh->border_count;
         index_count += 6u * mesh->border_count;
@@ -8864,17 +8951,17 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- a frame ---- */
 
-/* Whether the floor is to be drawn: where pictures are, while the eye is over the terrain. A ray
-   that starts there above the ground passes through the ground before it meets the floor; one that
-   comes in below the terrain's outer border does not. */
+/* Whether the floor is to be drawn: where pictures are, while the eye is on or over the ground. A
+   ray that starts there passes through the ground before it meets the floor or a wall, which are
+   below the ground everywhere; one that comes in below the terrain's outer border, or starts under
+   the ground, does not. */
 static int terrimpi_view_over(const terrimpi_frame *f)
 {
     const float *eye = f->camera.eye;
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
-    terrimp_box box;
-    terrimpi_node_box(f->terrain, &root, &box);
-    return eye[0] >= box.min[0] && eye[0] <= box.max[0] && eye[2] >= box.min[2] &&
-           eye[2] <= box.max[2] && eye[1] >= box.min[1];
+    float ground;
+    return terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
+               TERRIMP_OK &&
+           eye[1] >= ground;
 }
 
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
@@ -12510,6 +12597,7 @@ typedef struct terrimpi_facet {
 typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
     float *row;             /* samples of one row or column of the node; scratch of its errors */
+    float *tops;            /* of a border: see terrimpi_ground_tops */
     float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
@@ -12532,6 +12620,7 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
     build->tile = (float *)terrimpi_take(&b, side * side, sizeof *build->tile);
     build->row = (float *)terrimpi_take(&b, longest, sizeof *build->row);
+    build->tops = (float *)terrimpi_take(&b, longest, sizeof *build->tops);
     build->heights = (float *)terrimpi_take(&b, vertices, sizeof *build->heights);
     build->work = (float *)terrimpi_take(&b, 2u * vertices, sizeof *build->work);
     build->vertices =
@@ -12605,27 +12694,43 @@ static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x
         row[first + i] -= start + (float)i * slope;
 }
 
+/* A segment of the loop, in rising order, and the samples of the border that it begins and ends
+   at. */
+typedef struct terrimpi_segment {
+    uint32_t a, b, from, to;
+} terrimpi_segment;
+
+/* The segment from vertex i of the loop to the next; returns 0 when it is not on that side. */
+static int terrimpi_segment_of(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
+                               uint32_t i, terrimpi_segment *s)
+{
+    const terrimp_mesh_vertex *v = mesh->vertices;
+    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
+    uint32_t span = along_x ? p->span_x : p->span_z;
+    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
+    uint32_t next = (i + 1u) % mesh->border_vertex_count, from, to;
+    if ((along_x ? v[i].z : v[i].x) != at || (along_x ? v[next].z : v[next].x) != at)
+        return 0;
+    from = along_x ? v[i].x : v[i].z;
+    to = along_x ? v[next].x : v[next].z;
+    s->a = from < to ? i : next; /* the loop runs the other way on the far two sides */
+    s->b = from < to ? next : i;
+    s->from = terrimpi_lattice(terrimpi_min_u32(from, to), p->level, span);
+    s->to = terrimpi_lattice(terrimpi_max_u32(from, to), p->level, span);
+    return 1;
+}
+
 /* Takes the surface away from the samples of one border, whose line the loop has. */
 static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
                                  float *line)
 {
-    int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
-    uint32_t i, n = mesh->border_vertex_count, span = along_x ? p->span_x : p->span_z;
-    uint32_t at = !last ? 0u : along_x ? p->rows - 1u : p->cols - 1u;
-    for (i = 0; i < n; i++) {
-        const terrimp_mesh_vertex *a = mesh->vertices + i, *b = mesh->vertices + (i + 1u) % n;
-        uint32_t a_at = along_x ? a->x : a->z, b_at = along_x ? b->x : b->z, from, to;
-        if ((along_x ? a->z : a->x) != at || (along_x ? b->z : b->x) != at)
-            continue;
-        if (a_at > b_at) { /* the loop runs the other way on the far two sides */
-            const terrimp_mesh_vertex *swap = a;
-            a = b;
-            b = swap;
-        }
-        from = terrimpi_lattice(terrimpi_min_u32(a_at, b_at), p->level, span);
-        to = terrimpi_lattice(terrimpi_max_u32(a_at, b_at), p->level, span);
-        terrimpi_take_away(line, from, to + (to == span), (float)from, a->height,
-                           (b->height - a->height) / (float)(to - from));
+    uint32_t i, span = terrimpi_along_x(side) ? p->span_x : p->span_z;
+    terrimpi_segment s;
+    for (i = 0; i < mesh->border_vertex_count; i++) {
+        const terrimp_mesh_vertex *v = mesh->vertices;
+        if (terrimpi_segment_of(p, mesh, side, i, &s))
+            terrimpi_take_away(line, s.from, s.to + (s.to == span), (float)s.from, v[s.a].height,
+                               (v[s.b].height - v[s.a].height) / (float)(s.to - s.from));
     }
 }
 
@@ -12847,6 +12952,71 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
     return TERRIMP_OK;
 }
 
+/* The coarsest level of ground that is looked at beside a node: three above its own, as far as the
+   node's corners are samples of it. */
+static uint32_t terrimpi_tops_level(const terrimp_terrain *t, const terrimpi_patch *p)
+{
+    uint32_t level = 0;
+    while (level < 3u && t->desc.chunk_quads % (16u << level) == 0)
+        level++;
+    return p->level + level;
+}
+
+/* The highest that ground can be drawn at each sample of a border: of some levels the lines between
+   every 2^level-th sample. */
+static void terrimpi_ground_tops(const terrimpi_build *build, uint32_t span, uint32_t top_level)
+{
+    const float *line = build->row;
+    uint32_t level, from, to, k;
+    memcpy(build->tops, line, (span + 1u) * sizeof *line);
+    for (level = 1; level <= top_level; level++)
+        for (from = 0; from < span; from = to) {
+            float slope;
+            to = terrimpi_min_u32(from + (1u << level), span);
+            slope = (line[to] - line[from]) / (float)(to - from);
+            for (k = from + 1u; k < to; k++)
+                build->tops[k] = terrimpi_max(build->tops[k],
+                                              line[from] + slope * (float)(k - from));
+        }
+}
+
+/* Lifts the border until no ground beside it stands out: the corners, which are samples, and lines
+   of coarser ground over valleys would. What is missing at a place of a segment is asked of its
+   closer end, at most twice as much, which stays within the range of stored heights; a raised
+   vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
+   behind it, and what other meshes have over that is closed by their skirts, which reach below the
+   samples (see terrimpi_skirt_foot): there is no gap to see the sky through. Neighbours of a level
+   still share what lies between the corners. */
+static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch *p,
+                                 terrimp_mesh *mesh, const terrimpi_build *build)
+{
+    float *lift = build->work;
+    uint32_t i, k;
+    int side;
+    terrimpi_segment s;
+    for (i = 0; i < mesh->border_vertex_count; i++) {
+        float *height = &mesh->vertices[i].height;
+        *height = terrimpi_min(*height, terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
+        lift[i] = 0.0f;
+    }
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        uint32_t span = terrimpi_read_border(t, p, side, build->row);
+        terrimpi_ground_tops(build, span, terrimpi_tops_level(t, p));
+        terrimpi_take_border(p, mesh, side, build->tops);
+        for (i = 0; i < mesh->border_vertex_count; i++) {
+            if (!terrimpi_segment_of(p, mesh, side, i, &s))
+                continue;
+            for (k = s.from; k <= s.to; k++) {
+                float w = (float)(k - s.from) / (float)(s.to - s.from);
+                float *to = lift + (w > 0.5f ? s.b : s.a);
+                *to = terrimpi_max(*to, build->tops[k] / terrimpi_max(w, 1.0f - w));
+            }
+        }
+    }
+    for (i = 0; i < mesh->border_vertex_count; i++)
+        mesh->vertices[i].height += lift[i];
+}
+
 /* The steps that a height is stored as: rounded up when meshes stand proud. */
 static uint16_t terrimpi_height_steps(const terrimp_terrain *t, float height)
 {
@@ -12946,8 +13116,10 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
     float rms;
     terrimpi_fill_tile(t, &p, build);
     TERRIMPI_TRY(terrimpi_simplify_tile(t, &p, build, &mesh));
-    if (t->desc.proud > 0.0f)
+    if (t->desc.proud > 0.0f) {
         TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
+        terrimpi_lift_border(t, &p, &mesh, build);
+    }
     terrimpi_store_surface(t, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
     TERRIMPI_REFUSE(!terrimpi_finite2(error.above, error.below), TERRIMP_E_NOT_FINITE);

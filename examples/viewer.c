@@ -559,6 +559,7 @@ static void draw_frame(viewer *v)
     if (v->frame.width < 1 || v->frame.height < 1)
         return; /* minimised */
     context_bind(&v->frame);
+    glDisable(GL_SCISSOR_TEST);
     if (v->scene.view && !v->unsupported) {
         move(v);
         draw_scene(v);

@@ -121,7 +121,7 @@ newer_than_opengl_1_1()
 'gl(DepthFunc|DepthMask|Disable|DrawElements|Enable|EnableClientState|GenTextures|GetError)|'\
 'gl(LoadIdentity|LoadMatrixf|MatrixMode|MultMatrixf|PixelStorei|PopMatrix|PushMatrix|Scalef)|'\
 'gl(Scissor|ShadeModel|TexCoordPointer|TexEnvi|TexImage2D|TexParameteri|Translatef)|'\
-'gl(ClipPlane|VertexPointer|Viewport|ColorMask|Begin|End|TexCoord2f|Vertex2f)'
+'gl(ClipPlane|VertexPointer|Viewport|ColorMask|Begin|End|TexCoord2f|Vertex2f|PolygonStipple)'
 }
 
 # ---- flyover: the pictures are looked at by tests/render.c, here it is its manners

@@ -12,7 +12,7 @@ typedef struct context {
     int width, height;     /* of the frame, pixels */
     GLuint framebuffer;    /* RGBA8 colour with 24-bit depth, own making: alike on both systems */
     GLuint colour, depth;  /* its renderbuffers */
-    int clip_x, clip_width; /* only these columns are drawn; width 0: all */
+    int clip_x, clip_width; /* gl_terrain draws only these columns; width 0: all */
     uint8_t *reading;      /* [height][width][4] on its way to context_read */
     void *system;          /* what the windowless system keeps */
 } context;
@@ -26,8 +26,7 @@ const char *context_open(context *c, int width, int height);
    8 bits of alpha and 24 of depth. */
 const char *context_open_old(context *c, int width, int height);
 
-/* Draw calls go to the frame again (after a capture); the viewport is all of it, the
-   scissor its clip. */
+/* Draw calls go to the frame again (after a capture); the viewport is all of it. */
 void context_bind(const context *c);
 
 /* Waits for the frame and copies it to rgb[height][width][3], top row first. */

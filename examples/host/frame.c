@@ -7,12 +7,6 @@ void context_bind(const context *c)
 {
     glBindFramebuffer(GL_FRAMEBUFFER, c->framebuffer);
     glViewport(0, 0, c->width, c->height);
-    if (c->clip_width) {
-        glEnable(GL_SCISSOR_TEST);
-        glScissor(c->clip_x, 0, c->clip_width, c->height);
-    } else {
-        glDisable(GL_SCISSOR_TEST);
-    }
 }
 
 void context_read(const context *c, uint8_t *rgb)

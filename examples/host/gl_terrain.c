@@ -641,6 +641,8 @@ void gl_terrain_turn_to_frame(gl_terrain *g)
     flush(g);
     g->target = GL_TO_FRAME;
     context_bind(g->frame);
+    glScissor(g->frame->clip_x, 0, g->frame->clip_width, g->frame->height);
+    (g->frame->clip_width ? glEnable : glDisable)(GL_SCISSOR_TEST);
     if (!g->cleared) {
         glClearColor((float)g->sky[0] / 255.0f, (float)g->sky[1] / 255.0f,
                      (float)g->sky[2] / 255.0f, 1.0f);
