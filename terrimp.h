@@ -228,7 +228,7 @@ extern "C" {
     X(TERRIMP_E_STATE, 11, "called too early: build or update first")                             \
     X(TERRIMP_E_MISS, 12, "the ray or the point does not meet the terrain")                       \
     X(TERRIMP_E_BAKE, 13, "the block is damaged, or no bake of this version and heightfield")     \
-    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: convert it")
+    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: write it swapped")
 
 typedef enum terrimp_result {
 #define TERRIMPI_X(name, value, text) name = value,
@@ -892,10 +892,8 @@ typedef struct terrimp_terrain_desc {
     int not_proud;             /* nonzero: meshes are not raised, whatever proud says */
     int no_lower_skirts;       /* nonzero: without skirts that hang from the border, by a quarter of
                                   the node's heights, down to neighbours of other levels */
-    int upper_skirts;          /* nonzero: also with skirts that rise over the border by what still
-                                  stands out there. Raised meshes gain nothing from them */
     float height_low;          /* [wu] between these two all samples lie, also after edits: */
-    float height_high;         /* meshes store their heights in 65535 steps of 3 times that range
+    float height_high;         /* meshes store those of borders in 2^22 steps of 3 times that range
                                   [Limits: height_low <= height_high]
                                   [Default both 0 -> terrimp_terrain_build_begin finds them] */
 } terrimp_terrain_desc;
@@ -915,6 +913,8 @@ typedef struct terrimp_terrain_info {
     uint32_t mesh_index_stride;     /* the same of its indices */
     uint32_t mesh_vertex_count;     /* node_count * mesh_vertex_stride, and the floor */
     uint32_t mesh_index_count;      /* node_count * mesh_index_stride, and the floor */
+    uint32_t floor_vertex_count;    /* what is behind the meshes of all nodes */
+    uint32_t floor_index_count;
     uint32_t mesh_triangle_count;   /* of all coarse meshes without skirts */
     terrimp_box box;                /* of everything that is drawn [wu] */
 } terrimp_terrain_info;
@@ -1021,9 +1021,9 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain);
 
 /* What building a terrain results in, as one block: for a file, for read-only memory, for a memory
    map. It holds no pointer and is used where it lies, on machines of the byte order that it was
-   made on; convert turns that round. Floats are IEEE 754 of 32 bits. The samples stay apart. */
+   made on. Floats are IEEE 754 of 32 bits. The samples stay apart. */
 
-#define TERRIMP_BAKE_VERSION 1u
+#define TERRIMP_BAKE_VERSION 2u
 
 /* What a bake says about itself. */
 typedef struct terrimp_bake_info {
@@ -1036,31 +1036,18 @@ typedef struct terrimp_bake_info {
 } terrimp_bake_info;
 
 /* Looks at a bake: sizes, checksum, and every number in it, so that whatever block passes can be
-   drawn without harm, also one that somebody made to do harm.
+   drawn without harm, also a crafted one; and, when there is a field, whether that still has the
+   very samples which the bake was made of: open compares only its size, format, scale and offset.
 
    block      [bytes] aligned to 8 bytes
+   field      NULL: not compared
    info       out; NULL: not wanted
-   Errors     E_BAKE; E_ORDER when it has to be converted first
-   Cost       O(nodes), about 1 us for each */
+   Errors     E_BAKE, also for another field; E_ORDER when it was made for the other byte order;
+              those of terrimp_heightfield_resolve
+   Cost       O(nodes), about 1 us for each, and with a field O(width * depth) */
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
+                                              const terrimp_heightfield *field,
                                               terrimp_bake_info *info);
-
-/* Turns the byte order of a bake round: from the other one to this machine's, or from this one to
-   the other, for a host that bakes for another machine.
-
-   block      [bytes] aligned to 8 bytes
-   out        [capacity] aligned to 8 bytes; may be block, else apart from it
-   Errors     E_BAKE: out, if it is not block, may have changed */
-TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
-                                                size_t capacity);
-
-/* Whether a heightfield still has the very samples that a bake was made of: open compares only its
-   size, format, scale and offset.
-
-   Errors     those of check and of terrimp_heightfield_resolve; E_BAKE when it is another field
-   Cost       O(width * depth) */
-TERRIMP_API terrimp_result terrimp_bake_matches(const void *block, size_t bytes,
-                                                const terrimp_heightfield *field);
 
 /* The bytes of memory that a terrain needs which uses a bake where it lies. */
 TERRIMP_API size_t terrimp_terrain_open_bytes(void);
@@ -1927,9 +1914,10 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
 
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
+   swapped    nonzero: for a machine of the other byte order
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
-                                              size_t bytes);
+                                              size_t bytes, int swapped);
 
 /* ==== Visible sets ======================================================= >>visible-sets */
 
@@ -4883,11 +4871,13 @@ static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, flo
     memset(m->closest, 0, sizeof m->closest);
     m->low[0] = m->low[1] = 0.0f;
     m->cells[0] = m->cells[1] = 1.0f;
-    for (i = 0; i < vertex_count; i++) {
+    terrimpi_split_point(m, m->xyz, low);
+    memcpy(high, low, sizeof high);
+    for (i = 1; i < vertex_count; i++) {
         terrimpi_split_point(m, m->xyz + i * 3u, p);
         for (k = 0; k < 3u; k++) {
-            low[k] = i == 0 ? p[k] : terrimpi_min(low[k], p[k]);
-            high[k] = i == 0 ? p[k] : terrimpi_max(high[k], p[k]);
+            low[k] = terrimpi_min(low[k], p[k]);
+            high[k] = terrimpi_max(high[k], p[k]);
         }
     }
     for (k = 0; k < 2u; k++) {
@@ -5017,7 +5007,7 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, te
         order[i] = i;
     terrimpi_sort(order, count, rects, terrimpi_pack_after);
     /* at most 360 steps, from 2^32 texels down to one */
-    while (!terrimpi_pack_try(width, height, rects, count, order, order + count, by)) {
+    while (count && !terrimpi_pack_try(width, height, rects, count, order, order + count, by)) {
         TERRIMPI_REFUSE(by < 2e-10f, TERRIMP_E_CAPACITY);
         by *= 0.94f;
     }
@@ -5391,29 +5381,33 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
 /* Based on: Hess 2010, sections 3.1, 4.2 and 6.5 (coarse meshes, skirts, meshes for many chunks);
    de Boer 2000, section 2.2 (quadtree).
 
-   What is built stands in four arrays with a fixed share for each node and without any pointer:
-   so nodes can be built in any order, and the arrays can lie in read-only memory (room Bake). */
+   What is built stands in four arrays of 32-bit words with a fixed share for each node and without
+   any pointer: so nodes can be built in any order, and the arrays can lie in read-only memory and
+   change their byte order (room Bake). */
 
-#define TERRIMPI_DIRECTIONS 8u      /* neighbours of a node */
-#define TERRIMPI_FLOOR_QUADS 32u    /* along a side of the floor at most: 2048 triangles in all */
-#define TERRIMPI_WALL_POINTS 2u     /* of the walls round it, for each of these */
-#define TERRIMPI_HEIGHT_STEPS 65535 /* of the heights of meshes */
+#define TERRIMPI_DIRECTIONS 8u           /* neighbours of a node */
+#define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
+#define TERRIMPI_WALL_POINTS 2u          /* of the walls round it, for each of these */
+#define TERRIMPI_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
+#define TERRIMPI_INNER_STEPS 0xffffu     /* of those of inner vertices */
 
 /* What is kept of a node's coarse mesh. Skirts are not stored: they follow from the border loop. */
 typedef struct terrimpi_mesh {
     float error, error_rms; /* [wu] of the mesh as drawn, against every sample */
-    float upper_skirt;      /* [wu] its height */
+    float base;             /* [wu] the heights of inner vertices count from it on */
     float low, high;        /* [wu] of everything that is drawn of the node and of those below */
-    uint16_t triangle_count;
-    uint8_t border_count;
-    uint8_t vertex_count;   /* of the surface; 0: not built */
+    uint32_t counts;        /* 9 bits: triangles; 7: vertices of the border; 8: of the surface, 0 if
+                               it is not built; 8: the exponent of the steps of inner heights */
 } terrimpi_mesh;
 
 /* A vertex of it. Column and row count in steps of 2^level samples within the node; the last ones
-   stand for its last column and row. The height counts in steps of the terrain's range. */
+   stand for its last column and row. Inner ones are stored as 8 bits of column, 8 of row and 16 of
+   height, in steps of the node's own: one extreme sample spoils only the nodes that hold it. Those
+   of borders have to meet those of neighbours to the bit: 8 bits along the side, 2 for which side,
+   and 22 of height, in steps of the terrain. */
 typedef struct terrimpi_point {
-    uint8_t x, z;
-    uint16_t height;
+    uint32_t x, z;
+    float height;
 } terrimpi_point;
 
 struct terrimp_terrain {
@@ -5422,11 +5416,11 @@ struct terrimp_terrain {
     uint32_t mesh_triangle_count;          /* all nodes */
     uint32_t floor_level;                  /* level whose nodes are the floor's quads */
     float sample_low, sample_high;         /* [wu] between these all samples lie */
-    float range_low, range_step;           /* [wu] heights of meshes: low + step * 0..65535 */
+    float range_low, range_step;           /* [wu] heights of borders: low + step * 0..2^22 - 1 */
     uint16_t begun, built, baked;
     terrimpi_mesh *meshes;                 /* [node_count] */
-    terrimpi_point *points;                /* [node_count][vertex_limit] */
-    uint8_t *corners;                      /* [node_count][index_limit] indices of the surface */
+    uint32_t *points;                      /* [node_count][vertex_limit] */
+    uint32_t *corners;                     /* [node_count][index_limit / 4] four indices each */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -5517,7 +5511,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
 {
     uint32_t budget = t->desc.triangle_budget, skirts;
     int ok = 1;
-    skirts = (t->desc.no_lower_skirts ? 0u : 1u) + (t->desc.upper_skirts ? 1u : 0u);
+    skirts = t->desc.no_lower_skirts ? 0u : 1u;
     terrimp_quadtree_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
     /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices in all. */
     t->border_limit = 4u * (terrimpi_border_points(budget) + 1u);
@@ -5543,9 +5537,8 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
     count = t->tree.node_count;
     t->tree.nodes = (terrimp_geomip_node *)terrimpi_take(&b, count, sizeof *t->tree.nodes);
     t->meshes = (terrimpi_mesh *)terrimpi_take(&b, count, sizeof *t->meshes);
-    t->points =
-        (terrimpi_point *)terrimpi_take(&b, count, t->vertex_limit * sizeof *t->points);
-    t->corners = (uint8_t *)terrimpi_take(&b, count, t->index_limit);
+    t->points = (uint32_t *)terrimpi_take(&b, count, t->vertex_limit * sizeof *t->points);
+    t->corners = (uint32_t *)terrimpi_take(&b, count, t->index_limit);
     return b.ok ? b.bytes : 0;
 }
 
@@ -5571,17 +5564,6 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
     return p;
 }
 
-/* Samples from the node's first one to a point of its mesh. */
-static uint32_t terrimpi_point_x(const terrimpi_patch *p, const terrimpi_point *point)
-{
-    return terrimpi_lattice(point->x, p->level, p->span_x);
-}
-
-static uint32_t terrimpi_point_z(const terrimpi_patch *p, const terrimpi_point *point)
-{
-    return terrimpi_lattice(point->z, p->level, p->span_z);
-}
-
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
 static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
 {
@@ -5593,17 +5575,67 @@ static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
     return terrimpi_tree_z(&t->tree, 0, row);
 }
 
-/* The height that a number of steps stands for. */
-static float terrimpi_mesh_height(const terrimp_terrain *t, uint32_t steps)
+static uint32_t terrimpi_mesh_triangles(const terrimpi_mesh *mesh)
+{
+    return mesh->counts & 0x1ffu;
+}
+
+static uint32_t terrimpi_mesh_border(const terrimpi_mesh *mesh)
+{
+    return mesh->counts >> 9 & 0x7fu;
+}
+
+static uint32_t terrimpi_mesh_vertices(const terrimpi_mesh *mesh)
+{
+    return mesh->counts >> 16 & 0xffu;
+}
+
+/* The step of a mesh's inner heights: a power of two, or 0. */
+static float terrimpi_mesh_step(const terrimpi_mesh *mesh)
+{
+    uint32_t bits = mesh->counts >> 24 << 23;
+    float step;
+    memcpy(&step, &bits, sizeof step);
+    return step;
+}
+
+/* The height that a number of steps stands for, on a border. */
+static float terrimpi_border_height(const terrimp_terrain *t, uint32_t steps)
 {
     return t->range_low + t->range_step * (float)steps;
+}
+
+/* Vertex i of a node's mesh. */
+static terrimpi_point terrimpi_mesh_point(const terrimp_terrain *t, const terrimpi_patch *p,
+                                          uint32_t node, uint32_t i)
+{
+    const terrimpi_mesh *mesh = &t->meshes[node];
+    uint32_t word = t->points[(size_t)node * t->vertex_limit + i];
+    terrimpi_point point;
+    point.x = word & 0xffu;
+    point.z = word >> 8 & 0xffu;
+    if (i < terrimpi_mesh_border(mesh)) {
+        uint32_t side = point.z & 3u;
+        point.height = terrimpi_border_height(t, word >> 10);
+        point.z = terrimpi_along_x((int)side) ? side & 1u ? p->rows - 1u : 0u : point.x;
+        point.x = terrimpi_along_x((int)side) ? point.x : side & 1u ? p->cols - 1u : 0u;
+    } else {
+        point.height = mesh->base + terrimpi_mesh_step(mesh) * (float)(word >> 16);
+    }
+    return point;
+}
+
+/* Index i of a node's mesh. */
+static uint32_t terrimpi_mesh_corner(const terrimp_terrain *t, uint32_t node, uint32_t i)
+{
+    return t->corners[(size_t)node * (t->index_limit / 4u) + i / 4u] >> i % 4u * 8u & 0xffu;
 }
 
 /* Whether a range of heights does not overflow, nor squared errors that are summed up over all
    samples. */
 static int terrimpi_range_fits(const terrimp_heightfield *field, float low, float step)
 {
-    float range = step * (float)TERRIMPI_HEIGHT_STEPS;
+    float range = step * (float)TERRIMPI_BORDER_STEPS;
     return step >= 0.0f && terrimpi_finite(low) && terrimpi_finite(low + range) &&
            terrimpi_finite(range * range * (float)field->width * (float)field->depth);
 }
@@ -5640,12 +5672,12 @@ TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrai
 static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp_mesh_info *info)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
-    uint32_t skirts = (t->desc.no_lower_skirts ? 0u : 1u) + (mesh->upper_skirt > 0.0f ? 1u : 0u);
+    uint32_t rim = t->desc.no_lower_skirts ? 0u : terrimpi_mesh_border(mesh);
     info->base_vertex = node * t->vertex_stride;
-    info->vertex_count = mesh->vertex_count + skirts * mesh->border_count;
+    info->vertex_count = terrimpi_mesh_vertices(mesh) + rim;
     info->first_index = node * t->index_stride;
-    info->index_count = 3u * mesh->triangle_count + skirts * 6u * mesh->border_count;
-    info->triangle_count = mesh->triangle_count;
+    info->triangle_count = terrimpi_mesh_triangles(mesh);
+    info->index_count = 3u * info->triangle_count + 6u * rim;
     info->error = mesh->error;
     info->error_rms = mesh->error_rms;
 }
@@ -5834,10 +5866,10 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
-    info->mesh_vertex_count = tree->node_count * terrain->vertex_stride +
-                              terrimpi_floor_vertices(terrain);
-    info->mesh_index_count = tree->node_count * terrain->index_stride +
-                             terrimpi_floor_indices(terrain);
+    info->floor_vertex_count = terrimpi_floor_vertices(terrain);
+    info->floor_index_count = terrimpi_floor_indices(terrain);
+    info->mesh_vertex_count = tree->node_count * terrain->vertex_stride + info->floor_vertex_count;
+    info->mesh_index_count = tree->node_count * terrain->index_stride + info->floor_index_count;
     info->mesh_triangle_count = terrain->mesh_triangle_count;
     root = terrimpi_tree_root(tree);
     terrimpi_node_box(terrain, &root, &info->box);
@@ -5981,7 +6013,7 @@ static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const 
                                  uint32_t i)
 {
     const terrimp_geomip_node *range = &t->tree.nodes[node];
-    uint32_t n = t->meshes[node].border_count;
+    uint32_t n = terrimpi_mesh_border(&t->meshes[node]);
     float height = border[i * 3u + 1u];
     float lowest = terrimpi_min(border[(i + 1u) % n * 3u + 1u],
                                 border[(i + n - 1u) % n * 3u + 1u]);
@@ -5995,37 +6027,27 @@ static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const 
 static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
                                uint16_t *indices)
 {
-    const terrimpi_mesh *mesh = t->meshes + node;
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    terrimpi_patch p;
-    uint32_t i, vertices, index_count;
-    int upper;
-    p = terrimpi_patch_of(t, node);
-    vertices = mesh->vertex_count;
-    index_count = 3u * mesh->triangle_count;
+    terrimpi_patch p = terrimpi_patch_of(t, node);
+    uint32_t border = terrimpi_mesh_border(&t->meshes[node]), i;
+    uint32_t vertices = terrimpi_mesh_vertices(&t->meshes[node]);
+    uint32_t index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
+    float *rim = xyz + (size_t)vertices * 3u;
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
     for (i = 0; i < vertices; i++) {
-        uint32_t x = terrimpi_point_x(&p, &points[i]), z = terrimpi_point_z(&p, &points[i]);
-        xyz[i * 3u] = terrimpi_world_x(t, p.x + x);
-        xyz[i * 3u + 1u] = terrimpi_mesh_height(t, points[i].height);
-        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + z);
+        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        xyz[i * 3u] = terrimpi_world_x(t, p.x + terrimpi_lattice(point.x, p.level, p.span_x));
+        xyz[i * 3u + 1u] = point.height;
+        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + terrimpi_lattice(point.z, p.level, p.span_z));
     }
     for (i = 0; i < index_count; i++)
-        indices[i] = corners[i];
-    for (upper = 0; upper < 2; upper++) {
-        float *rim = xyz + (size_t)vertices * 3u;
-        if (upper ? !(mesh->upper_skirt > 0.0f) : t->desc.no_lower_skirts)
-            continue;
-        memcpy(rim, xyz, (size_t)mesh->border_count * 3u * sizeof *rim);
-        for (i = 0; i < mesh->border_count; i++)
-            rim[i * 3u + 1u] = upper ? rim[i * 3u + 1u] + mesh->upper_skirt
-                                     : terrimpi_skirt_foot(t, node, xyz, i);
-        terrimpi_write_wall(indices + index_count, mesh->border_count, vertices, upper);
-        vertices += mesh->border_count;
-        index_count += 6u * mesh->border_count;
-    }
+        indices[i] = (uint16_t)terrimpi_mesh_corner(t, node, i);
+    if (t->desc.no_lower_skirts)
+        return;
+    memcpy(rim, xyz, (size_t)border * 3u * sizeof *rim);
+    for (i = 0; i < border; i++)
+        rim[i * 3u + 1u] = terrimpi_skirt_foot(t, node, xyz, i);
+    terrimpi_write_wall(indices + index_count, border, vertices, 0);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
@@ -6053,18 +6075,19 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
                                                        size_t xyz_capacity, uint16_t *indices,
                                                        size_t index_capacity)
 {
-    size_t node, nodes;
+    size_t node, vertex_stride, index_stride;
     TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_check_node(terrain, 0, xyz));
-    nodes = terrain->tree.node_count;
-    if (xyz_capacity / 3u < nodes * terrain->vertex_stride + terrimpi_floor_vertices(terrain) ||
-        index_capacity < nodes * terrain->index_stride + terrimpi_floor_indices(terrain))
+    vertex_stride = terrain->vertex_stride;
+    index_stride = terrain->index_stride;
+    node = terrain->tree.node_count;
+    if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_vertices(terrain) ||
+        index_capacity < node * index_stride + terrimpi_floor_indices(terrain))
         return TERRIMP_E_CAPACITY;
-    for (node = 0; node < nodes; node++)
-        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + node * terrain->vertex_stride * 3u,
-                           indices + node * terrain->index_stride);
-    terrimpi_fill_floor(terrain, xyz + nodes * terrain->vertex_stride * 3u,
-                        indices + nodes * terrain->index_stride);
+    terrimpi_fill_floor(terrain, xyz + 3u * node * vertex_stride, indices + node * index_stride);
+    while (node-- > 0)
+        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + 3u * node * vertex_stride,
+                           indices + node * index_stride);
     return TERRIMP_OK;
 }
 
@@ -6107,16 +6130,15 @@ TERRIMP_API void terrimp_terrain_destroy(terrimp_terrain *terrain)
 #endif /* TERRIMP_NO_MALLOC */
 
 /* ==== Bake =============================================================== >>impl-bake */
-/* A header of 32-bit words, then the four arrays of the terrain's block as they are. Where they
-   stand follows from the header's sizes: there is no offset to be false. */
+/* A header, then the four arrays of the terrain's block as they are: nothing but 32-bit words.
+   Where the arrays stand follows from the header's sizes: there is no offset to be false. */
 
-#define TERRIMPI_BAKE_MAGIC 0x54494d50u /* reads otherwise in the other byte order */
-#define TERRIMPI_BAKE_MAGIC_TURNED 0x504d4954u
+#define TERRIMPI_BAKE_MAGIC 0x54494d50u
+#define TERRIMPI_BAKE_MAGIC_SWAPPED 0x504d4954u /* as it reads in the other byte order */
 
 enum {
     TERRIMPI_BAKE_NO_LOWER_SKIRTS = 1 << 0,
-    TERRIMPI_BAKE_NO_UPPER_SKIRTS = 1 << 1,
-    TERRIMPI_BAKE_NOT_PROUD = 1 << 2
+    TERRIMPI_BAKE_NOT_PROUD = 1 << 1
 };
 
 typedef struct terrimpi_bake {
@@ -6146,40 +6168,15 @@ static uint32_t terrimpi_float_bits(float value)
     return bits;
 }
 
-/* Copied, since a float may not be looked at as an integer where it lies. */
-static uint32_t terrimpi_hash_words(uint32_t hash, const void *words, size_t count)
+/* The checksum of a bake. Words are copied, since a float may not be looked at as an integer. */
+static uint32_t terrimpi_bake_hash(const void *block)
 {
-    const unsigned char *at = (const unsigned char *)words;
-    uint32_t word;
-    for (; count > 0; count--, at += sizeof word) {
+    const unsigned char *at = (const unsigned char *)block + offsetof(terrimpi_bake, width);
+    uint32_t hash = 2166136261u, word, bytes;
+    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
+    for (bytes -= (uint32_t)offsetof(terrimpi_bake, width); bytes >= 4u; bytes -= 4u, at += 4) {
         memcpy(&word, at, sizeof word);
         hash = terrimpi_hash(hash, word);
-    }
-    return hash;
-}
-
-/* The checksum of a bake's header and arrays, the same in either byte order. */
-static uint32_t terrimpi_bake_hash(const terrimpi_bake *bake, const terrimp_terrain *t)
-{
-    const size_t before = offsetof(terrimpi_bake, width); /* magic to checksum */
-    uint32_t hash = 2166136261u;
-    size_t i, count = t->tree.node_count;
-    hash = terrimpi_hash_words(hash, (const unsigned char *)bake + before,
-                               (sizeof *bake - before) / 4u);
-    hash = terrimpi_hash_words(hash, t->tree.nodes, count * sizeof *t->tree.nodes / 4u);
-    for (i = 0; i < count; i++) {
-        const terrimpi_mesh *mesh = &t->meshes[i];
-        hash = terrimpi_hash_words(hash, mesh, 5u);
-        hash = terrimpi_hash(hash, (uint32_t)mesh->triangle_count << 16 |
-                                       (uint32_t)mesh->border_count << 8 | mesh->vertex_count);
-    }
-    for (i = 0; i < count * t->vertex_limit; i++)
-        hash = terrimpi_hash(hash, (uint32_t)t->points[i].height << 16 |
-                                       (uint32_t)t->points[i].z << 8 | t->points[i].x);
-    for (i = 0; i < count * t->index_limit; i += 4u) { /* a multiple of 4 */
-        const uint8_t *c = t->corners + i;
-        hash = terrimpi_hash(hash, (uint32_t)c[0] | (uint32_t)c[1] << 8 | (uint32_t)c[2] << 16 |
-                                       (uint32_t)c[3] << 24);
     }
     return hash;
 }
@@ -6207,7 +6204,7 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     memset(&desc, 0, sizeof desc);
     if (bake->version != TERRIMP_BAKE_VERSION || bake->format == 0 ||
         bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
-        bake->triangle_budget == 0 || bake->flags > 7u)
+        bake->triangle_budget == 0 || bake->flags > 3u)
         return 0;
     desc.field.samples = &any;
     desc.field.width = bake->width;
@@ -6220,7 +6217,6 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     desc.proud = bake->proud;
     desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
     desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
-    desc.upper_skirts = (bake->flags & TERRIMPI_BAKE_NO_UPPER_SKIRTS) == 0;
     desc.height_low = bake->height_low;
     desc.height_high = bake->height_high;
     if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK)
@@ -6246,20 +6242,22 @@ static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
     terrimpi_terrain_layout(t, (unsigned char *)(uintptr_t)block + sizeof(terrimpi_bake));
 }
 
-/* Whether the loop runs once round the tile, counter-clockwise seen from above, from (0, 0). */
-static int terrimpi_loop_ok(const terrimpi_point *points, uint32_t count, uint32_t last_x,
-                            uint32_t last_z)
+/* Whether the border runs once round the tile, counter-clockwise seen from above, from (0, 0). */
+static int terrimpi_loop_ok(const terrimp_terrain *t, const terrimpi_patch *tile, uint32_t node)
 {
-    uint32_t i;
-    if (points[0].x != 0 || points[0].z != 0)
+    uint32_t i, count = terrimpi_mesh_border(&t->meshes[node]);
+    uint32_t last_x = tile->cols - 1u, last_z = tile->rows - 1u;
+    terrimpi_point p = terrimpi_mesh_point(t, tile, node, 0), q;
+    if (p.x != 0 || p.z != 0)
         return 0;
-    for (i = 0; i < count; i++) {
-        const terrimpi_point *p = points + i, *q = points + (i + 1u < count ? i + 1u : 0);
-        int ok = (p->x == 0 && q->x == 0 && q->z > p->z) ||
-                 (p->z == last_z && q->z == last_z && q->x > p->x) ||
-                 (p->x == last_x && q->x == last_x && q->z < p->z) ||
-                 (p->z == 0 && q->z == 0 && q->x < p->x);
-        if (!ok || (i > 0 && p->x == 0 && p->z == 0))
+    for (i = 0; i < count; i++, p = q) {
+        int ok;
+        q = terrimpi_mesh_point(t, tile, node, i + 1u < count ? i + 1u : 0);
+        ok = (p.x == 0 && q.x == 0 && q.z > p.z) ||
+             (p.z == last_z && q.z == last_z && q.x > p.x) ||
+             (p.x == last_x && q.x == last_x && q.z < p.z) ||
+             (p.z == 0 && q.z == 0 && q.x < p.x);
+        if (!ok || (i > 0 && p.x == 0 && p.z == 0))
             return 0;
     }
     return 1;
@@ -6281,29 +6279,31 @@ static uint32_t terrimpi_edge_sum(uint32_t from, uint32_t to)
 
 /* Whether the triangles of a surface face up, have corners that exist, and cover its node: that
    inner edges have two sides, and border edges one, is told from a sum over all. */
-static int terrimpi_corners_ok(const terrimp_terrain *t, uint32_t node, const terrimpi_patch *p)
+static int terrimpi_corners_ok(const terrimp_terrain *t, const terrimpi_patch *p, uint32_t node)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const uint8_t *corners = t->corners + (size_t)node * t->index_limit;
     int64_t all = 0;
-    uint32_t i, k, edges = 0, border = mesh->border_count;
+    uint32_t i, k, edges = 0, border = terrimpi_mesh_border(mesh);
     for (i = 0; i < border; i++)
         edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
-    for (i = 0; i < mesh->triangle_count; i++, corners += 3) {
+    for (i = 0; i < terrimpi_mesh_triangles(mesh); i++) {
+        uint32_t corner[3];
         int64_t at[3][2], area;
         for (k = 0; k < 3u; k++) {
-            if (corners[k] >= mesh->vertex_count)
+            terrimpi_point point;
+            corner[k] = terrimpi_mesh_corner(t, node, 3u * i + k);
+            if (corner[k] >= terrimpi_mesh_vertices(mesh))
                 return 0;
-            at[k][0] = terrimpi_point_x(p, &points[corners[k]]);
-            at[k][1] = terrimpi_point_z(p, &points[corners[k]]);
+            point = terrimpi_mesh_point(t, p, node, corner[k]);
+            at[k][0] = terrimpi_lattice(point.x, p->level, p->span_x);
+            at[k][1] = terrimpi_lattice(point.z, p->level, p->span_z);
         }
         area = terrimpi_twice_area(at[0], at[1], at[2]);
         if (area <= 0)
             return 0;
         all += area;
         for (k = 0; k < 3u; k++)
-            edges += terrimpi_edge_sum(corners[k], corners[k == 2u ? 0 : k + 1u]);
+            edges += terrimpi_edge_sum(corner[k], corner[k == 2u ? 0 : k + 1u]);
     }
     return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
@@ -6313,37 +6313,28 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
 {
     const terrimp_geomip_node *ground = &t->tree.nodes[node];
     const terrimpi_mesh *mesh = &t->meshes[node];
-    const terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    const float most = TERRIMPI_FLOAT_MAX, slack = t->range_step; /* other machines round */
+    const float most = TERRIMPI_FLOAT_MAX;
+    float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
+    uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
+    uint32_t triangles = terrimpi_mesh_triangles(mesh);
     terrimpi_patch p = terrimpi_patch_of(t, node);
-    float sizes[5];
-    uint32_t i;
-    sizes[0] = ground->error;
-    sizes[1] = ground->rms;
-    sizes[2] = mesh->error;
-    sizes[3] = mesh->error_rms;
-    sizes[4] = mesh->upper_skirt;
-    for (i = 0; i < 5u; i++)
-        if (!terrimpi_within(sizes[i], 0.0f, most))
-            return 0;
-    if (!terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
+    if (!terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
+        !terrimpi_within(mesh->error, 0.0f, most) ||
+        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
+        !terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
         !terrimpi_within(ground->low, mesh->low, mesh->high) ||
-        !terrimpi_within(ground->high, ground->low, mesh->high) ||
-        (!t->desc.upper_skirts && mesh->upper_skirt > 0.0f))
+        !terrimpi_within(ground->high, ground->low, mesh->high))
         return 0;
-    if (mesh->border_count < 4u || mesh->border_count > t->border_limit ||
-        mesh->vertex_count < mesh->border_count || mesh->vertex_count > t->vertex_limit ||
-        mesh->triangle_count < 2u || mesh->triangle_count > t->desc.triangle_budget)
+    if (border < 4u || border > t->border_limit || vertices < border ||
+        vertices > t->vertex_limit || triangles < 2u || triangles > t->desc.triangle_budget)
         return 0;
-    for (i = 0; i < mesh->vertex_count; i++) {
-        float height = terrimpi_mesh_height(t, points[i].height);
-        if (points[i].x >= p.cols || points[i].z >= p.rows ||
-            height + slack < mesh->low ||
-            height - slack + (i < mesh->border_count ? mesh->upper_skirt : 0.0f) > mesh->high)
+    for (i = 0; i < vertices; i++) {
+        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        if (point.x >= p.cols || point.z >= p.rows ||
+            !(point.height + slack >= mesh->low && point.height - slack <= mesh->high))
             return 0;
     }
-    return terrimpi_loop_ok(points, mesh->border_count, p.cols - 1u, p.rows - 1u) &&
-           terrimpi_corners_ok(t, node, &p);
+    return terrimpi_loop_ok(t, &p, node) && terrimpi_corners_ok(t, &p, node);
 }
 
 /* Whether a node is held by its parent. */
@@ -6357,138 +6348,59 @@ static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
            t->meshes[node].high <= t->meshes[parent].high;
 }
 
-/* Checks a whole block and fills in a terrain from it, all but the field. */
-static terrimp_result terrimpi_bake_read(const void *block, size_t bytes, terrimp_terrain *t)
+/* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
+   could have been made of. */
+static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
+                                         const terrimp_heightfield *field, terrimp_terrain *t)
 {
+    const terrimp_heightfield *f = &t->desc.field;
     terrimpi_bake bake;
     uint32_t node, triangles = 0;
     TERRIMPI_REFUSE(!block, TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)block % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(bytes < sizeof bake, TERRIMP_E_BAKE);
     memcpy(&bake, block, sizeof bake);
-    TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_TURNED, TERRIMP_E_ORDER);
-    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC ||
-                    !terrimpi_bake_header(&bake, bytes, t), TERRIMP_E_BAKE);
+    TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_SWAPPED, TERRIMP_E_ORDER);
+    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, t) ||
+                    terrimpi_bake_hash(block) != bake.checksum, TERRIMP_E_BAKE);
+    TERRIMPI_REFUSE(field && (field->width != f->width || field->depth != f->depth ||
+                              field->format != f->format ||
+                              field->height_scale != f->height_scale ||
+                              field->height_offset != f->height_offset), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
-    TERRIMPI_REFUSE(terrimpi_bake_hash(&bake, t) != bake.checksum, TERRIMP_E_BAKE);
     for (node = 0; node < t->tree.node_count; node++) {
         if (!terrimpi_node_ok(t, node) || !terrimpi_parent_ok(t, node))
             return TERRIMP_E_BAKE;
-        triangles += t->meshes[node].triangle_count;
+        triangles += terrimpi_mesh_triangles(&t->meshes[node]);
     }
     return triangles == t->mesh_triangle_count ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
+                                              const terrimp_heightfield *field,
                                               terrimp_bake_info *info)
-{
-    terrimp_terrain t;
-    terrimp_result result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK || !info)
-        return result;
-    info->bytes = sizeof(terrimpi_bake) + terrimpi_terrain_layout(&t, NULL);
-    info->width = t.desc.field.width;
-    info->depth = t.desc.field.depth;
-    info->format = t.desc.field.format;
-    info->height_scale = t.desc.field.height_scale;
-    info->height_offset = t.desc.field.height_offset;
-    info->chunk_quads = t.desc.chunk_quads;
-    info->triangle_budget = t.desc.triangle_budget;
-    info->level_count = t.tree.level_count;
-    info->node_count = t.tree.node_count;
-    return TERRIMP_OK;
-}
-
-/* ---- byte order ---- */
-
-static void terrimpi_turn_words(void *words, size_t count)
-{
-    unsigned char *at = (unsigned char *)words, swap;
-    for (; count > 0; count--, at += 4) {
-        swap = at[0];
-        at[0] = at[3];
-        at[3] = swap;
-        swap = at[1];
-        at[1] = at[2];
-        at[2] = swap;
-    }
-}
-
-static uint16_t terrimpi_turned(uint16_t value)
-{
-    return (uint16_t)(value >> 8 | value << 8);
-}
-
-/* Turns the arrays of a terrain round. */
-static void terrimpi_turn_arrays(terrimp_terrain *t)
-{
-    size_t i, count = t->tree.node_count;
-    terrimpi_turn_words(t->tree.nodes, count * sizeof *t->tree.nodes / 4u);
-    for (i = 0; i < count; i++) {
-        terrimpi_turn_words(&t->meshes[i], 5u);
-        t->meshes[i].triangle_count = terrimpi_turned(t->meshes[i].triangle_count);
-    }
-    for (i = 0; i < count * t->vertex_limit; i++)
-        t->points[i].height = terrimpi_turned(t->points[i].height);
-}
-
-TERRIMP_API terrimp_result terrimp_bake_convert(const void *block, size_t bytes, void *out,
-                                                size_t capacity)
-{
-    terrimp_terrain t;
-    terrimpi_bake bake;
-    terrimp_result result;
-    TERRIMPI_REFUSE(!block || !out, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK && result != TERRIMP_E_ORDER)
-        return result;
-    memcpy(&bake, block, sizeof bake);
-    if (result == TERRIMP_E_ORDER) {
-        terrimpi_turn_words(&bake, sizeof bake / 4u);
-        if (!terrimpi_bake_header(&bake, bytes, &t))
-            return TERRIMP_E_BAKE;
-    }
-    TERRIMPI_REFUSE(capacity < bake.bytes, TERRIMP_E_CAPACITY);
-    memmove(out, block, bake.bytes);
-    terrimpi_turn_words(out, sizeof bake / 4u);
-    terrimpi_bake_arrays_at(&t, out);
-    terrimpi_turn_arrays(&t);
-    if (result == TERRIMP_OK)
-        return TERRIMP_OK;
-    result = terrimpi_bake_read(out, bake.bytes, &t);
-    if (result != TERRIMP_OK && out == block) { /* back: a false block stays as it was */
-        terrimpi_turn_words(out, sizeof bake / 4u);
-        terrimpi_turn_arrays(&t);
-    }
-    return result;
-}
-
-/* ---- opening ---- */
-
-/* Whether a resolved field could be the one that a bake was made of. */
-static int terrimpi_bake_fits(const terrimp_terrain *t, const terrimp_heightfield *field)
-{
-    const terrimp_heightfield *f = &t->desc.field;
-    return field->width == f->width && field->depth == f->depth && field->format == f->format &&
-           field->height_scale == f->height_scale && field->height_offset == f->height_offset;
-}
-
-TERRIMP_API terrimp_result terrimp_bake_matches(const void *block, size_t bytes,
-                                                const terrimp_heightfield *field)
 {
     terrimp_terrain t;
     terrimp_heightfield resolved;
     terrimpi_bake bake;
-    terrimp_result result = terrimp_heightfield_resolve(field, &resolved);
-    if (result == TERRIMP_OK)
-        result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK)
-        return result;
+    if (field)
+        TERRIMPI_TRY(terrimp_heightfield_resolve(field, &resolved));
+    TERRIMPI_TRY(terrimpi_bake_read(block, bytes, field ? &resolved : NULL, &t));
     memcpy(&bake, block, sizeof bake);
-    return terrimpi_bake_fits(&t, &resolved) && terrimpi_samples_hash(&resolved) == bake.samples
-               ? TERRIMP_OK
-               : TERRIMP_E_BAKE;
+    TERRIMPI_REFUSE(field && terrimpi_samples_hash(&resolved) != bake.samples, TERRIMP_E_BAKE);
+    if (!info)
+        return TERRIMP_OK;
+    info->bytes = bake.bytes;
+    info->width = bake.width;
+    info->depth = bake.depth;
+    info->format = (int)bake.format;
+    info->height_scale = t.desc.field.height_scale;
+    info->height_offset = bake.height_offset;
+    info->chunk_quads = bake.chunk_quads;
+    info->triangle_budget = bake.triangle_budget;
+    info->level_count = t.tree.level_count;
+    info->node_count = bake.node_count;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API size_t terrimp_terrain_open_bytes(void)
@@ -6502,16 +6414,10 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 {
     terrimp_terrain t;
     terrimp_heightfield resolved;
-    terrimp_result result;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    result = terrimp_heightfield_resolve(field, &resolved);
-    if (result == TERRIMP_OK)
-        result = terrimpi_check_block(memory, memory_bytes, sizeof t);
-    if (result == TERRIMP_OK)
-        result = terrimpi_bake_read(block, bytes, &t);
-    if (result != TERRIMP_OK)
-        return result;
-    TERRIMPI_REFUSE(!terrimpi_bake_fits(&t, &resolved), TERRIMP_E_BAKE);
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &resolved));
+    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes, sizeof t));
+    TERRIMPI_TRY(terrimpi_bake_read(block, bytes, &resolved, &t));
     t.desc.field = t.tree.field = resolved;
     t.begun = t.built = t.baked = 1;
     *(terrimp_terrain *)memory = t;
@@ -8681,8 +8587,8 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
         return 0;
-    terrimpi_capture_split(&plan->camera, xyz, mesh->vertex_count, indices,
-                           3u * mesh->triangle_count, sine * closest, overlap, &split);
+    terrimpi_capture_split(&plan->camera, xyz, terrimpi_mesh_vertices(mesh), indices,
+                           3u * terrimpi_mesh_triangles(mesh), sine * closest, overlap, &split);
     *distance = split.distance;
     return split.gap * sine * f->pixel_factor >
                TERRIMPI_VIEW_SPLIT_SMEAR * f->desc->tolerance_px &&
@@ -12996,7 +12902,7 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
     terrimpi_segment s;
     for (i = 0; i < mesh->border_vertex_count; i++) {
         float *height = &mesh->vertices[i].height;
-        *height = terrimpi_min(*height, terrimpi_mesh_height(t, TERRIMPI_HEIGHT_STEPS));
+        *height = terrimpi_min(*height, terrimpi_border_height(t, TERRIMPI_BORDER_STEPS));
         lift[i] = 0.0f;
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
@@ -13017,40 +12923,81 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
         mesh->vertices[i].height += lift[i];
 }
 
-/* The steps that a height is stored as: rounded up when meshes stand proud. */
-static uint16_t terrimpi_height_steps(const terrimp_terrain *t, float height)
+/* The steps above `low` that a height is stored as: rounded up when meshes stand proud. */
+static uint32_t terrimpi_height_steps(float height, float low, float step, uint32_t most, int up)
 {
-    float steps = height - t->range_low;
+    float steps = height - low;
     uint32_t whole;
-    if (!(steps > 0.0f) || !(t->range_step > 0.0f))
+    if (!(steps > 0.0f) || !(step > 0.0f))
         return 0;
-    steps /= t->range_step;
-    if (!(steps < (float)TERRIMPI_HEIGHT_STEPS))
-        return TERRIMPI_HEIGHT_STEPS;
-    whole = (uint32_t)(t->desc.proud > 0.0f ? steps : steps + 0.5f);
-    if (t->desc.proud > 0.0f && terrimpi_mesh_height(t, whole) < height)
-        whole++;
-    return (uint16_t)terrimpi_min_u32(whole, TERRIMPI_HEIGHT_STEPS);
+    steps /= step;
+    if (!(steps < (float)most))
+        return most;
+    whole = (uint32_t)(up ? steps : steps + 0.5f);
+    return whole + (uint32_t)(up && low + step * (float)whole < height && whole < most);
+}
+
+/* Settles what the heights of a node's inner vertices count from, in which steps: the exponent of
+   the least power of two with which they reach to the highest. */
+static uint32_t terrimpi_inner_range(const terrimp_terrain *t, const terrimp_mesh *mesh,
+                                     float *base)
+{
+    float most = terrimpi_border_height(t, TERRIMPI_BORDER_STEPS), low = most, step;
+    float high = t->range_low;
+    uint32_t i, bits;
+    for (i = mesh->border_vertex_count; i < mesh->surface_vertex_count; i++) {
+        mesh->vertices[i].height = terrimpi_clamp(mesh->vertices[i].height, t->range_low, most);
+        low = terrimpi_min(low, mesh->vertices[i].height);
+        high = terrimpi_max(high, mesh->vertices[i].height);
+    }
+    *base = low;
+    step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_INNER_STEPS;
+    memcpy(&bits, &step, sizeof bits);
+    return (bits + 0x7fffffu) >> 23;
+}
+
+/* A vertex of a surface as it is stored. */
+static uint32_t terrimpi_store_point(const terrimp_terrain *t, const terrimpi_patch *p,
+                                     const terrimpi_mesh *mesh, const terrimp_mesh_vertex *v,
+                                     int inner)
+{
+    int up = t->desc.proud > 0.0f, side;
+    if (inner)
+        return v->x | (uint32_t)v->z << 8 |
+               terrimpi_height_steps(v->height, mesh->base, terrimpi_mesh_step(mesh),
+                                     TERRIMPI_INNER_STEPS, up) << 16;
+    side = v->x == 0               ? TERRIMP_SIDE_X0
+           : v->z == 0             ? TERRIMP_SIDE_Z0
+           : v->x == p->cols - 1u  ? TERRIMP_SIDE_X1
+                                   : TERRIMP_SIDE_Z1;
+    return (terrimpi_along_x(side) ? v->x : v->z) | (uint32_t)side << 8 |
+           terrimpi_height_steps(v->height, t->range_low, t->range_step, TERRIMPI_BORDER_STEPS, up)
+               << 10;
 }
 
 /* Stores a surface, and leaves in it the heights that have been stored. */
-static void terrimpi_store_surface(terrimp_terrain *t, uint32_t node, terrimp_mesh *mesh)
+static void terrimpi_store_surface(terrimp_terrain *t, const terrimpi_patch *p, uint32_t node,
+                                   const terrimp_mesh *mesh)
 {
-    terrimpi_point *points = t->points + (size_t)node * t->vertex_limit;
-    uint8_t *corners = t->corners + (size_t)node * t->index_limit;
-    uint32_t i;
+    terrimpi_mesh *out = &t->meshes[node];
+    uint32_t *points = t->points + (size_t)node * t->vertex_limit;
+    uint32_t *corners = t->corners + (size_t)node * (t->index_limit / 4u), i;
     TERRIMP_ASSERT(mesh->surface_vertex_count <= t->vertex_limit);
     TERRIMP_ASSERT(mesh->border_vertex_count <= t->border_limit);
     memset(points, 0, t->vertex_limit * sizeof *points);
     memset(corners, 0, t->index_limit);
+    out->counts = terrimpi_inner_range(t, mesh, &out->base) << 24 |
+                  mesh->surface_vertex_count << 16 | mesh->border_vertex_count << 9 |
+                  mesh->surface_index_count / 3u;
     for (i = 0; i < mesh->surface_vertex_count; i++) {
-        points[i].x = (uint8_t)mesh->vertices[i].x;
-        points[i].z = (uint8_t)mesh->vertices[i].z;
-        points[i].height = terrimpi_height_steps(t, mesh->vertices[i].height);
-        mesh->vertices[i].height = terrimpi_mesh_height(t, points[i].height);
+        terrimp_mesh_vertex *v = &mesh->vertices[i];
+        points[i] = terrimpi_store_point(t, p, out, v, i >= mesh->border_vertex_count);
+        v->height = terrimpi_mesh_point(t, p, node, i).height;
+        out->low = i == 0 ? v->height : terrimpi_min(out->low, v->height);
+        out->high = i == 0 ? v->height : terrimpi_max(out->high, v->height);
     }
     for (i = 0; i < mesh->surface_index_count; i++)
-        corners[i] = (uint8_t)mesh->indices[i];
+        corners[i / 4u] |= (uint32_t)mesh->indices[i] << i % 4u * 8u;
 }
 
 /* Differences of samples to the surface. */
@@ -13084,29 +13031,6 @@ static void terrimpi_measure_node(const terrimp_terrain *t, const terrimpi_patch
     *rms = TERRIMP_SQRTF(squares / ((float)(p->span_x + 1u) * (float)(p->span_z + 1u)));
 }
 
-/* Notes what is to be known of a finished mesh. What still rises over the surface decides how high
-   the upper skirt has to be. */
-static void terrimpi_store_mesh(terrimp_terrain *t, uint32_t node, const terrimp_mesh *mesh,
-                                const terrimpi_error *error, float rms)
-{
-    terrimpi_mesh *out = &t->meshes[node];
-    uint32_t i;
-    out->error = terrimpi_max(error->above, error->below);
-    out->error_rms = rms;
-    out->upper_skirt = t->desc.upper_skirts ? error->above : 0.0f;
-    out->low = out->high = mesh->vertices[0].height;
-    for (i = 0; i < mesh->surface_vertex_count; i++) {
-        float height = mesh->vertices[i].height;
-        out->low = terrimpi_min(out->low, height);
-        if (i < mesh->border_vertex_count)
-            height += out->upper_skirt;
-        out->high = terrimpi_max(out->high, height);
-    }
-    out->triangle_count = (uint16_t)(mesh->surface_index_count / 3u);
-    out->border_count = (uint8_t)mesh->border_vertex_count;
-    out->vertex_count = (uint8_t)mesh->surface_vertex_count;
-}
-
 static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
                                           const terrimpi_build *build)
 {
@@ -13120,10 +13044,14 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
         TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
         terrimpi_lift_border(t, &p, &mesh, build);
     }
-    terrimpi_store_surface(t, node, &mesh);
+    terrimpi_store_surface(t, &p, node, &mesh);
     terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
-    TERRIMPI_REFUSE(!terrimpi_finite2(error.above, error.below), TERRIMP_E_NOT_FINITE);
-    terrimpi_store_mesh(t, node, &mesh, &error, rms);
+    if (!terrimpi_finite2(error.above, error.below)) {
+        t->meshes[node].counts = 0;
+        return TERRIMP_E_NOT_FINITE;
+    }
+    t->meshes[node].error = terrimpi_max(error.above, error.below);
+    t->meshes[node].error_rms = rms;
     return TERRIMP_OK;
 }
 
@@ -13187,7 +13115,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
         TERRIMPI_TRY(terrimpi_height_range(f, all, 0, &low, &high));
     }
     room = TERRIMPI_RANGE_ROOM * (high - low);
-    step = (high - low + 2.0f * room) / (float)TERRIMPI_HEIGHT_STEPS;
+    step = (high - low + 2.0f * room) / (float)TERRIMPI_BORDER_STEPS;
     TERRIMPI_REFUSE(!terrimpi_range_fits(&terrain->desc.field, low - room, step), TERRIMP_E_RANGE);
     terrain->sample_low = low;
     terrain->sample_high = high;
@@ -13204,9 +13132,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= terrain->tree.node_count, TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+                                      terrimpi_build_layout(&terrain->desc, scratch, &build)));
     TERRIMPI_REFUSE(!terrain->begun, TERRIMP_E_STATE);
-    terrimpi_build_layout(&terrain->desc, scratch, &build);
     TERRIMPI_TRY(terrimp_geomip_build_node(&terrain->tree, node, build.row));
     TERRIMPI_REFUSE(node < terrain->tree.level_first[1] &&
                     (terrain->tree.nodes[node].low < terrain->sample_low ||
@@ -13228,12 +13155,12 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
-        TERRIMPI_REFUSE(terrain->meshes[node].vertex_count == 0, TERRIMP_E_STATE);
+        TERRIMPI_REFUSE(terrimpi_mesh_vertices(&terrain->meshes[node]) == 0, TERRIMP_E_STATE);
     terrimp_geomip_build_finish(tree);
     terrain->mesh_triangle_count = 0;
     for (node = 0; node < tree->node_count; node++) {
         terrimpi_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
-        terrain->mesh_triangle_count += terrain->meshes[node].triangle_count;
+        terrain->mesh_triangle_count += terrimpi_mesh_triangles(&terrain->meshes[node]);
     }
     for (node = 0; node + 1u < tree->node_count; node++)
         terrimpi_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
@@ -13337,8 +13264,20 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
     return arrays ? sizeof(terrimpi_bake) + arrays : 0;
 }
 
+static void terrimpi_swap_words(unsigned char *words, size_t bytes)
+{
+    size_t i;
+    for (i = 0; i + 4u <= bytes; i += 4u) {
+        unsigned char first = words[i], second = words[i + 1u];
+        words[i] = words[i + 3u];
+        words[i + 1u] = words[i + 2u];
+        words[i + 2u] = second;
+        words[i + 3u] = first;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
-                                              size_t bytes)
+                                              size_t bytes, int swapped)
 {
     const terrimp_terrain_desc *desc;
     terrimpi_bake bake;
@@ -13360,7 +13299,6 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.chunk_quads = desc->chunk_quads;
     bake.triangle_budget = desc->triangle_budget;
     bake.flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
-                 (desc->upper_skirts ? 0u : (uint32_t)TERRIMPI_BAKE_NO_UPPER_SKIRTS) |
                  (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
     bake.node_count = terrain->tree.node_count;
     bake.vertex_limit = terrain->vertex_limit;
@@ -13376,9 +13314,12 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.range_low = terrain->range_low;
     bake.range_step = terrain->range_step;
     bake.proud = desc->proud;
-    bake.checksum = terrimpi_bake_hash(&bake, terrain);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
+    bake.checksum = terrimpi_bake_hash(out);
+    memcpy(out, &bake, sizeof bake);
+    if (swapped)
+        terrimpi_swap_words((unsigned char *)out, bake.bytes);
     return TERRIMP_OK;
 }
 

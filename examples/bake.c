@@ -107,15 +107,15 @@ static terrimp_result bake(const options *o, const terrimp_heightfield *field,
     *bytes = terrimp_bake_bytes(terrain);
     memory = malloc(terrimp_terrain_open_bytes());
     *block = malloc(*bytes ? *bytes : 1);
-    result = *block && memory ? terrimp_bake_write(terrain, *block, *bytes) : TERRIMP_E_MEMORY;
-    terrimp_terrain_destroy(terrain);
+    result = *block && memory ? terrimp_bake_write(terrain, *block, *bytes, 0) : TERRIMP_E_MEMORY;
     if (result == TERRIMP_OK) /* what a game does, when it starts */
         result = terrimp_terrain_open(field, *block, *bytes, memory, terrimp_terrain_open_bytes(),
                                       &opened);
     if (result == TERRIMP_OK)
         result = terrimp_terrain_get_info(opened, info);
     if (result == TERRIMP_OK && o->turn)
-        result = terrimp_bake_convert(*block, *bytes, *block, *bytes);
+        result = terrimp_bake_write(terrain, *block, *bytes, 1);
+    terrimp_terrain_destroy(terrain);
     free(memory);
     return result;
 }

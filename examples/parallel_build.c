@@ -98,7 +98,7 @@ static void *bake(const terrimp_terrain *terrain, size_t *bytes)
     void *block;
     *bytes = terrimp_bake_bytes(terrain);
     block = malloc(*bytes ? *bytes : 1);
-    if (!block || terrimp_bake_write(terrain, block, *bytes) != TERRIMP_OK)
+    if (!block || terrimp_bake_write(terrain, block, *bytes, 0) != TERRIMP_OK)
         exit(1);
     return block;
 }

@@ -26,16 +26,16 @@ static double standing_out(const terrimp_terrain *t, uint32_t node, float slack)
     memset(&mesh, 0, sizeof mesh);
     mesh.vertices = build.vertices;
     mesh.indices = build.indices;
-    mesh.border_vertex_count = t->meshes[node].border_count;
-    mesh.surface_index_count = 3u * t->meshes[node].triangle_count;
-    for (i = 0; i < t->meshes[node].vertex_count; i++) {
-        const terrimpi_point *point = t->points + (size_t)node * t->vertex_limit + i;
-        build.vertices[i].x = point->x;
-        build.vertices[i].z = point->z;
-        build.vertices[i].height = terrimpi_mesh_height(t, point->height);
+    mesh.border_vertex_count = terrimpi_mesh_border(&t->meshes[node]);
+    mesh.surface_index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
+    for (i = 0; i < terrimpi_mesh_vertices(&t->meshes[node]); i++) {
+        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        build.vertices[i].x = point.x;
+        build.vertices[i].z = point.z;
+        build.vertices[i].height = point.height;
     }
     for (i = 0; i < mesh.surface_index_count; i++)
-        build.indices[i] = t->corners[(size_t)node * t->index_limit + i];
+        build.indices[i] = (uint16_t)terrimpi_mesh_corner(t, node, i);
     terrimpi_make_facets(&p, &mesh, build.facets);
     for (z = 0; z <= p.span_z; z++) {
         terrimpi_survey_row(t, &p, &mesh, &build, z);
@@ -72,25 +72,20 @@ static int bench(const terrimp_terrain_desc *desc)
     terrimp_terrain_get_box(t, t->tree.node_count - 1u, &box);
     range = (double)(t->sample_high - t->sample_low);
     say("\n| level | nodes | ms a node | ms all | max %% | mean max %% | mean rms %% | "
-        "upper skirt %% | above %% | clamped |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+        "above %% |\n|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (level = 0; level < t->tree.level_count; level++) {
-        double most = 0, sum = 0, rms = 0, skirt = 0, above = 0;
-        uint32_t nodes = t->tree.level_first[level + 1] - t->tree.level_first[level], clamped = 0;
+        double most = 0, sum = 0, rms = 0, above = 0;
+        uint32_t nodes = t->tree.level_first[level + 1] - t->tree.level_first[level];
         for (node = t->tree.level_first[level]; node < t->tree.level_first[level + 1]; node++) {
             const terrimpi_mesh *mesh = &t->meshes[node];
-            uint32_t i;
             most = (double)mesh->error > most ? (double)mesh->error : most;
             sum += (double)mesh->error;
             rms += (double)mesh->error_rms;
-            skirt += (double)mesh->upper_skirt;
             above += standing_out(t, node, (float)(1e-6 * range));
-            for (i = 0; i < mesh->vertex_count; i++)
-                clamped += t->points[(size_t)node * t->vertex_limit + i].height % 65535u == 0;
         }
-        say("| %u | %u | %.2f | %.0f | %.2f | %.2f | %.3f | %.2f | %.3f | %u |\n", (unsigned)level,
+        say("| %u | %u | %.2f | %.0f | %.2f | %.2f | %.3f | %.3f |\n", (unsigned)level,
                (unsigned)nodes, ms[level] / nodes, ms[level], 100 * most / range,
-               100 * sum / nodes / range, 100 * rms / nodes / range, 100 * skirt / nodes / range,
-               100 * above / nodes, (unsigned)clamped);
+               100 * sum / nodes / range, 100 * rms / nodes / range, 100 * above / nodes);
     }
     say("\nIn all %.0f ms, %.2f times level 0; %.1f bytes a node, %.3f a sample\n", whole,
            whole / ms[0], (double)bytes / t->tree.node_count,

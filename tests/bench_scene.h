@@ -163,7 +163,7 @@ static void scene_write_bake(const scene *s, int i)
     FILE *file;
     if (!block)
         return;
-    need(terrimp_bake_write(s->terrain[i], block, bytes));
+    need(terrimp_bake_write(s->terrain[i], block, bytes, 0));
     scene_bake_path(s, i, path, sizeof path);
     file = fopen(path, "wb");
     if (file && (fwrite(block, 1, bytes, file) != bytes) + (fclose(file) != 0) > 0)

@@ -38,7 +38,6 @@ static void describe_terrain(terrimp_terrain_desc *desc)
     desc->proud = fuzz_u8() & 7u ? 0.0f : fuzz_float(1.0f);
     desc->not_proud = (int)(fuzz_u8() & 1u);
     desc->no_lower_skirts = fuzz_u8() == 1;
-    desc->upper_skirts = fuzz_u8() == 1;
     if (fuzz_u8() == 1) { /* a range that edits keep to, or not */
         desc->height_low = fuzz_good(-7000.0f, 0.0f);
         desc->height_high = fuzz_good(0.0f, 7000.0f);

@@ -77,7 +77,7 @@ static void *bake_of(const terrimp_terrain *terrain, size_t *bytes)
     void *block;
     *bytes = terrimp_bake_bytes(terrain);
     block = malloc(*bytes);
-    CHECK(terrimp_bake_write(terrain, block, *bytes) == TERRIMP_OK);
+    CHECK(terrimp_bake_write(terrain, block, *bytes, 0) == TERRIMP_OK);
     return block;
 }
 

@@ -39,8 +39,10 @@ static void packed_rectangles_keep_apart_and_inside(void)
     for (i = 0; i < 300; i++) {
         uint32_t width = random_range(15, 700), height = random_range(15, 700);
         uint32_t count = random_range(0, ATLAS_ITEMS), k, j;
+        uint32_t most = random_range(1, 8), widest = random_range(1, 2u * width / most + 1u);
+        uint32_t tallest = random_range(1, height / most + 1u);
         float scale = 0.0f;
-        random_rects(rects, count, random_range(1, 2u * width), random_range(1, height));
+        random_rects(rects, count, widest, tallest);
         for (k = 0; k < count; k++)
             if (random_range(0, 9) == 0)
                 *(random_range(0, 1) ? &rects[k].width : &rects[k].height) = 0;

@@ -834,32 +834,33 @@ static void bakes_are_refused(void)
     terrimp_terrain_desc desc;
     terrimp_terrain *terrain = NULL, *opened;
     terrimp_bake_info info;
+    terrimp_heightfield field;
     size_t size;
     memset(&desc, 0, sizeof desc);
     good_field(&desc.field);
     CHECK(terrimp_bake_bytes(NULL) == 0);
     GIVES(TERRIMP_OK, terrimp_terrain_init(&desc, memory, sizeof memory, &terrain));
     CHECK(terrimp_bake_bytes(terrain) == 0);
-    GIVES(TERRIMP_E_STATE, terrimp_bake_write(terrain, other, sizeof other));
+    GIVES(TERRIMP_E_STATE, terrimp_bake_write(terrain, other, sizeof other, 0));
     GIVES(TERRIMP_OK, terrimp_terrain_create(&desc, NULL, &terrain));
     size = terrimp_bake_bytes(terrain);
     CHECK(size > 0 && size < sizeof memory);
-    GIVES(TERRIMP_E_NULL, terrimp_bake_write(NULL, other, sizeof other));
-    GIVES(TERRIMP_E_NULL, terrimp_bake_write(terrain, NULL, sizeof other));
-    REFUSES(TERRIMP_E_CAPACITY, other, terrimp_bake_write(terrain, other, size - 1u));
-    REFUSES(TERRIMP_E_ALIGN, other, terrimp_bake_write(terrain, odd, size));
-    GIVES(TERRIMP_OK, terrimp_bake_write(terrain, memory, size));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_write(NULL, other, sizeof other, 0));
+    GIVES(TERRIMP_E_NULL, terrimp_bake_write(terrain, NULL, sizeof other, 0));
+    REFUSES(TERRIMP_E_CAPACITY, other, terrimp_bake_write(terrain, other, size - 1u, 1));
+    REFUSES(TERRIMP_E_ALIGN, other, terrimp_bake_write(terrain, odd, size, 0));
+    GIVES(TERRIMP_OK, terrimp_bake_write(terrain, memory, size, 0));
+    field = desc.field;
+    field.samples = NULL;
 
-    REFUSES(TERRIMP_E_NULL, info, terrimp_bake_check(NULL, size, &info));
-    REFUSES(TERRIMP_E_ALIGN, info, terrimp_bake_check(bytes + 1, size, &info));
-    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, 0, &info));
-    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, size - 1u, &info));
-    GIVES(TERRIMP_E_NULL, terrimp_bake_convert(NULL, size, other, size));
-    GIVES(TERRIMP_E_NULL, terrimp_bake_convert(memory, size, NULL, size));
-    REFUSES(TERRIMP_E_ALIGN, other, terrimp_bake_convert(memory, size, odd, size));
-    REFUSES(TERRIMP_E_CAPACITY, other, terrimp_bake_convert(memory, size, other, size - 1u));
-    GIVES(TERRIMP_E_NULL, terrimp_bake_matches(memory, size, NULL));
-    GIVES(TERRIMP_E_NULL, terrimp_bake_matches(NULL, size, &desc.field));
+    REFUSES(TERRIMP_E_NULL, info, terrimp_bake_check(NULL, size, NULL, &info));
+    REFUSES(TERRIMP_E_ALIGN, info, terrimp_bake_check(bytes + 1, size, NULL, &info));
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, 0, NULL, &info));
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, size - 1u, NULL, &info));
+    REFUSES(TERRIMP_E_NULL, info, terrimp_bake_check(memory, size, &field, &info));
+    field = desc.field;
+    field.height_offset += 1.0f;
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_bake_check(memory, size, &field, &info));
     REFUSES(TERRIMP_E_NULL, opened, terrimp_terrain_open(NULL, memory, size, other, 8192, &opened));
     REFUSES(TERRIMP_E_NULL, opened,
             terrimp_terrain_open(&desc.field, NULL, size, other, 8192, &opened));
@@ -875,7 +876,7 @@ static void bakes_are_refused(void)
     REFUSES(TERRIMP_E_BAKE, opened,
             terrimp_terrain_open(&desc.field, memory, size, other, 8192, &opened));
     bytes[20]--;
-    GIVES(TERRIMP_OK, terrimp_bake_convert(memory, size, memory, size));
+    GIVES(TERRIMP_OK, terrimp_bake_write(terrain, memory, size, 1));
     REFUSES(TERRIMP_E_ORDER, opened,
             terrimp_terrain_open(&desc.field, memory, size, other, 8192, &opened));
     terrimp_terrain_destroy(terrain);

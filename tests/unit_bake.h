@@ -24,14 +24,13 @@ static int bake_land(baked_land *b, uint32_t width, uint32_t depth, int format, 
     b->l.desc.triangle_budget = budget;
     b->l.desc.not_proud = kind % 3 == 0;
     b->l.desc.no_lower_skirts = kind % 4 == 1;
-    b->l.desc.upper_skirts = kind % 5 != 1;
     if (!land_build(&b->l))
         return 0;
     b->bytes = terrimp_bake_bytes(b->l.terrain);
     CHECK(b->bytes > 0);
     b->block = (unsigned char *)malloc(b->bytes);
     b->memory = malloc(terrimp_terrain_open_bytes());
-    CHECK(terrimp_bake_write(b->l.terrain, b->block, b->bytes) == TERRIMP_OK);
+    CHECK(terrimp_bake_write(b->l.terrain, b->block, b->bytes, 0) == TERRIMP_OK);
     return 1;
 }
 
@@ -123,19 +122,18 @@ static void opened_bakes_are_the_terrain_that_was_baked(void)
             terrimp_bake_info info;
             unsigned char *copy = (unsigned char *)malloc(b.bytes);
             memcpy(copy, b.block, b.bytes);
-            CHECK(terrimp_bake_check(b.block, b.bytes, &info) == TERRIMP_OK);
+            CHECK(terrimp_bake_check(b.block, b.bytes, &b.l.desc.field, &info) == TERRIMP_OK);
             CHECK(info.bytes == b.bytes && info.node_count == b.l.info.node_count);
             CHECK(info.width == b.l.desc.field.width && info.depth == b.l.desc.field.depth);
             CHECK(info.format == b.l.desc.field.format && info.level_count == b.l.info.level_count);
             CHECK(info.chunk_quads == b.l.info.chunk_quads);
             CHECK(info.triangle_budget == b.l.desc.triangle_budget);
-            CHECK(terrimp_bake_matches(b.block, b.bytes, &b.l.desc.field) == TERRIMP_OK);
             CHECK(baked_open(&b) == TERRIMP_OK);
             check_same_terrain(&b.l, b.opened);
             CHECK(memcmp(copy, b.block, b.bytes) == 0);
-            CHECK(terrimp_bake_write(b.l.terrain, copy, b.bytes) == TERRIMP_OK);
+            CHECK(terrimp_bake_write(b.l.terrain, copy, b.bytes, 0) == TERRIMP_OK);
             CHECK(memcmp(copy, b.block, b.bytes) == 0); /* the same bytes each time */
-            CHECK(terrimp_bake_write(b.l.terrain, copy, b.bytes - 1u) == TERRIMP_E_CAPACITY);
+            CHECK(terrimp_bake_write(b.l.terrain, copy, b.bytes - 1u, 0) == TERRIMP_E_CAPACITY);
             free(copy);
         }
         baked_free(&b);
@@ -206,74 +204,42 @@ static void bakes_open_on_their_own_field_alone(void)
         *f = good;
         *sample = (int16_t)(*sample + 1);
         CHECK(baked_open(&b) == TERRIMP_OK);
-        CHECK(terrimp_bake_matches(b.block, b.bytes, f) == TERRIMP_E_BAKE);
+        CHECK(terrimp_bake_check(b.block, b.bytes, f, NULL) == TERRIMP_E_BAKE);
     }
     baked_free(&b);
 }
 
-/* Whether n bytes at a are those at b in reverse. */
-static int is_turned(const void *a, const void *b, size_t n)
+/* Whether each word of one block is that of the other in reverse. */
+static int is_swapped(const unsigned char *a, const unsigned char *b, size_t bytes)
 {
     size_t i;
-    for (i = 0; i < n; i++)
-        if (((const unsigned char *)a)[i] != ((const unsigned char *)b)[n - 1u - i])
+    for (i = 0; i < bytes; i++)
+        if (a[i] != b[i ^ 3u])
             return 0;
-    return 1;
+    return bytes % 4u == 0;
 }
 
-/* Each number of a turned bake is turned in its own place. */
-static void check_turned(const unsigned char *block, const unsigned char *turned)
+/* What is written for the other byte order is refused here, and right when it is swapped back. */
+static void bakes_are_written_for_the_other_byte_order(void)
 {
-    terrimpi_bake bake;
-    terrimp_terrain a, b;
-    size_t i;
-    memcpy(&bake, block, sizeof bake);
-    CHECK(terrimpi_bake_header(&bake, bake.bytes, &a));
-    b = a;
-    terrimpi_bake_arrays_at(&a, block);
-    terrimpi_bake_arrays_at(&b, turned);
-    for (i = 0; i < sizeof bake; i += 4u)
-        CHECK(is_turned(block + i, turned + i, 4));
-    for (i = 0; i < a.tree.node_count; i++) {
-        CHECK(is_turned(&a.tree.nodes[i].low, &b.tree.nodes[i].low, 4));
-        CHECK(is_turned(&a.tree.nodes[i].rms, &b.tree.nodes[i].rms, 4));
-        CHECK(is_turned(&a.meshes[i].error, &b.meshes[i].error, 4));
-        CHECK(is_turned(&a.meshes[i].high, &b.meshes[i].high, 4));
-        CHECK(is_turned(&a.meshes[i].triangle_count, &b.meshes[i].triangle_count, 2));
-        CHECK(a.meshes[i].border_count == b.meshes[i].border_count);
-    }
-    for (i = 0; i < (size_t)a.tree.node_count * a.vertex_limit; i++)
-        CHECK(is_turned(&a.points[i].height, &b.points[i].height, 2) &&
-              a.points[i].x == b.points[i].x && a.points[i].z == b.points[i].z);
-    CHECK(memcmp(a.corners, b.corners, (size_t)a.tree.node_count * a.index_limit) == 0);
-}
-
-/* Turned round once, a bake has to be converted; turned round twice, it is as it was. */
-static void bakes_of_the_other_byte_order_convert(void)
-{
-    size_t i;
+    size_t i, k;
     for (i = 0; i < sizeof bake_sizes / sizeof bake_sizes[0]; i++) {
         baked_land b;
         if (bake_sized(&b, i)) {
             unsigned char *copy = (unsigned char *)malloc(b.bytes);
             terrimp_bake_info info;
-            CHECK(terrimp_bake_convert(b.block, b.bytes, copy, b.bytes - 1u) ==
-                  TERRIMP_E_CAPACITY);
-            CHECK(terrimp_bake_convert(b.block, b.bytes, copy, b.bytes) == TERRIMP_OK);
-            check_turned(b.block, copy);
-            CHECK(terrimp_bake_check(copy, b.bytes, &info) == TERRIMP_E_ORDER);
-            memcpy(b.block, copy, b.bytes);
+            memset(&info, UNTOUCHED, sizeof info);
+            CHECK(terrimp_bake_write(b.l.terrain, copy, b.bytes, 1) == TERRIMP_OK);
+            CHECK(is_swapped(b.block, copy, b.bytes));
+            CHECK(terrimp_bake_check(copy, b.bytes, NULL, &info) == TERRIMP_E_ORDER);
+            CHECK(is_untouched(&info, sizeof info));
+            for (k = 0; k < b.bytes; k++)
+                b.block[k] = copy[k];
             CHECK(baked_open(&b) == TERRIMP_E_ORDER && b.opened == NULL);
-            CHECK(terrimp_bake_convert(copy, b.bytes, b.block, b.bytes) == TERRIMP_OK);
+            for (k = 0; k < b.bytes; k++)
+                b.block[k] = copy[k ^ 3u];
             CHECK(baked_open(&b) == TERRIMP_OK);
             check_same_terrain(&b.l, b.opened);
-            CHECK(terrimp_bake_convert(copy, b.bytes, copy, b.bytes) == TERRIMP_OK); /* in place */
-            CHECK(memcmp(copy, b.block, b.bytes) == 0);
-            CHECK(terrimp_bake_convert(copy, b.bytes, copy, b.bytes) == TERRIMP_OK);
-            copy[b.bytes / 2u] ^= 1u;
-            memcpy(b.block, copy, b.bytes);
-            if (terrimp_bake_convert(copy, b.bytes, copy, b.bytes) != TERRIMP_OK)
-                CHECK(memcmp(copy, b.block, b.bytes) == 0); /* a false block stays as it was */
             free(copy);
         }
         baked_free(&b);
@@ -317,8 +283,7 @@ static void forge_checksum(unsigned char *block)
     memcpy(&bake, block, sizeof bake);
     if (!terrimpi_bake_header(&bake, bake.bytes, &t))
         return;
-    terrimpi_bake_arrays_at(&t, block);
-    bake.checksum = terrimpi_bake_hash(&bake, &t);
+    bake.checksum = terrimpi_bake_hash(block);
     memcpy(block, &bake, sizeof bake);
 }
 
@@ -379,14 +344,13 @@ static void every_false_number_of_a_bake_is_refused(void)
     unsigned char *sound = (unsigned char *)malloc(b.bytes + 1u);
     memcpy(sound, b.block, b.bytes);
     CHECK(baked);
-    for (kind = 0; baked && kind < 29; kind++) {
+    for (kind = 0; baked && kind < 30; kind++) {
         terrimpi_bake *bake = (terrimpi_bake *)(void *)b.block;
         terrimp_terrain t;
         uint32_t node = random_range(0, b.l.info.node_count - 1u);
         terrimp_geomip_node *ground;
         terrimpi_mesh *mesh;
-        terrimpi_point *points;
-        uint8_t *corners;
+        uint32_t *points, *corners, vertices;
         const uint32_t nan_bits = 0x7fc00000u;
         float nan;
         memcpy(&nan, &nan_bits, sizeof nan);
@@ -395,7 +359,8 @@ static void every_false_number_of_a_bake_is_refused(void)
         ground = &t.tree.nodes[node];
         mesh = &t.meshes[node];
         points = t.points + (size_t)node * t.vertex_limit;
-        corners = t.corners + (size_t)node * t.index_limit;
+        corners = t.corners + (size_t)node * (t.index_limit / 4u);
+        vertices = terrimpi_mesh_vertices(mesh);
         switch (kind) {
         case 0: ground->low = nan; break;
         case 1: ground->low = ground->high + 1.0f; break;
@@ -408,24 +373,25 @@ static void every_false_number_of_a_bake_is_refused(void)
         case 8: mesh->error = nan; break;
         case 9: mesh->error_rms = nan; break;
         case 10: mesh->error_rms = bad[0]; break;
-        case 11: mesh->upper_skirt = nan; break;
-        case 12: mesh->upper_skirt = bad[1]; break;
+        case 11: mesh->base = nan; break;
+        case 12: mesh->base = bad[1]; break;
         case 13: mesh->low = nan; break;
         case 14: mesh->high = mesh->low; break;
-        case 15: mesh->triangle_count = 401; break;
-        case 16: mesh->triangle_count = 1; break;
-        case 17: mesh->border_count = 3; break;
-        case 18: mesh->vertex_count = 255; break;
-        case 19: mesh->vertex_count = 0; break;
-        case 20: corners[1] = mesh->vertex_count; break;
-        case 21: corners[0] = corners[1]; break;
-        case 22: points[1].x = 1; break;
-        case 23: points[mesh->vertex_count - 1].z = 17; break;
-        case 24: points[0].z = 1; break;
-        case 25: points[0].height = 65535; break;
-        case 26: points[mesh->vertex_count - 1].height = 0; break;
-        case 27: memcpy(corners, corners + 3, 3); break; /* covers twice, and leaves a hole */
-        default: mesh->border_count++; break;
+        case 15: mesh->counts = (mesh->counts & ~0x1ffu) | 401u; break;
+        case 16: mesh->counts = (mesh->counts & ~0x1ffu) | 1u; break;
+        case 17: mesh->counts = (mesh->counts & ~0xfe00u) | 3u << 9; break;
+        case 18: mesh->counts |= 255u << 16; break;
+        case 19: mesh->counts &= ~(255u << 16); break;
+        case 20: corners[0] = (corners[0] & ~0xff00u) | vertices << 8; break;
+        case 21: corners[0] = (corners[0] & ~0xffu) | (corners[0] >> 8 & 0xffu); break;
+        case 22: points[1] ^= 0x300u; break; /* another side */
+        case 23: points[vertices - 1u] |= 17u << 8; break;
+        case 24: points[0] |= 1u; break;
+        case 25: points[0] |= 0xfffffc00u; break;
+        case 26: mesh->counts |= 0x7fu << 25; break; /* steps of infinite height */
+        case 27: corners[0] = corners[0] >> 24 | corners[1] << 8; break; /* a hole */
+        case 28: points[0] |= 1u << 7; break;
+        default: mesh->counts += 1u << 9; break;
         }
         forge_checksum(b.block);
         if (baked_open(&b) != TERRIMP_E_BAKE)
@@ -446,8 +412,8 @@ static void surfaces_with_holes_are_refused(void)
         terrimp_terrain t;
         CHECK(terrimpi_bake_header((terrimpi_bake *)(void *)b.block, b.bytes, &t));
         terrimpi_bake_arrays_at(&t, b.block);
-        CHECK(t.meshes[0].triangle_count == 2);
-        memcpy(t.corners, t.corners + 3, 3);
+        CHECK(terrimpi_mesh_triangles(&t.meshes[0]) == 2);
+        t.corners[0] = t.corners[0] >> 24 | t.corners[1] << 8;
         forge_checksum(b.block);
         CHECK(baked_open(&b) == TERRIMP_E_BAKE);
     }
@@ -462,8 +428,7 @@ static void truncated_bakes_are_refused(void)
         for (bytes = 0; bytes < b.bytes; bytes += bytes < 200u ? 1u : step) {
             uint64_t *cut = (uint64_t *)malloc(bytes + 1u);
             memcpy(cut, b.block, bytes);
-            CHECK(terrimp_bake_check(cut, bytes, NULL) == TERRIMP_E_BAKE);
-            CHECK(terrimp_bake_convert(cut, bytes, cut, bytes) == TERRIMP_E_BAKE);
+            CHECK(terrimp_bake_check(cut, bytes, NULL, NULL) == TERRIMP_E_BAKE);
             free(cut);
         }
     }
@@ -479,9 +444,9 @@ static void bakes_may_have_company(void)
         terrimp_bake_info info;
         memcpy(more, b.block, b.bytes);
         memset(more + b.bytes, UNTOUCHED, 100);
-        CHECK(terrimp_bake_check(more, b.bytes + 100u, &info) == TERRIMP_OK);
+        CHECK(terrimp_bake_check(more, b.bytes + 100u, NULL, &info) == TERRIMP_OK);
         CHECK(info.bytes == b.bytes);
-        CHECK(terrimp_bake_convert(more, b.bytes + 100u, more, b.bytes + 100u) == TERRIMP_OK);
+        CHECK(terrimp_bake_write(b.l.terrain, more, b.bytes + 100u, 1) == TERRIMP_OK);
         CHECK(is_untouched(more + b.bytes, 100));
         free(more);
     }
@@ -612,8 +577,8 @@ static void rebuilt_terrains_equal_those_built_anew(void)
             CHECK(terrimp_terrain_create(&l.desc, NULL, &anew) == TERRIMP_OK);
             block[0] = (unsigned char *)malloc(bytes);
             block[1] = (unsigned char *)malloc(bytes);
-            CHECK(terrimp_bake_write(l.terrain, block[0], bytes) == TERRIMP_OK);
-            CHECK(terrimp_bake_write(anew, block[1], bytes) == TERRIMP_OK);
+            CHECK(terrimp_bake_write(l.terrain, block[0], bytes, 0) == TERRIMP_OK);
+            CHECK(terrimp_bake_write(anew, block[1], bytes, 0) == TERRIMP_OK);
             CHECK(memcmp(block[0], block[1], bytes) == 0);
             after = copy_host(&l, l.terrain);
             check_touched(&l, &rect, &before, &after);
@@ -669,7 +634,7 @@ static void bad_edits_change_nothing(void)
         CHECK(terrimp_terrain_touched(t, NULL, 0, NULL, 0, &count) == TERRIMP_E_NULL);
         CHECK(count == 77);
         CHECK(terrimp_terrain_touched(t, &rect, 0, NULL, 0, NULL) == TERRIMP_E_NULL);
-        CHECK(terrimp_bake_write(t, block, b.bytes) == TERRIMP_OK);
+        CHECK(terrimp_bake_write(t, block, b.bytes, 0) == TERRIMP_OK);
         CHECK(memcmp(block, b.block, b.bytes) == 0);
         free(block);
         free(scratch);
@@ -694,8 +659,8 @@ static void terrains_of_any_scale_are_refused_or_open(void)
         if (result == TERRIMP_OK) {
             size_t bytes = terrimp_bake_bytes(l.terrain);
             void *block = malloc(bytes);
-            CHECK(terrimp_bake_write(l.terrain, block, bytes) == TERRIMP_OK);
-            CHECK(terrimp_bake_check(block, bytes, NULL) == TERRIMP_OK);
+            CHECK(terrimp_bake_write(l.terrain, block, bytes, 0) == TERRIMP_OK);
+            CHECK(terrimp_bake_check(block, bytes, &l.desc.field, NULL) == TERRIMP_OK);
             free(block);
             built++;
         } else {
@@ -712,7 +677,7 @@ static void bake_tests(void)
     RUN(views_of_opened_bakes_give_the_same_commands);
     RUN(bakes_are_small);
     RUN(bakes_open_on_their_own_field_alone);
-    RUN(bakes_of_the_other_byte_order_convert);
+    RUN(bakes_are_written_for_the_other_byte_order);
     RUN(damaged_bakes_do_no_harm);
     RUN(every_false_number_of_a_bake_is_refused);
     RUN(surfaces_with_holes_are_refused);

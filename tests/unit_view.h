@@ -453,6 +453,23 @@ static void flight_draw_ground(void *user, const terrimp_ground_command *command
     f->ground_count++;
 }
 
+/* The texels by which float rounding can move what a row of a texture matrix gives for a point: the
+   closer that is to the plane of the eye, the more. */
+static double texture_rounding(const float m[16], const double p[3], int row, double size)
+{
+    double q = fabs((double)m[3] * p[0] + (double)m[7] * p[1] + (double)m[11] * p[2] +
+                    (double)m[15]);
+    double sums[2], out = fabs((double)m[row] * p[0] + (double)m[row + 4] * p[1] +
+                               (double)m[row + 8] * p[2] + (double)m[row + 12]) / q;
+    int i;
+    for (i = 0; i < 2; i++) {
+        int k = i ? 3 : row;
+        sums[i] = fabs((double)m[k] * p[0]) + fabs((double)m[k + 4] * p[1]) +
+                  fabs((double)m[k + 8] * p[2]) + fabs((double)m[k + 12]);
+    }
+    return 1.2e-7 * (sums[0] + out * sums[1]) / q * size;
+}
+
 /* The texture matrix leads the vertices of the mesh to where the capture put them, in its slot. The
    parts of a picture show all of them. */
 static void check_texture(const flight *f, const terrimp_impostor_command *command)
@@ -466,7 +483,7 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     step = mesh.vertex_count / 5u + 1u;
     for (i = 0; i < mesh.vertex_count; i += step) {
         double p[3], seen[4], clip[4], out[4], x, y;
-        double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height);
+        double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height), rim_y;
         int shown = 0, k;
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
         oracle_transform(capture->view, p, seen);
@@ -479,10 +496,12 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         rim += 2e-6 * fabs(p[1]) * (double)(capture->slot.width + capture->slot.height) / clip[3];
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
+        rim_y = rim + texture_rounding(command->texture_matrix, p, 1, size);
+        rim += texture_rounding(command->texture_matrix, p, 0, size);
         CHECK(fabs(x - (clip[0] / clip[3] * 0.5 + 0.5) * (double)capture->slot.width) < rim);
-        CHECK(fabs(y - (clip[1] / clip[3] * 0.5 + 0.5) * (double)capture->slot.height) < rim);
+        CHECK(fabs(y - (clip[1] / clip[3] * 0.5 + 0.5) * (double)capture->slot.height) < rim_y);
         CHECK(x > -rim && x < (double)capture->slot.width + rim);
-        CHECK(y > -rim && y < (double)capture->slot.height + rim);
+        CHECK(y > -rim_y && y < (double)capture->slot.height + rim_y);
         for (part = 0; part < command->part_count; part++) {
             oracle_transform(parts[part].capture.view, p, seen);
             oracle_transform4(parts[part].capture.projection, seen, clip);

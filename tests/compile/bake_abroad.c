@@ -1,7 +1,7 @@
 /* A bake made on one machine and opened on another. "make FILE" builds a terrain and writes its
-   bake; "open FILE..." opens each, converted first if it has the other byte order, checks what it
-   says against the samples, draws frames of it, and damages it to see it refused. Prints how many
-   were used as they are and how many converted. */
+   bake, and to FILE.swapped the one for the other byte order; "open FILE..." opens each, or the
+   swapped one, checks what it says against the samples, draws frames of it, and damages it to see
+   it refused. Prints how many were used as they are and how many swapped. */
 #include <stdio.h>
 
 #define TERRIMP_IMPLEMENTATION
@@ -12,7 +12,7 @@
 #define CAPACITY (1u << 20)
 
 static uint16_t samples[DEPTH][WIDTH];
-static uint64_t block[CAPACITY / 8], turned[CAPACITY / 8]; /* 8: as bakes are aligned */
+static uint64_t block[CAPACITY / 8]; /* 8: as bakes are aligned */
 
 static terrimp_heightfield make_field(void)
 {
@@ -35,22 +35,33 @@ static terrimp_heightfield make_field(void)
 
 /* ---- make ---- */
 
+static int write_bake(const terrimp_terrain *terrain, const char *name, int swapped)
+{
+    size_t bytes = terrimp_bake_bytes(terrain);
+    FILE *file;
+    return terrimp_bake_write(terrain, block, sizeof block, swapped) == TERRIMP_OK &&
+           (file = fopen(name, "wb")) != NULL &&
+           (fwrite(block, 1, bytes, file) == bytes) + (fclose(file) == 0) == 2;
+}
+
+static const char *name_of_swapped(const char *name)
+{
+    static char swapped[1024];
+    sprintf(swapped, "%.1000s.swapped", name);
+    return swapped;
+}
+
 static int make(const char *name)
 {
     terrimp_terrain_desc desc;
     terrimp_terrain *terrain;
-    size_t bytes;
-    FILE *file;
     int written;
     memset(&desc, 0, sizeof desc);
     desc.field = make_field();
     desc.chunk_quads = 8;
     if (terrimp_terrain_create(&desc, NULL, &terrain) != TERRIMP_OK)
         return 0;
-    bytes = terrimp_bake_bytes(terrain);
-    written = terrimp_bake_write(terrain, block, sizeof block) == TERRIMP_OK &&
-              (file = fopen(name, "wb")) != NULL &&
-              (fwrite(block, 1, bytes, file) == bytes) + (fclose(file) == 0) == 2;
+    written = write_bake(terrain, name, 0) && write_bake(terrain, name_of_swapped(name), 1);
     terrimp_terrain_destroy(terrain);
     return written;
 }
@@ -133,34 +144,39 @@ static int damage_is_refused(unsigned char *bytes, size_t count)
     for (i = 0; i < count; i += 1 + count / 200) {
         terrimp_result result;
         bytes[i] ^= 0x10;
-        result = terrimp_bake_check(block, count, NULL);
+        result = terrimp_bake_check(block, count, NULL, NULL);
         bytes[i] ^= 0x10;
         if (result != TERRIMP_E_BAKE)
             return 0;
     }
-    return terrimp_bake_check(block, count - 1, NULL) == TERRIMP_E_BAKE;
+    return terrimp_bake_check(block, count - 1, NULL, NULL) == TERRIMP_E_BAKE;
+}
+
+/* Reads a file into the block; returns its bytes, 0 for none. */
+static size_t read_bake(const char *name)
+{
+    FILE *file = fopen(name, "rb");
+    size_t bytes = file ? fread(block, 1, sizeof block, file) : 0;
+    return file && fclose(file) == 0 ? bytes : 0;
 }
 
 /* 0, or what failed: 1 the file, 2 the bake. */
-static int open_bake(const char *name, int *converted)
+static int open_bake(const char *name, int *swapped)
 {
     static uint64_t memory[4096 / 8];
     const terrimp_heightfield field = make_field();
     terrimp_terrain *terrain;
     terrimp_result result;
-    FILE *file = fopen(name, "rb");
-    size_t bytes = file ? fread(block, 1, sizeof block, file) : 0;
-    if (!file || fclose(file) != 0 || bytes == 0)
+    size_t bytes = read_bake(name);
+    if (bytes == 0)
         return 1;
     result = terrimp_terrain_open(&field, block, bytes, memory, sizeof memory, &terrain);
-    *converted = result == TERRIMP_E_ORDER;
-    if (*converted) {
-        if (terrimp_bake_convert(block, bytes, turned, sizeof turned) != TERRIMP_OK)
-            return 2;
-        memcpy(block, turned, bytes);
+    *swapped = result == TERRIMP_E_ORDER;
+    if (*swapped) {
+        bytes = read_bake(name_of_swapped(name));
         result = terrimp_terrain_open(&field, block, bytes, memory, sizeof memory, &terrain);
     }
-    if (result != TERRIMP_OK || terrimp_bake_matches(block, bytes, &field) != TERRIMP_OK ||
+    if (result != TERRIMP_OK || terrimp_bake_check(block, bytes, &field, NULL) != TERRIMP_OK ||
         !boxes_hold(terrain, &field) || !draws(terrain) ||
         !damage_is_refused((unsigned char *)block, bytes))
         return 2;
@@ -169,18 +185,18 @@ static int open_bake(const char *name, int *converted)
 
 int main(int argc, char **argv)
 {
-    int i, converted, as_they_are = 0, turned_round = 0;
+    int i, swapped, as_they_are = 0, others = 0;
     if (argc == 3 && strcmp(argv[1], "make") == 0)
         return make(argv[2]) ? 0 : 1;
     for (i = 2; i < argc; i++) {
-        int failure = open_bake(argv[i], &converted);
+        int failure = open_bake(argv[i], &swapped);
         if (failure) {
             printf("%s: %s\n", argv[i], failure == 1 ? "cannot be read" : "is no good here");
             return failure;
         }
-        turned_round += converted;
-        as_they_are += !converted;
+        others += swapped;
+        as_they_are += !swapped;
     }
-    printf("     %d used as they are, %d converted\n", as_they_are, turned_round);
+    printf("     %d used as they are, %d swapped\n", as_they_are, others);
     return argc > 2 ? 0 : 1;
 }

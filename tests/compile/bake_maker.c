@@ -15,7 +15,7 @@ size_t make_bake(const terrimp_heightfield *field, void *block, size_t bytes)
     desc.chunk_quads = 4;
     if (terrimp_terrain_init(&desc, memory, sizeof memory, &terrain) ||
         terrimp_terrain_build(terrain, scratch, sizeof scratch) ||
-        terrimp_bake_write(terrain, block, bytes))
+        terrimp_bake_write(terrain, block, bytes, 0))
         return 0;
     return terrimp_bake_bytes(terrain);
 }
