@@ -14299,7 +14299,10 @@ static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects
         for (a = 0; a < count; a++)
             for (b = a + 1u; b < count; b++) {
                 terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
-                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                if (terrimpi_cover_cost(c, r.width, r.height) / 2u > /* far apart */
+                        terrimpi_cover_cost(c, rects[a].width, rects[a].height) +
+                            terrimpi_cover_cost(c, rects[b].width, rects[b].height) ||
+                    terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
                     continue;
                 count = terrimpi_cover_swallow(&r, rects, count);
                 joined = 1;
@@ -15778,7 +15781,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
 
 #define TERRIMPI_PLACE_NONE 0xffffffffu
 enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
-#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+#define TERRIMPI_PLACE_WORK 3000000u /* numbers that attempts may go over, some 10 ns each */
 
 typedef struct terrimpi_placing {
     const terrimp_place_desc *desc;
