@@ -11,6 +11,7 @@
 #include "terrimp.h"
 
 #include "bench_say.h"
+#include "cover_greedy.h"
 
 #include <math.h>
 #include <time.h>
@@ -302,8 +303,10 @@ static void cover_figure(uint32_t masks[FIGURE_LAYERS][FIGURE_WORDS], uint32_t c
     *ms = now_ms();
     for (k = 0; k < FIGURE_LAYERS; k++) {
         d.mask = masks[k];
-        need(cell ? terrimp_cover_grow(&d, cell, 0.8f, scratch, bytes, rects, FIGURE_QUADS, &count)
-                  : terrimp_cover(&d, scratch, bytes, rects, FIGURE_QUADS, &count));
+        if (cell)
+            count = cover_greedily(&d, cell, 0.8f, rects, FIGURE_QUADS);
+        else
+            need(terrimp_cover(&d, scratch, bytes, rects, FIGURE_QUADS, &count));
         *quads += count;
         for (i = 0; i < count; i++)
             *texels += rects[i].width * rects[i].height;
