@@ -1498,7 +1498,7 @@ typedef struct terrimp_sorted {
                                     of this level is split */
     terrimp_sorted_int whole[TERRIMP_SORTED_LEVELS]; /* up to here a vertex has its own height */
     float fade[TERRIMP_SORTED_LEVELS]; /* 1 / (split of the next level - whole) */
-    terrimp_sorted_int texel_steps[3]; /* where the level after 0 begins; with less, with more */
+    terrimp_sorted_int texel_steps[2]; /* squared: where level 1 begins, and where it is left */
     uint32_t side_count;         /* of the footprint: sides[0] x + sides[1] z + sides[2] >= 0 */
     terrimp_sorted_int sides[TERRIMP_SORTED_SIDES][3];
     int32_t bounds[2][2];        /* of the footprint: first and last page along each axis */
@@ -9309,6 +9309,8 @@ static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_hull *hull, f
     side[2] = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
 }
 
+static int32_t terrimpi_larger(int32_t a, int32_t b) { return a > b ? a : b; }
+
 static int32_t terrimpi_floor(float value)
 {
     int32_t whole = (int32_t)value;
@@ -9366,22 +9368,23 @@ static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], i
     return (int)crossing;
 }
 
-/* First and last page of a row that the footprint can touch. */
+/* First and last page of a row that the footprint can touch, or one more: sides are divided in
+   pages, of which there are few, so that 32 bits are enough. */
 static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *first,
                                 int32_t *last)
 {
     int along = s->row_axis, across = 1 - along;
-    float page = (float)s->desc.page_quads, low = (float)row * page;
     uint32_t i;
     *first = s->bounds[along][0];
     *last = s->bounds[along][1];
     for (i = 0; i < s->side_count; i++) {
-        float n = (float)s->sides[i][along], m = (float)s->sides[i][across];
-        float at = -((float)s->sides[i][2] + m * (m > 0.0f ? low + page : low)) / n;
-        if (n > 0.0f && at > (float)*first * page)
-            *first = terrimpi_floor(at / page - 0.01f);
-        else if (n < 0.0f && at < (float)*last * page)
-            *last = terrimpi_floor(at / page + 0.01f);
+        int32_t n = (int32_t)s->sides[i][along], m = (int32_t)s->sides[i][across];
+        int32_t most = (int32_t)(s->sides[i][2] >> s->top) + 1 +
+                       m * (m > 0 ? row + 1 : row);
+        if (n > 0)
+            *first = terrimpi_larger(*first, -most / n - 1);
+        else if (n < 0)
+            *last = -terrimpi_larger(-*last, most / n);
     }
 }
 
@@ -9504,8 +9507,8 @@ static int terrimpi_sorted_quarter(terrimp_sorted *s)
 
 /* ---- pages ---- */
 
-/* The level at which a page's texels are no smaller than pixels at its closest point. One that was
-   left is entered again only a tenth farther on. */
+/* The level whose texels are one to two pixels large at the page's closest point. A coarser one is
+   left only a tenth closer than where it began. */
 static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int32_t page[2])
 {
     const terrimp_sorted_desc *d = &s->desc;
@@ -9522,7 +9525,7 @@ static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int
             level--;
     }
     while (level + 1u < d->texture_level_count &&
-           away >> 2u * level >= s->texel_steps[kept && *kept <= level ? 2 : 0])
+           away >> 2u * level >= s->texel_steps[0])
         level++;
     if (kept)
         *kept = (uint8_t)level;
@@ -9651,10 +9654,12 @@ static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int
     const void *row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
     const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
     switch (s->desc.field.format) {
-    case TERRIMP_FORMAT_U8: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
+#ifndef TERRIMP_FIXED
+    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
+#endif
     case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
     case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
-    default: return (terrimp_sorted_height)((const float *)row)[x];
+    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
     }
 }
 
@@ -10052,7 +10057,6 @@ static void terrimpi_sorted_texels(terrimp_sorted *s, const terrimp_camera *came
                (float)d->page_quads / (float)d->page_texels;
     s->texel_steps[0] = terrimpi_sorted_square(s, at);
     s->texel_steps[1] = terrimpi_sorted_square(s, at / 1.1f);
-    s->texel_steps[2] = terrimpi_sorted_square(s, at * 1.1f);
 }
 
 /* Rows across the view come before columns; beyond the last page of a field there is nothing. */

@@ -36,7 +36,7 @@ linked() # prefix, object, functions...: what is left of it in a host that calls
     for name in "$@"; do
         roots="$roots -u $name"
     done
-    "${prefix}ld" -r --gc-sections -e terrimp_view_update $roots "$object" -o $work/part.o
+    "${prefix}ld" -r --gc-sections -e $1 $roots "$object" -o $work/part.o
 }
 
 machine() # name, prefix, flags, "judged" or ""
@@ -62,6 +62,21 @@ machine() # name, prefix, flags, "judged" or ""
     linked "$2" $work/small.o $draws || exit 1
     row "$1" "the same without splits, BOUND, morphing" $work/part.o "$4"
     [ -z "$2" ] || needs_nothing_heavy "$1" "$2" "$object"
+    $compile -DTERRIMP_NO_BUILD -DTERRIMP_FIXED -o $work/fixed.o || exit 1
+    linked "$2" $work/fixed.o terrimp_sorted_begin terrimp_sorted_init terrimp_sorted_next || exit 1
+    row "$1" "Sorted alone, with TERRIMP_FIXED" $work/part.o
+    linked "$2" $work/fixed.o terrimp_sorted_next || exit 1
+    row "$1" "of that what runs for each triangle" $work/part.o
+    [ -z "$2" ] || needs_no_float "$1" "$2" $work/part.o
+}
+
+# With TERRIMP_FIXED what runs for each triangle has no floats, in software or in registers.
+needs_no_float() # name, prefix, object
+{
+    calls=$("$2objdump" -dr "$3" | grep -E 'R_ARM.*__aeabi_[df]|[[:space:]]v[a-z]+[.].*f32')
+    [ -n "$calls" ] || { echo "    uses no floats"; return; }
+    echo "    FAILED: what runs for each triangle uses floats:" $calls
+    failed=1
 }
 
 # Every function of the run-time part, not only those that a host calls.

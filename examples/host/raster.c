@@ -49,7 +49,8 @@ void raster_clear(const raster *r, uint16_t colour)
 
 void raster_clear_depth(const raster *r)
 {
-    memset(r->depth, 0, (size_t)r->width * (size_t)r->height * sizeof *r->depth);
+    if (r->depth)
+        memset(r->depth, 0, (size_t)r->width * (size_t)r->height * sizeof *r->depth);
 }
 
 /* ---- Spans -------------------------------------------------------------- */
@@ -103,6 +104,17 @@ static void fill_run(const sampler *from, run k, uint16_t *pixel, uint16_t *dept
     }
 }
 
+/* The same without a depth buffer, and of the whole picture. */
+static void cover_run(const sampler *from, run k, uint16_t *pixel, int count)
+{
+    for (; count > 0; count--, pixel++) {
+        uint16_t texel = from->texels[(k.v >> 16 << from->log2_side) + (k.u >> 16)];
+        if (texel != RASTER_KEY)
+            *pixel = texel;
+        k.u += k.du, k.v += k.dv;
+    }
+}
+
 /* Divides at every 16th pixel and at the last one; between them the texture goes straight. */
 static void fill_span(const raster *r, const sampler *from, gradient at, const gradient *dx,
                       int x, int end, int y, int share)
@@ -120,11 +132,17 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
         if (steps) {
             u = to_texels(from, at.s / at.q);
             v = to_texels(from, at.t / at.q);
-            depth = to_depth(at.depth);
-            k.du = (u - k.u) / steps, k.dv = (v - k.v) / steps, k.step = (depth - k.depth) / steps;
+            k.du = (u - k.u) / steps, k.dv = (v - k.v) / steps;
         }
-        fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count, share,
-                 (uint32_t)x * 3242174889u + (uint32_t)y * 2447445414u);
+        if (steps && r->depth) {
+            depth = to_depth(at.depth);
+            k.step = (depth - k.depth) / steps;
+        }
+        if (r->depth)
+            fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count,
+                     share, (uint32_t)x * 3242174889u + (uint32_t)y * 2447445414u);
+        else
+            cover_run(from, k, r->pixels + y * r->pitch + x, count);
         x += count;
     }
 }
@@ -188,8 +206,11 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
     left = a->x < left ? a->x : left, right = a->x > right ? a->x : right;
     if (y >= end || first_pixel(left, r->width) >= first_pixel(right, r->width))
         return; /* between the centres of pixels, as most triangles of a full mesh, or outside */
-    dx.depth = ((b->depth - a->depth) * cy - (c->depth - a->depth) * by) * scale;
-    dy.depth = ((c->depth - a->depth) * bx - (b->depth - a->depth) * cx) * scale;
+    dx.depth = dy.depth = 0.0f;
+    if (r->depth) {
+        dx.depth = ((b->depth - a->depth) * cy - (c->depth - a->depth) * by) * scale;
+        dy.depth = ((c->depth - a->depth) * bx - (b->depth - a->depth) * cx) * scale;
+    }
     dx.s = ((b->s - a->s) * cy - (c->s - a->s) * by) * scale;
     dy.s = ((c->s - a->s) * bx - (b->s - a->s) * cx) * scale;
     dx.t = ((b->t - a->t) * cy - (c->t - a->t) * by) * scale;

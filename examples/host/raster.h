@@ -36,7 +36,8 @@ typedef struct raster_corner {
 /* Where triangles go, and through which camera. */
 typedef struct raster {
     uint16_t *pixels;      /* of the target's corner; what is drawn stays within width x height */
-    uint16_t *depth;       /* rows without gaps; z_near / w, larger is closer */
+    uint16_t *depth;       /* rows without gaps; z_near / w, larger is closer. NULL: none, what
+                              is drawn later covers what was drawn before */
     int pitch;             /* pixels from a row to the next */
     int width, height;
     int row_0_is_top;      /* as on a screen; else as in a texture whose row 0 is t = 0 */
@@ -65,7 +66,7 @@ void raster_begin(raster *r, uint16_t *pixels, uint16_t *depth, int pitch, int w
 /* Fills the target's pixels with a colour. */
 void raster_clear(const raster *r, uint16_t colour);
 
-/* Makes the target's depth farthest. */
+/* Makes the target's depth farthest, if it has one. */
 void raster_clear_depth(const raster *r);
 
 /* Draws the counter-clockwise ones of index_count / 3 triangles. Nearer pixels win, and of equally
