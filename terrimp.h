@@ -7486,6 +7486,64 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          19 of 20 would spare too little (seven flights) */
 #define TERRIMPI_NO_PICTURE 0xffffu
 
+/* How the eye moves: how far it is from where it was in the mean of the last 4, 16, 64 and 256
+   frames. Who bobs is fast, but not far away from where he was: a picture that is good as far as
+   that lasts. And how often all pictures are lost at once, by jumps or because the host says so. */
+#define TERRIMPI_MOTIONS 4u
+typedef struct terrimpi_motion {
+    float away[TERRIMPI_MOTIONS][3]; /* [wu] */
+    float frames[TERRIMPI_MOTIONS];  /* which an eye of constant speed needs for that way */
+    float since, between;            /* [frames] since the last loss, and between two in the mean */
+} terrimpi_motion;
+
+static void terrimpi_motion_begin(terrimpi_motion *m)
+{
+    memset(m, 0, sizeof *m);
+    m->between = TERRIMPI_VIEW_LIFE;
+}
+
+/* Notes that all pictures are lost, or of no use. */
+static void terrimpi_motion_lose(terrimpi_motion *m)
+{
+    m->between = 0.5f * (m->between + m->since);
+    m->since = 0.0f;
+}
+
+/* A frame later; a jump is no motion. */
+static void terrimpi_motion_step(terrimpi_motion *m, const float step[3], float jump)
+{
+    float way[3] = {0.0f, 0.0f, 0.0f}, frames = 4.0f;
+    uint32_t k, i;
+    m->since += 1.0f;
+    if (terrimpi_length(step) > jump)
+        terrimpi_motion_lose(m);
+    else
+        memcpy(way, step, sizeof way);
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        float keep = 1.0f - 1.0f / frames;
+        for (i = 0; i < 3u; i++) {
+            m->away[k][i] = keep * (m->away[k][i] + way[i]);
+            if (terrimpi_abs(m->away[k][i]) < 1e-6f * jump) /* at rest, some time */
+                m->away[k][i] = 0.0f;
+        }
+        m->frames[k] = keep * (m->frames[k] + 1.0f);
+    }
+}
+
+/* The speed [wu a frame] with which an eye gets to `reach` away: the mean over about as many frames
+   as it needs for that. */
+static float terrimpi_motion_speed(const terrimpi_motion *m, float reach)
+{
+    float frames = 4.0f, speed = 0.0f;
+    uint32_t k;
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        speed = terrimpi_length(m->away[k]) / terrimpi_max(m->frames[k], 0.75f);
+        if (!(speed * frames < reach))
+            break;
+    }
+    return speed;
+}
+
 /* What the whole of a frame looks at, and nothing changes. */
 typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
@@ -7494,8 +7552,7 @@ typedef struct terrimpi_frame {
     terrimp_camera camera;         /* resolved */
     terrimp_frustum frustum;
     float pixel_factor;
-    float motion[3];               /* [wu] a frame, smoothed */
-    float speed;
+    terrimpi_motion motion;
 } terrimpi_frame;
 
 /* ---- settings ---- */
@@ -7953,8 +8010,9 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
     float way = f->desc->no_lookahead ? 1.0f : 1.0f + TERRIMPI_VIEW_AHEAD;
-    float life = way * closest * terrimpi_view_sine(f, node, closest) /
-                 terrimpi_max(f->speed, 1e-20f);
+    float reach = way * closest * terrimpi_view_sine(f, node, closest);
+    float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
+    life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -7978,15 +8036,16 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
 static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
                                 const terrimp_box *box, float closest, float eye[3])
 {
-    float ahead;
+    const float *way = f->motion.away[0];
+    float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
     memcpy(eye, f->camera.eye, sizeof f->camera.eye);
-    if (f->desc->no_lookahead || !(f->speed > 0.0f))
+    if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
-    ahead = TERRIMPI_VIEW_AHEAD * closest * terrimpi_view_sine(f, node->number, closest);
-    ahead = terrimpi_min(ahead, f->speed * 0.5f * TERRIMPI_VIEW_LIFE);
+    ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
+    ahead = terrimpi_min(TERRIMPI_VIEW_AHEAD * reach, ahead * 0.5f * TERRIMPI_VIEW_LIFE);
     for (i = 0; i < 3u; i++)
-        eye[i] += f->motion[i] / f->speed * ahead;
+        eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
         memcpy(eye, f->camera.eye, sizeof f->camera.eye);
 }
@@ -8255,6 +8314,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
+    terrimpi_motion_lose(&view->frame.motion);
     view->job_count = view->open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
@@ -9075,14 +9135,13 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
-    for (i = 0; i < 3u; i++) {
-        step[i] = camera->eye[i] - before->camera.eye[i];
-        f.motion[i] = 0.75f * before->motion[i] + 0.25f * step[i];
+    if (f.number == 1u) {
+        terrimpi_motion_begin(&f.motion);
+        return f;
     }
-    if (f.number <= 1u || terrimpi_length(step) > TERRIMPI_VIEW_JUMP * f.desc->fade_start ||
-        terrimpi_length(f.motion) < 1e-6f * f.desc->fade_start)
-        memset(f.motion, 0, sizeof f.motion);
-    f.speed = terrimpi_length(f.motion);
+    for (i = 0; i < 3u; i++)
+        step[i] = camera->eye[i] - before->camera.eye[i];
+    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
     return f;
 }
 
