@@ -2033,8 +2033,8 @@ typedef struct terrimp_cover_desc {
     uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
 } terrimp_cover_desc;
 
-/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
-   numbers of the descriptor are outside of their limits or capacity is 0. */
+/* Bytes of scratch memory that terrimp_cover needs; 0 when the numbers of the descriptor are out of
+   their limits or capacity is 0. */
 TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
 
 /* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
@@ -2049,18 +2049,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
 TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
                                          size_t bytes, terrimp_rect *rects, uint32_t capacity,
                                          uint32_t *count);
-
-/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
-   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
-
-   cell       [texels] side of a cell [Limits: 1..16384]
-   min_fill   [Limits: 0..1] he found 0.8 to work well
-   Errors     those of terrimp_cover
-   Source     Jeschke 2004, section 3.5 */
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count);
 
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
@@ -7526,6 +7514,64 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          19 of 20 would spare too little (seven flights) */
 #define TERRIMPI_NO_PICTURE 0xffffu
 
+/* How the eye moves: how far it is from where it was in the mean of the last 4, 16, 64 and 256
+   frames. Who bobs is fast, but not far away from where he was: a picture that is good as far as
+   that lasts. And how often all pictures are lost at once, by jumps or because the host says so. */
+#define TERRIMPI_MOTIONS 4u
+typedef struct terrimpi_motion {
+    float away[TERRIMPI_MOTIONS][3]; /* [wu] */
+    float frames[TERRIMPI_MOTIONS];  /* which an eye of constant speed needs for that way */
+    float since, between;            /* [frames] since the last loss, and between two in the mean */
+} terrimpi_motion;
+
+static void terrimpi_motion_begin(terrimpi_motion *m)
+{
+    memset(m, 0, sizeof *m);
+    m->between = TERRIMPI_VIEW_LIFE;
+}
+
+/* Notes that all pictures are lost, or of no use. */
+static void terrimpi_motion_lose(terrimpi_motion *m)
+{
+    m->between = 0.5f * (m->between + m->since);
+    m->since = 0.0f;
+}
+
+/* A frame later; a jump is no motion. */
+static void terrimpi_motion_step(terrimpi_motion *m, const float step[3], float jump)
+{
+    float way[3] = {0.0f, 0.0f, 0.0f}, frames = 4.0f;
+    uint32_t k, i;
+    m->since += 1.0f;
+    if (terrimpi_length(step) > jump)
+        terrimpi_motion_lose(m);
+    else
+        memcpy(way, step, sizeof way);
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        float keep = 1.0f - 1.0f / frames;
+        for (i = 0; i < 3u; i++) {
+            m->away[k][i] = keep * (m->away[k][i] + way[i]);
+            if (terrimpi_abs(m->away[k][i]) < 1e-6f * jump) /* at rest, some time */
+                m->away[k][i] = 0.0f;
+        }
+        m->frames[k] = keep * (m->frames[k] + 1.0f);
+    }
+}
+
+/* The speed [wu a frame] with which an eye gets to `reach` away: the mean over about as many frames
+   as it needs for that. */
+static float terrimpi_motion_speed(const terrimpi_motion *m, float reach)
+{
+    float frames = 4.0f, speed = 0.0f;
+    uint32_t k;
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        speed = terrimpi_length(m->away[k]) / terrimpi_max(m->frames[k], 0.75f);
+        if (!(speed * frames < reach))
+            break;
+    }
+    return speed;
+}
+
 /* What the whole of a frame looks at, and nothing changes. */
 typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
@@ -7534,8 +7580,7 @@ typedef struct terrimpi_frame {
     terrimp_camera camera;         /* resolved */
     terrimp_frustum frustum;
     float pixel_factor;
-    float motion[3];               /* [wu] a frame, smoothed */
-    float speed;
+    terrimpi_motion motion;
 } terrimpi_frame;
 
 /* ---- settings ---- */
@@ -7993,8 +8038,9 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
     float way = f->desc->no_lookahead ? 1.0f : 1.0f + TERRIMPI_VIEW_AHEAD;
-    float life = way * closest * terrimpi_view_sine(f, node, closest) /
-                 terrimpi_max(f->speed, 1e-20f);
+    float reach = way * closest * terrimpi_view_sine(f, node, closest);
+    float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
+    life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -8019,15 +8065,16 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
 static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
                                 const terrimp_box *box, float closest, float eye[3])
 {
-    float ahead;
+    const float *way = f->motion.away[0];
+    float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
     memcpy(eye, f->camera.eye, sizeof f->camera.eye);
-    if (f->desc->no_lookahead || !(f->speed > 0.0f))
+    if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
-    ahead = TERRIMPI_VIEW_AHEAD * closest * terrimpi_view_sine(f, node->number, closest);
-    ahead = terrimpi_min(ahead, f->speed * 0.5f * TERRIMPI_VIEW_LIFE);
+    ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
+    ahead = terrimpi_min(TERRIMPI_VIEW_AHEAD * reach, ahead * 0.5f * TERRIMPI_VIEW_LIFE);
     for (i = 0; i < 3u; i++)
-        eye[i] += f->motion[i] / f->speed * ahead;
+        eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
         memcpy(eye, f->camera.eye, sizeof f->camera.eye);
 }
@@ -8296,6 +8343,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
+    terrimpi_motion_lose(&view->frame.motion);
     view->job_count = view->open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
@@ -9117,14 +9165,13 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
-    for (i = 0; i < 3u; i++) {
-        step[i] = camera->eye[i] - before->camera.eye[i];
-        f.motion[i] = 0.75f * before->motion[i] + 0.25f * step[i];
+    if (f.number == 1u) {
+        terrimpi_motion_begin(&f.motion);
+        return f;
     }
-    if (f.number <= 1u || terrimpi_length(step) > TERRIMPI_VIEW_JUMP * f.desc->fade_start ||
-        terrimpi_length(f.motion) < 1e-6f * f.desc->fade_start)
-        memset(f.motion, 0, sizeof f.motion);
-    f.speed = terrimpi_length(f.motion);
+    for (i = 0; i < 3u; i++)
+        step[i] = camera->eye[i] - before->camera.eye[i];
+    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
     return f;
 }
 
@@ -13968,7 +14015,6 @@ typedef struct terrimpi_cover {
     uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
     uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
     uint32_t *seen;       /* a row of bits */
-    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
     terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
 } terrimpi_cover;
 
@@ -14329,7 +14375,10 @@ static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects
         for (a = 0; a < count; a++)
             for (b = a + 1u; b < count; b++) {
                 terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
-                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                if (terrimpi_cover_cost(c, r.width, r.height) / 2u > /* far apart */
+                        terrimpi_cover_cost(c, rects[a].width, rects[a].height) +
+                            terrimpi_cover_cost(c, rects[b].width, rects[b].height) ||
+                    terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
                     continue;
                 count = terrimpi_cover_swallow(&r, rects, count);
                 joined = 1;
@@ -14357,9 +14406,6 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
     c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
     c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
-    c->cells = (uint32_t *)terrimpi_take(
-        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
-        sizeof *c->cells);
     c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
         &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
     c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
@@ -14372,19 +14418,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
     terrimpi_cover c;
     size_t bytes;
     return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
-}
-
-/* What both ways to cover begin with. */
-static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
-                                          size_t bytes, const terrimp_rect *rects,
-                                          uint32_t capacity, const uint32_t *count,
-                                          terrimpi_cover *c)
-{
-    size_t needed;
-    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
-    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 /* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
@@ -14420,8 +14453,12 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
                                          uint32_t *count)
 {
     terrimpi_cover c;
+    size_t needed;
     uint32_t i, kept;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, &c, &needed));
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
     c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
     c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
     for (i = 0; i < c.node_count; i++)
@@ -14429,140 +14466,6 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
     kept = terrimpi_cover_prune(&c, rects, capacity);
     TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
     *count = terrimpi_cover_join(&c, rects, kept);
-    return TERRIMP_OK;
-}
-
-/* A box of cells, ends excluded, and how many of them are filled. */
-typedef struct terrimpi_grow_box {
-    uint32_t x0, y0, x1, y1, filled;
-} terrimpi_grow_box;
-
-/* How many cells of a box are filled, on a grid that is a mask. */
-static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
-                                     uint32_t x1, uint32_t y1)
-{
-    uint32_t y, word, filled = 0;
-    for (y = y0; y < y1 && x0 < x1; y++)
-        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
-            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
-    return filled;
-}
-
-/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
-static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
-                              int dy, terrimpi_grow_box *out)
-{
-    *out = *b;
-    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
-        (dy > 0 && b->y1 == g->height))
-        return 0;
-    out->x0 -= dx < 0;
-    out->x1 += dx > 0;
-    out->y0 -= dy < 0;
-    out->y1 += dy > 0;
-    if (dx)
-        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
-                                            dx < 0 ? b->x0 : out->x1, out->y1);
-    if (dy)
-        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
-                                            dy < 0 ? b->y0 : out->y1);
-    return 1;
-}
-
-static float terrimpi_grow_area(const terrimpi_grow_box *b)
-{
-    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
-}
-
-/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
-static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
-                                 terrimpi_grow_box *box)
-{
-    for (;;) {
-        terrimpi_grow_box best = *box, next;
-        float best_ratio = 0.0f;
-        int k;
-        for (k = 0; k < 9; k++) {
-            float ratio;
-            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
-                continue;
-            ratio = (float)(next.filled - box->filled) /
-                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
-            if (ratio > best_ratio) {
-                best_ratio = ratio;
-                best = next;
-            }
-        }
-        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
-            return;
-        *box = best;
-    }
-}
-
-/* The mask of the cells that hold opaque texels. */
-static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
-{
-    terrimp_cover_desc g = c->desc;
-    uint32_t y, word;
-    g.mask = c->cells;
-    g.width = (c->desc.width - 1u) / cell + 1u;
-    g.height = (c->desc.height - 1u) / cell + 1u;
-    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
-    for (y = 0; y < c->desc.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
-            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
-            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
-            while (bits) {
-                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
-                row[x / 32u] |= 1u << x % 32u;
-            }
-        }
-    return g;
-}
-
-/* Grows a box from a cell, empties its cells, and returns it in texels. */
-static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
-                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
-{
-    terrimpi_grow_box b;
-    b.x0 = x;
-    b.y0 = y;
-    b.x1 = x + 1u;
-    b.y1 = y + 1u;
-    b.filled = 1;
-    terrimpi_grow_box_up(g, min_fill, &b);
-    for (y = b.y0; y < b.y1; y++)
-        for (x = b.x0; x < b.x1; x++)
-            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
-    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
-                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
-                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
-}
-
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count)
-{
-    terrimpi_cover c;
-    terrimp_cover_desc g;
-    uint32_t made = 0, y, word;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
-    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
-                        !terrimpi_within_u32(cell, 1, 16384),
-                    TERRIMP_E_RANGE);
-    g = terrimpi_grow_grid(&c, cell);
-    for (y = 0; y < g.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
-            uint32_t bits;
-            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
-                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
-                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
-                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
-                terrimpi_cover_tighten(&c, &rects[made++]);
-            }
-        }
-    *count = made;
     return TERRIMP_OK;
 }
 
@@ -15808,7 +15711,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
 
 #define TERRIMPI_PLACE_NONE 0xffffffffu
 enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
-#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+#define TERRIMPI_PLACE_WORK 3000000u /* numbers that attempts may go over, some 10 ns each */
 
 typedef struct terrimpi_placing {
     const terrimp_place_desc *desc;
