@@ -1350,6 +1350,14 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
 
+/* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
+
+   desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
+              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0
+   Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
+              changes */
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
+
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
@@ -7562,6 +7570,7 @@ typedef struct terrimpi_frame {
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
     terrimp_camera camera;         /* resolved */
+    int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
     float pixel_factor;
     terrimpi_motion motion;
@@ -7679,6 +7688,7 @@ typedef struct terrimpi_picture {
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
     uint32_t draw;            /* ... and its place on the list of that frame */
+    uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
     uint32_t layer_count;     /* 0: not made yet */
     uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
@@ -7698,6 +7708,7 @@ typedef struct terrimpi_cache {
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
     uint32_t frame;              /* what is seen in it is not given up */
+    uint32_t freed;              /* the last frame that gave room back */
     uint32_t failures, evictions; /* so far */
 } terrimpi_cache;
 
@@ -7720,6 +7731,8 @@ static terrimpi_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t n
 static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, uint32_t count)
 {
     uint32_t i;
+    if (count > 0)
+        c->freed = c->frame;
     for (i = 0; i < count; i++)
         terrimp_live_atlas_free(&c->atlases[slots[i].atlas], slots[i].slot);
 }
@@ -7796,12 +7809,23 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2], terrim
 static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slots,
                                 uint32_t count)
 {
-    uint32_t i;
+    uint32_t i, freed = c->freed;
     for (i = 0; i < count; i++)
         if (!terrimpi_cache_slot(c, size, &slots[i])) {
             terrimpi_cache_free(c, slots, i);
+            c->freed = freed; /* there is no more room than before */
             return 0;
         }
+    return 1;
+}
+
+/* Whether there is no room for a picture since there was none a frame before, and nothing has
+   changed. */
+static int terrimpi_cache_refuses(const terrimpi_cache *c, int still, terrimpi_picture *picture)
+{
+    if (!still || picture->refused + 1u != c->frame || c->freed >= picture->refused)
+        return 0;
+    picture->refused = c->frame;
     return 1;
 }
 
@@ -8264,6 +8288,14 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     return terrimpi_view_layout(&v, NULL);
 }
 
+static void terrimpi_view_set_ground(const terrimp_view_desc *d, terrimp_geomip_view *ground)
+{
+    ground->rule = d->ground_rule;
+    ground->morph_ratio = d->morph_ratio;
+    ground->tolerance_px = d->ground_tolerance_px;
+    ground->hysteresis = TERRIMPI_VIEW_HYSTERESIS;
+}
+
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view)
@@ -8279,17 +8311,35 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_view_layout(&v, (unsigned char *)memory);
-    v.ground.rule = v.desc.ground_rule;
-    v.ground.morph_ratio = v.desc.morph_ratio;
-    v.ground.tolerance_px = v.desc.ground_tolerance_px;
-    v.ground.hysteresis = TERRIMPI_VIEW_HYSTERESIS;
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
+    terrimpi_view_set_ground(&v.desc, &v.ground);
     v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
+}
+
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc)
+{
+    terrimp_view_desc d;
+    const terrimp_view_desc *has;
+    TERRIMPI_REFUSE(!view || !desc, TERRIMP_E_NULL);
+    has = &view->desc;
+    d = *desc;
+    TERRIMPI_DEFAULT(d.atlas_size, has->atlas_size);
+    TERRIMPI_DEFAULT(d.atlas_count, has->atlas_count);
+    TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
+    TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
+    TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
+    TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
+                    d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
+                    d.max_captures != has->max_captures, TERRIMP_E_RANGE);
+    view->desc = d;
+    terrimpi_view_set_ground(&view->desc, &view->ground);
+    return TERRIMP_OK;
 }
 
 /* ---- captures that are not made ---- */
@@ -8821,6 +8871,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
     terrimp_mesh_info mesh;
     memset(job, 0, sizeof *job);
+    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
+    if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
+        return 0;
     plan->node = c->node;
     plan->layer_count = 1;
     terrimpi_node_box(f->terrain, &c->node, &plan->box);
@@ -8831,7 +8884,6 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
         return 0;
-    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
@@ -8845,8 +8897,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
-    if (!terrimpi_job_slots(&v->cache, size, job))
+    if (!terrimpi_job_slots(&v->cache, size, job)) {
+        job->picture->refused = f->number;
         return 0;
+    }
     size[0] = terrimpi_cache_rect(&v->cache, &job->slots[0]).width;
     size[1] = terrimpi_cache_rect(&v->cache, &job->slots[0]).height;
     terrimpi_capture_spread(f->terrain, plan, size, texels);
@@ -9144,6 +9198,7 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     float step[3];
     uint32_t i;
     f.number++;
+    f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
