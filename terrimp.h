@@ -383,15 +383,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 /* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
 typedef struct terrimp_camera {
-    float eye[3];           /* [wu] */
+    float eye[3];           /* [wu] [Limits: -1e18..1e18] */
     float forward[3];       /* (required) viewing direction, any length > 0 */
     float up[3];            /* [Default 0,0,0 -> 0,1,0]; along forward: another one is chosen */
     float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
     uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
     uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
     float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near].
-                               What is drawn may need more: see terrimp_stats.z_far */
+    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
+                               ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
@@ -458,8 +458,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
-              E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum, or for 1e18 and more; E_INSIDE when the
+              eye is in the box; E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -712,8 +712,9 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
-/* The matrix that takes a world position (x, y, z, 1) to (s, t, r, q): the capture's picture lies
-   in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth in 0..1.
+/* The matrix that takes (x, y, z, 1), a position relative to the capture's eye, to (s, t, r, q):
+   the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
+   in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
@@ -726,9 +727,10 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq);
+   xyz [count][3], world positions, and the capture's eye, to stq [count][3], which may not overlap
+   xyz. */
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
@@ -1264,10 +1266,10 @@ typedef struct terrimp_capture_command {
 } terrimp_capture_command;
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
-   texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
-   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
-   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
+   texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
+   bilinear, divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a
+   picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
+   the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1278,6 +1280,7 @@ typedef struct terrimp_impostor_command {
     uint32_t index_count;
     float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
                              by a dither pattern: its ground shows on the others */
+    float eye[3];         /* that the picture was made from: positions are relative to it */
     float texture_matrix[16];
 } terrimp_impostor_command;
 
@@ -2038,8 +2041,8 @@ typedef struct terrimp_cover_desc {
     uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
 } terrimp_cover_desc;
 
-/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
-   numbers of the descriptor are outside of their limits or capacity is 0. */
+/* Bytes of scratch memory that terrimp_cover needs; 0 when the numbers of the descriptor are out of
+   their limits or capacity is 0. */
 TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
 
 /* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
@@ -2054,18 +2057,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
 TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
                                          size_t bytes, terrimp_rect *rects, uint32_t capacity,
                                          uint32_t *count);
-
-/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
-   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
-
-   cell       [texels] side of a cell [Limits: 1..16384]
-   min_fill   [Limits: 0..1] he found 0.8 to work well
-   Errors     those of terrimp_cover
-   Source     Jeschke 2004, section 3.5 */
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count);
 
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
@@ -2444,11 +2435,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-static int terrimpi_finite(float value)
+/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
+   since compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value)
 {
-    float rounded = terrimpi_float(value);
-    return rounded - rounded == 0.0f;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x7fffffffu;
 }
+
+static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
 {
@@ -2771,7 +2768,7 @@ static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t
 
 static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 {
-    return field->has_no_data && (raw == field->no_data || raw != raw);
+    return field->has_no_data && (raw == field->no_data || terrimpi_bits(raw) > TERRIMPI_INFINITE);
 }
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
@@ -3363,6 +3360,16 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
+#define TERRIMPI_FARTHEST 1e18f /* of coordinates: products of two distances stay finite */
+
+/* Whether two vectors are of unit length and at a right angle, but for rounding. */
+static int terrimpi_orthonormal(const float a[3], const float b[3])
+{
+    return terrimpi_abs(terrimpi_dot(a, a) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(b, b) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(a, b)) < 2e-6f;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
 {
     terrimp_camera c;
@@ -3378,8 +3385,12 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
                     !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
-    terrimpi_basis(c.forward, c.up, right);
+                    c.z_far <= c.z_near || c.z_far > TERRIMPI_FARTHEST ||
+                    terrimpi_largest(c.eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
+    if (!terrimpi_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
+        TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
+        terrimpi_basis(c.forward, c.up, right);
+    }
     *out = c;
     return TERRIMP_OK;
 }
@@ -3577,7 +3588,8 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
-                    box->min[2] > box->max[2], TERRIMP_E_RANGE);
+                    box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_FARTHEST ||
+                    terrimp_box_farthest(box, eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
@@ -4699,6 +4711,7 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
     terrimp_capture_matrices(capture, 0, view, projection);
+    view[12] = view[13] = view[14] = 0.0f; /* relative to the eye */
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
     scale[2] = 0.5f;
@@ -4732,18 +4745,21 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq)
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq)
 {
     static const int rows[3] = {0, 1, 3};
     size_t i;
     int k;
-    TERRIMPI_REFUSE(!matrix || (count && (!xyz || !stq)), TERRIMP_E_NULL);
-    for (i = 0; i < count; i++, xyz += 3, stq += 3)
+    TERRIMPI_REFUSE(!matrix || !eye || (count && (!xyz || !stq)), TERRIMP_E_NULL);
+    for (i = 0; i < count; i++, xyz += 3, stq += 3) {
+        float to[3];
+        terrimpi_sub(xyz, eye, to);
         for (k = 0; k < 3; k++) {
             const float *m = matrix + rows[k];
-            stq[k] = m[0] * xyz[0] + m[4] * xyz[1] + m[8] * xyz[2] + m[12];
+            stq[k] = m[0] * to[0] + m[4] * to[1] + m[8] * to[2] + m[12];
         }
+    }
     return TERRIMP_OK;
 }
 
@@ -8054,7 +8070,8 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
 
 static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 {
-    return f->pixel_factor * f->desc->texels_per_px / terrimpi_max(closest, 1e-6f);
+    return f->pixel_factor * f->desc->texels_per_px /
+           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
@@ -8738,6 +8755,7 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
+    memcpy(command.eye, picture->eye, sizeof command.eye);
     picture->drawn_count++;
     for (layer = 0; layer < picture->layer_count; layer++) {
         command.part = layer;
@@ -14052,7 +14070,6 @@ typedef struct terrimpi_cover {
     uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
     uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
     uint32_t *seen;       /* a row of bits */
-    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
     terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
 } terrimpi_cover;
 
@@ -14413,7 +14430,10 @@ static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects
         for (a = 0; a < count; a++)
             for (b = a + 1u; b < count; b++) {
                 terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
-                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                if (terrimpi_cover_cost(c, r.width, r.height) / 2u > /* far apart */
+                        terrimpi_cover_cost(c, rects[a].width, rects[a].height) +
+                            terrimpi_cover_cost(c, rects[b].width, rects[b].height) ||
+                    terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
                     continue;
                 count = terrimpi_cover_swallow(&r, rects, count);
                 joined = 1;
@@ -14441,9 +14461,6 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
     c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
     c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
-    c->cells = (uint32_t *)terrimpi_take(
-        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
-        sizeof *c->cells);
     c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
         &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
     c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
@@ -14456,19 +14473,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
     terrimpi_cover c;
     size_t bytes;
     return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
-}
-
-/* What both ways to cover begin with. */
-static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
-                                          size_t bytes, const terrimp_rect *rects,
-                                          uint32_t capacity, const uint32_t *count,
-                                          terrimpi_cover *c)
-{
-    size_t needed;
-    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
-    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 /* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
@@ -14504,8 +14508,12 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
                                          uint32_t *count)
 {
     terrimpi_cover c;
+    size_t needed;
     uint32_t i, kept;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, &c, &needed));
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
     c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
     c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
     for (i = 0; i < c.node_count; i++)
@@ -14513,140 +14521,6 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
     kept = terrimpi_cover_prune(&c, rects, capacity);
     TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
     *count = terrimpi_cover_join(&c, rects, kept);
-    return TERRIMP_OK;
-}
-
-/* A box of cells, ends excluded, and how many of them are filled. */
-typedef struct terrimpi_grow_box {
-    uint32_t x0, y0, x1, y1, filled;
-} terrimpi_grow_box;
-
-/* How many cells of a box are filled, on a grid that is a mask. */
-static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
-                                     uint32_t x1, uint32_t y1)
-{
-    uint32_t y, word, filled = 0;
-    for (y = y0; y < y1 && x0 < x1; y++)
-        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
-            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
-    return filled;
-}
-
-/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
-static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
-                              int dy, terrimpi_grow_box *out)
-{
-    *out = *b;
-    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
-        (dy > 0 && b->y1 == g->height))
-        return 0;
-    out->x0 -= dx < 0;
-    out->x1 += dx > 0;
-    out->y0 -= dy < 0;
-    out->y1 += dy > 0;
-    if (dx)
-        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
-                                            dx < 0 ? b->x0 : out->x1, out->y1);
-    if (dy)
-        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
-                                            dy < 0 ? b->y0 : out->y1);
-    return 1;
-}
-
-static float terrimpi_grow_area(const terrimpi_grow_box *b)
-{
-    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
-}
-
-/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
-static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
-                                 terrimpi_grow_box *box)
-{
-    for (;;) {
-        terrimpi_grow_box best = *box, next;
-        float best_ratio = 0.0f;
-        int k;
-        for (k = 0; k < 9; k++) {
-            float ratio;
-            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
-                continue;
-            ratio = (float)(next.filled - box->filled) /
-                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
-            if (ratio > best_ratio) {
-                best_ratio = ratio;
-                best = next;
-            }
-        }
-        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
-            return;
-        *box = best;
-    }
-}
-
-/* The mask of the cells that hold opaque texels. */
-static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
-{
-    terrimp_cover_desc g = c->desc;
-    uint32_t y, word;
-    g.mask = c->cells;
-    g.width = (c->desc.width - 1u) / cell + 1u;
-    g.height = (c->desc.height - 1u) / cell + 1u;
-    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
-    for (y = 0; y < c->desc.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
-            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
-            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
-            while (bits) {
-                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
-                row[x / 32u] |= 1u << x % 32u;
-            }
-        }
-    return g;
-}
-
-/* Grows a box from a cell, empties its cells, and returns it in texels. */
-static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
-                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
-{
-    terrimpi_grow_box b;
-    b.x0 = x;
-    b.y0 = y;
-    b.x1 = x + 1u;
-    b.y1 = y + 1u;
-    b.filled = 1;
-    terrimpi_grow_box_up(g, min_fill, &b);
-    for (y = b.y0; y < b.y1; y++)
-        for (x = b.x0; x < b.x1; x++)
-            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
-    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
-                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
-                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
-}
-
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count)
-{
-    terrimpi_cover c;
-    terrimp_cover_desc g;
-    uint32_t made = 0, y, word;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
-    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
-                        !terrimpi_within_u32(cell, 1, 16384),
-                    TERRIMP_E_RANGE);
-    g = terrimpi_grow_grid(&c, cell);
-    for (y = 0; y < g.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
-            uint32_t bits;
-            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
-                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
-                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
-                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
-                terrimpi_cover_tighten(&c, &rects[made++]);
-            }
-        }
-    *count = made;
     return TERRIMP_OK;
 }
 
@@ -15892,7 +15766,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
 
 #define TERRIMPI_PLACE_NONE 0xffffffffu
 enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
-#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+#define TERRIMPI_PLACE_WORK 3000000u /* numbers that attempts may go over, some 10 ns each */
 
 typedef struct terrimpi_placing {
     const terrimp_place_desc *desc;

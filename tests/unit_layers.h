@@ -2,6 +2,7 @@
 #ifndef UNIT_LAYERS_H
 #define UNIT_LAYERS_H
 
+#include "cover_greedy.h"
 #include "unit_bad_input.h"
 
 /* ---- where layers stand ---- */
@@ -259,7 +260,7 @@ static void quads_stand_where_their_texels_were_seen(void)
         quad.x = random_range(0, 400);
         quad.y = random_range(0, 200);
         CHECK(terrimp_layer_corners(&l, &picture, &quad, atlas, xyz, st) == TERRIMP_OK);
-        CHECK(terrimp_texture_coordinates(matrix, xyz, 4, stq) == TERRIMP_OK);
+        CHECK(terrimp_texture_coordinates(matrix, eye, xyz, 4, stq) == TERRIMP_OK);
         for (k = 0; k < 4; k++) {
             uint32_t dx = k == 1 || k == 2 ? quad.texels.width : 0;
             uint32_t dy = k >= 2 ? quad.texels.height : 0;
@@ -458,8 +459,8 @@ static void covers_hold_all_that_is_opaque_and_cost_less_than_greedy_ones(void)
         scratch = malloc(bytes);
         CHECK(bytes && scratch);
         for (k = 0; k < 8; k++) {
-            CHECK(terrimp_cover_grow(&d, 1u << k, 0.8f, scratch, bytes, cover_rects, COVER_QUADS,
-                                     &count) == TERRIMP_OK);
+            count = cover_greedily(&d, 1u << k, 0.8f, cover_rects, COVER_QUADS);
+            CHECK(count <= COVER_QUADS);
             greedy = fmin(greedy, cover_judge(&d, count, 0));
         }
         memset(cover_rects, UNTOUCHED, sizeof cover_rects);
@@ -1467,12 +1468,6 @@ static void layer_masks_refuse(void)
             terrimp_cover(&d, (char *)scratch + 4, bytes, rects, 4, &count));
     REFUSES(TERRIMP_E_MEMORY, count, terrimp_cover(&d, scratch, bytes - 1, rects, 4, &count));
     REFUSES(TERRIMP_E_RANGE, count, terrimp_cover(&d, scratch, bytes, rects, 0, &count));
-    REFUSES(TERRIMP_E_RANGE, count,
-            terrimp_cover_grow(&d, 0, 0.8f, scratch, bytes, rects, 4, &count));
-    REFUSES(TERRIMP_E_RANGE, count,
-            terrimp_cover_grow(&d, 1, not_finite(0), scratch, bytes, rects, 4, &count));
-    REFUSES(TERRIMP_E_CAPACITY, count,
-            terrimp_cover_grow(&d, 1, 1.0f, scratch, bytes, rects, 4, &count));
     d.quad_cost = 1;
     REFUSES(TERRIMP_E_CAPACITY, count, terrimp_cover(&d, scratch, bytes, rects, 4, &count));
     for (i = 0; i < 4; i++) {

@@ -477,20 +477,24 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     const flight_picture *parts = &f->latest[command->node * FLIGHT_PARTS];
     const terrimp_capture_command *capture = &parts[command->part].capture;
     double size = (double)f->desc.atlas_size;
+    float view[16]; /* of positions relative to the eye */
     terrimp_mesh_info mesh;
     uint32_t i, step, part;
+    memcpy(view, capture->view, sizeof view);
+    view[12] = view[13] = view[14] = 0.0f;
+    CHECK(memcmp(command->eye, capture->eye, sizeof command->eye) == 0);
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     step = mesh.vertex_count / 5u + 1u;
     for (i = 0; i < mesh.vertex_count; i += step) {
         double p[3], seen[4], clip[4], out[4], x, y;
         double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height), rim_y;
-        int shown = 0;
+        int shown = 0, k;
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
-        oracle_transform(capture->view, p, seen);
+        for (k = 0; k < 3; k++)
+            p[k] -= (double)command->eye[k];
+        oracle_transform(view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
         oracle_transform(command->texture_matrix, p, out);
-        /* close to the capture's eye floats of the world's size are coarse */
-        rim += 2e-6 * fabs(p[1]) * (double)(capture->slot.width + capture->slot.height) / clip[3];
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
         rim_y = rim + texture_rounding(command->texture_matrix, p, 1, size);
@@ -500,7 +504,6 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         CHECK(x > -rim && x < (double)capture->slot.width + rim);
         CHECK(y > -rim_y && y < (double)capture->slot.height + rim_y);
         for (part = 0; part < command->part_count; part++) {
-            oracle_transform(parts[part].capture.view, p, seen);
             oracle_transform4(parts[part].capture.projection, seen, clip);
             shown |= clip[2] < clip[3] &&
                      clip[2] > (f->camera.depth_zero_to_one ? 0.0 : -clip[3]);
