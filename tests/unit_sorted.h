@@ -827,7 +827,7 @@ static void sorted_texture_levels_fit_the_screen(void)
     CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
     for (i = 0; i < 60; i++) {
         terrimp_camera camera = sorted_camera(&s.desc);
-        float factor, x = camera.eye[0];
+        float factor = 0.0f, x = camera.eye[0];
         uint8_t first[64 * 64];
         camera.z_far = 900.0f;
         CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);
@@ -1118,7 +1118,7 @@ static void sorted_bears_odd_cameras(void)
         case 2: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = -1.0f; break;
         case 3: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = 1.0f;
                 camera.eye[1] = 100.0f; break;
-        case 4: camera.eye[1] = 3e30f; break;
+        case 4: camera.eye[1] = 1e18f; break;
         default: camera.eye[1] = -1e9f, camera.z_far = 1e7f;
         }
         sorted_frame(&s, &camera);
