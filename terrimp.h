@@ -1371,6 +1371,14 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
 
+/* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
+
+   desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
+              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0
+   Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
+              changes */
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
+
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
@@ -1537,6 +1545,7 @@ typedef struct terrimp_sorted {
     } stack[TERRIMP_SORTED_LEVELS + 1];
     int32_t at[2];               /* the present square */
     uint32_t level;
+    terrimp_sorted_int away;     /* squared, of its closest point */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1567,7 +1576,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 
    squares    [capacity] out
    Returns    how many; less than capacity, or 0, at the end of the frame
-   Cost       less than 100 cycles a triangle, whatever came before
+   Cost       110 to 150 cycles a triangle of a processor of 2020, whatever came before
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
@@ -7642,6 +7651,7 @@ typedef struct terrimpi_frame {
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
     terrimp_camera camera;         /* resolved */
+    int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
     float pixel_factor;
     terrimpi_motion motion;
@@ -7759,6 +7769,7 @@ typedef struct terrimpi_picture {
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
     uint32_t draw;            /* ... and its place on the list of that frame */
+    uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
     uint32_t layer_count;     /* 0: not made yet */
     uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
@@ -7784,6 +7795,7 @@ typedef struct terrimpi_cache {
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
     uint32_t frame;              /* what is seen in it is not given up */
+    uint32_t freed;              /* the last frame that gave room back */
     uint32_t failures, evictions; /* so far */
 } terrimpi_cache;
 
@@ -7806,6 +7818,8 @@ static terrimpi_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t n
 static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, uint32_t count)
 {
     uint32_t i;
+    if (count > 0)
+        c->freed = c->frame;
     for (i = 0; i < count; i++)
         terrimp_live_atlas_free(&c->atlases[slots[i].atlas], slots[i].slot);
 }
@@ -7882,12 +7896,23 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2], terrim
 static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slots,
                                 uint32_t count)
 {
-    uint32_t i;
+    uint32_t i, freed = c->freed;
     for (i = 0; i < count; i++)
         if (!terrimpi_cache_slot(c, size, &slots[i])) {
             terrimpi_cache_free(c, slots, i);
+            c->freed = freed; /* there is no more room than before */
             return 0;
         }
+    return 1;
+}
+
+/* Whether there is no room for a picture since there was none a frame before, and nothing has
+   changed. */
+static int terrimpi_cache_refuses(const terrimpi_cache *c, int still, terrimpi_picture *picture)
+{
+    if (!still || picture->refused + 1u != c->frame || c->freed >= picture->refused)
+        return 0;
+    picture->refused = c->frame;
     return 1;
 }
 
@@ -8354,6 +8379,14 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     return terrimpi_view_layout(&v, NULL);
 }
 
+static void terrimpi_view_set_ground(const terrimp_view_desc *d, terrimp_geomip_view *ground)
+{
+    ground->rule = d->ground_rule;
+    ground->morph_ratio = d->morph_ratio;
+    ground->tolerance_px = d->ground_tolerance_px;
+    ground->hysteresis = TERRIMPI_VIEW_HYSTERESIS;
+}
+
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view)
@@ -8369,17 +8402,35 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_view_layout(&v, (unsigned char *)memory);
-    v.ground.rule = v.desc.ground_rule;
-    v.ground.morph_ratio = v.desc.morph_ratio;
-    v.ground.tolerance_px = v.desc.ground_tolerance_px;
-    v.ground.hysteresis = TERRIMPI_VIEW_HYSTERESIS;
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
+    terrimpi_view_set_ground(&v.desc, &v.ground);
     v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
+}
+
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc)
+{
+    terrimp_view_desc d;
+    const terrimp_view_desc *has;
+    TERRIMPI_REFUSE(!view || !desc, TERRIMP_E_NULL);
+    has = &view->desc;
+    d = *desc;
+    TERRIMPI_DEFAULT(d.atlas_size, has->atlas_size);
+    TERRIMPI_DEFAULT(d.atlas_count, has->atlas_count);
+    TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
+    TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
+    TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
+    TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
+                    d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
+                    d.max_captures != has->max_captures, TERRIMP_E_RANGE);
+    view->desc = d;
+    terrimpi_view_set_ground(&view->desc, &view->ground);
+    return TERRIMP_OK;
 }
 
 /* ---- captures that are not made ---- */
@@ -8917,6 +8968,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
     terrimp_mesh_info mesh;
     memset(job, 0, sizeof *job);
+    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
+    if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
+        return 0;
     plan->node = c->node;
     plan->layer_count = 1;
     terrimpi_node_box(f->terrain, &c->node, &plan->box);
@@ -8927,7 +8981,6 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
         return 0;
-    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
@@ -8941,8 +8994,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
-    if (!terrimpi_job_slots(&v->cache, size, job))
+    if (!terrimpi_job_slots(&v->cache, size, job)) {
+        job->picture->refused = f->number;
         return 0;
+    }
     size[0] = terrimpi_cache_rect(&v->cache, &job->slots[0]).width;
     size[1] = terrimpi_cache_rect(&v->cache, &job->slots[0]).height;
     terrimpi_capture_spread(f->terrain, plan, size, texels);
@@ -9240,6 +9295,7 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     float step[3];
     uint32_t i;
     f.number++;
+    f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
@@ -9752,13 +9808,15 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
-/* Which sides of a square are split, for its neighbours are: bits as in the patterns of nodes. */
-static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s, const int32_t at[2],
-                                        uint32_t level)
+/* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
+   nodes. None is when even the neighbour that is closest, by a side, is not. */
+static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
+    const int32_t *at = s->at;
+    uint32_t level = s->level;
     int32_t size = 1 << level;
     terrimp_sorted_int x, z, split = s->split[level] - s->rise;
-    if (level == 0)
+    if (level == 0 || s->away > s->whole[level])
         return 0;
     x = terrimpi_sorted_away(s, 0, at[0], size);
     z = terrimpi_sorted_away(s, 1, at[1], size);
@@ -9798,8 +9856,9 @@ static int terrimpi_sorted_visit(terrimp_sorted *s, const int32_t at[2], uint32_
     s->at[0] = at[0];
     s->at[1] = at[1];
     s->level = level;
-    if (!(terrimpi_sorted_away(s, 0, at[0], 1 << level) +
-          terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise < s->split[level]))
+    s->away = terrimpi_sorted_away(s, 0, at[0], 1 << level) +
+              terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise;
+    if (s->away >= s->split[level])
         return 1;
     s->depth++;
     s->stack[s->depth].at[0] = at[0];
@@ -10100,13 +10159,12 @@ static terrimp_sorted_height terrimpi_sorted_blend(const terrimp_sorted *s, int3
 #endif
 }
 
-/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. */
+/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. away:
+   the square of its distance. */
 static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *out, int32_t x,
-                                int32_t z, uint32_t level)
+                                int32_t z, uint32_t level, terrimp_sorted_int away)
 {
     terrimp_sorted_vertex *v = &out->vertices[out->vertex_count++];
-    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0] + x, 0) +
-                              terrimpi_sorted_away(s, 1, s->corner[1] + z, 0) + s->rise;
     terrimp_sorted_height height;
     v->x = s->page.x * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 0, x);
     v->z = s->page.z * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 1, z);
@@ -10206,22 +10264,31 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
 /* Writes the present square. */
 static void terrimpi_sorted_emit(const terrimp_sorted *s, terrimp_sorted_square *out)
 {
-    uint32_t pattern = terrimpi_sorted_pattern(s, s->at, s->level);
+    uint32_t pattern = terrimpi_sorted_pattern(s);
     int32_t x = s->at[0] - s->corner[0], z = s->at[1] - s->corner[1], size = 1 << s->level;
     int32_t half = size / 2;
+    terrimp_sorted_int away_x[2], away_z[2];
     int i, middle[4] = { 0, 0, 0, 0 };
     out->page_x = s->page.x;
     out->page_z = s->page.z;
     out->level = (uint8_t)s->level;
     out->texture_level = (uint8_t)s->page.texture_level;
     out->vertex_count = 0;
+    for (i = 0; i < 2; i++) {
+        away_x[i] = terrimpi_sorted_away(s, 0, s->at[0] + i * size, 0);
+        away_z[i] = terrimpi_sorted_away(s, 1, s->at[1] + i * size, 0) + s->rise;
+    }
     for (i = 0; i < 4; i++)
-        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level);
+        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level,
+                            away_x[i & 1] + away_z[i >> 1]);
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
+            int32_t along_x = i < 2 ? half : (i & 1) * size;
+            int32_t along_z = i < 2 ? (i & 1) * size : half;
             middle[i] = out->vertex_count;
-            terrimpi_sorted_put(s, out, x + (i < 2 ? half : (i & 1) * size),
-                                z + (i < 2 ? (i & 1) * size : half), s->level - 1u);
+            terrimpi_sorted_put(s, out, x + along_x, z + along_z, s->level - 1u,
+                                terrimpi_sorted_away(s, 0, s->at[0] + along_x, 0) + s->rise +
+                                terrimpi_sorted_away(s, 1, s->at[1] + along_z, 0));
         }
     terrimpi_sorted_triangles(s, out, middle);
 }
@@ -10309,7 +10376,7 @@ static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
     terrimpi_sorted_set_scale(s, scale);
     terrimpi_sorted_restart(s);
     while (terrimpi_sorted_step(s, 1))
-        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s, s->at, s->level));
+        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
     terrimpi_sorted_restart(s);
     return count;
 }

@@ -1505,6 +1505,47 @@ static void touch_forgets_what_shows_the_samples_and_little_else(void)
     land_free(&l);
 }
 
+/* New settings are those of the next frame; pictures that are good by them stay. */
+static void settings_change_without_a_loss(void)
+{
+    flight *f = &flight_room;
+    terrimp_view_desc d, wrong;
+    terrimp_camera camera;
+    uint32_t i;
+    land l;
+    make_hills(&l);
+    memset(&d, 0, sizeof d);
+    d.texels_per_px = 2.0f;
+    d.fade_start = 16.0f;
+    if (land_build(&l) && flight_open(f, &l, &d)) {
+        camera = camera_beside(&l);
+        CHECK(rest(f, &camera) < REST_FRAMES && f->impostor_count > 0);
+        d.tolerance_px = 1.5f; /* all pictures do for a larger one */
+        CHECK(terrimp_view_set(f->view, &d) == TERRIMP_OK);
+        for (i = 0; i < 3u; i++) {
+            CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+            CHECK(f->stats.captures == 0 && f->stats.impostors > 0);
+        }
+        d.mode = TERRIMP_MODE_GEOMIP;
+        CHECK(terrimp_view_set(f->view, &d) == TERRIMP_OK);
+        wrong = d;
+        wrong.atlas_size = 512;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        wrong = d;
+        wrong.mode = TERRIMP_MODE_IMPOSTOR;
+        wrong.tolerance_px = -1.0f;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        CHECK(terrimp_view_set(f->view, NULL) == TERRIMP_E_NULL);
+        CHECK(terrimp_view_set(NULL, &d) == TERRIMP_E_NULL);
+        CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+        CHECK(f->stats.impostors == 0 && f->stats.ground > 0);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
 static void invalidate_forgets_every_picture(void)
 {
     flight *f = &flight_room;
@@ -2143,6 +2184,7 @@ static void view_tests(void)
     RUN(a_resting_eye_captures_nothing);
     RUN(nothing_waits_after_some_frames_of_rest);
     RUN(touch_forgets_what_shows_the_samples_and_little_else);
+    RUN(settings_change_without_a_loss);
     RUN(invalidate_forgets_every_picture);
     RUN(what_was_forgotten_since_the_update_is_not_drawn);
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);
