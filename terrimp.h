@@ -726,8 +726,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   const terrimp_rect *slot, uint32_t atlas_width,
                                                   uint32_t atlas_height, float matrix[16]);
 
-/* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of a
-   capture's picture, to the place that is seen there, relative to an eye, times a factor.
+/* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of
+   a capture's picture, to the place that is seen there, relative to an eye, times a factor.
 
    eye             [3] [wu] of the frame: results are exact close to it, wherever the origin is
    matrix          [16] out, column-major
