@@ -7459,7 +7459,7 @@ static void terrimpi_capture_order(uint32_t at, uint32_t shift, uint32_t nodes, 
     row->count = terrimpi_min_u32(1u << shift, nodes - row->first);
     high = (int)row->count + 1;
     cell = (int)terrimpi_clamp(eye - (float)row->first + 1.0f, -1.0f, 99.0f);
-    for (k = 0; k < row->count + 2u; k++)
+    for (k = 0; k < terrimpi_min_u32(row->count + 2u, TERRIMPI_CAPTURE_ROW); k++)
         row->order[k] = (uint8_t)(cell - low > high - cell ? low++ : high--);
 }
 
@@ -14046,8 +14046,8 @@ TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
     terrimpi_layers_spacing(desc, &s);
     TERRIMPI_REFUSE(!(s.end + s.spare > 0.0f), TERRIMP_E_RANGE); /* no layer would be the last */
     if (desc->even) { /* the far side's smallest step for all */
-        float small = s.shift + s.shrink * s.end;
-        s.side = terrimpi_max(s.side, small > 0.0f ? s.texel / small : TERRIMPI_INFINITY);
+        float least = s.shift + s.shrink * s.end;
+        s.side = terrimpi_max(s.side, least > 0.0f ? s.texel / least : TERRIMPI_INFINITY);
         s.change = -1.0f;
     }
     l.start = desc->distance;
@@ -14976,6 +14976,7 @@ static void terrimpi_depth_cells(terrimpi_depth *d, int fill)
     for (y = 0; y < s->height; y++)
         for (x = 0; x < s->width; x++) {
             terrimpi_depth_cell run;
+            run.k1 = 0;
             if (fill)
                 d->first_cell[y * s->width + x] = d->cell_count;
             for (k = 0; terrimpi_depth_run(s, x, y, k, &run, &seen); k = run.k1 + 1u) {
