@@ -7456,7 +7456,8 @@ static void terrimpi_capture_order(uint32_t at, uint32_t shift, uint32_t nodes, 
     int low = 0, high, cell;
     uint32_t k;
     row->first = at << shift;
-    row->count = terrimpi_min_u32(1u << shift, nodes - row->first);
+    row->count = terrimpi_min_u32(terrimpi_min_u32(1u << shift, nodes - row->first),
+                                  TERRIMPI_CAPTURE_ROW - 2u);
     high = (int)row->count + 1;
     cell = (int)terrimpi_clamp(eye - (float)row->first + 1.0f, -1.0f, 99.0f);
     for (k = 0; k < terrimpi_min_u32(row->count + 2u, TERRIMPI_CAPTURE_ROW); k++)
