@@ -383,15 +383,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 /* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
 typedef struct terrimp_camera {
-    float eye[3];           /* [wu] */
+    float eye[3];           /* [wu] [Limits: -1e18..1e18] */
     float forward[3];       /* (required) viewing direction, any length > 0 */
     float up[3];            /* [Default 0,0,0 -> 0,1,0]; along forward: another one is chosen */
     float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
     uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
     uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
     float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near].
-                               What is drawn may need more: see terrimp_stats.z_far */
+    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
+                               ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
@@ -458,8 +458,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
-              E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum, or for 1e18 and more; E_INSIDE when the
+              eye is in the box; E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -712,8 +712,9 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
-/* The matrix that takes a world position (x, y, z, 1) to (s, t, r, q): the capture's picture lies
-   in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth in 0..1.
+/* The matrix that takes (x, y, z, 1), a position relative to the capture's eye, to (s, t, r, q):
+   the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
+   in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
@@ -726,9 +727,10 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq);
+   xyz [count][3], world positions, and the capture's eye, to stq [count][3], which may not overlap
+   xyz. */
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
@@ -1270,10 +1272,10 @@ typedef struct terrimp_capture_command {
 } terrimp_capture_command;
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
-   texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
-   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
-   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
+   texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
+   bilinear, divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a
+   picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
+   the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1284,6 +1286,7 @@ typedef struct terrimp_impostor_command {
     uint32_t index_count;
     float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
                              by a dither pattern: its ground shows on the others */
+    float eye[3];         /* that the picture was made from: positions are relative to it */
     float texture_matrix[16];
 } terrimp_impostor_command;
 
@@ -1356,6 +1359,14 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
+
+/* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
+
+   desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
+              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0
+   Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
+              changes */
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
@@ -1523,6 +1534,7 @@ typedef struct terrimp_sorted {
     } stack[TERRIMP_SORTED_LEVELS + 1];
     int32_t at[2];               /* the present square */
     uint32_t level;
+    terrimp_sorted_int away;     /* squared, of its closest point */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1553,7 +1565,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 
    squares    [capacity] out
    Returns    how many; less than capacity, or 0, at the end of the frame
-   Cost       less than 100 cycles a triangle, whatever came before
+   Cost       110 to 150 cycles a triangle of a processor of 2020, whatever came before
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
@@ -2037,8 +2049,8 @@ typedef struct terrimp_cover_desc {
     uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
 } terrimp_cover_desc;
 
-/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
-   numbers of the descriptor are outside of their limits or capacity is 0. */
+/* Bytes of scratch memory that terrimp_cover needs; 0 when the numbers of the descriptor are out of
+   their limits or capacity is 0. */
 TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
 
 /* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
@@ -2053,18 +2065,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
 TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
                                          size_t bytes, terrimp_rect *rects, uint32_t capacity,
                                          uint32_t *count);
-
-/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
-   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
-
-   cell       [texels] side of a cell [Limits: 1..16384]
-   min_fill   [Limits: 0..1] he found 0.8 to work well
-   Errors     those of terrimp_cover
-   Source     Jeschke 2004, section 3.5 */
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count);
 
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
@@ -2443,11 +2443,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-static int terrimpi_finite(float value)
+/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
+   since compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value)
 {
-    float rounded = terrimpi_float(value);
-    return rounded - rounded == 0.0f;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x7fffffffu;
 }
+
+static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
 {
@@ -2770,7 +2776,7 @@ static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t
 
 static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 {
-    return field->has_no_data && (raw == field->no_data || raw != raw);
+    return field->has_no_data && (raw == field->no_data || terrimpi_bits(raw) > TERRIMPI_INFINITE);
 }
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
@@ -3362,6 +3368,16 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
+#define TERRIMPI_FARTHEST 1e18f /* of coordinates: products of two distances stay finite */
+
+/* Whether two vectors are of unit length and at a right angle, but for rounding. */
+static int terrimpi_orthonormal(const float a[3], const float b[3])
+{
+    return terrimpi_abs(terrimpi_dot(a, a) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(b, b) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(a, b)) < 2e-6f;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
 {
     terrimp_camera c;
@@ -3377,8 +3393,12 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
                     !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
-    terrimpi_basis(c.forward, c.up, right);
+                    c.z_far <= c.z_near || c.z_far > TERRIMPI_FARTHEST ||
+                    terrimpi_largest(c.eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
+    if (!terrimpi_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
+        TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
+        terrimpi_basis(c.forward, c.up, right);
+    }
     *out = c;
     return TERRIMP_OK;
 }
@@ -3576,7 +3596,8 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
-                    box->min[2] > box->max[2], TERRIMP_E_RANGE);
+                    box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_FARTHEST ||
+                    terrimp_box_farthest(box, eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
@@ -4698,6 +4719,7 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
     terrimp_capture_matrices(capture, 0, view, projection);
+    view[12] = view[13] = view[14] = 0.0f; /* relative to the eye */
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
     scale[2] = 0.5f;
@@ -4731,18 +4753,21 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq)
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq)
 {
     static const int rows[3] = {0, 1, 3};
     size_t i;
     int k;
-    TERRIMPI_REFUSE(!matrix || (count && (!xyz || !stq)), TERRIMP_E_NULL);
-    for (i = 0; i < count; i++, xyz += 3, stq += 3)
+    TERRIMPI_REFUSE(!matrix || !eye || (count && (!xyz || !stq)), TERRIMP_E_NULL);
+    for (i = 0; i < count; i++, xyz += 3, stq += 3) {
+        float to[3];
+        terrimpi_sub(xyz, eye, to);
         for (k = 0; k < 3; k++) {
             const float *m = matrix + rows[k];
-            stq[k] = m[0] * xyz[0] + m[4] * xyz[1] + m[8] * xyz[2] + m[12];
+            stq[k] = m[0] * to[0] + m[4] * to[1] + m[8] * to[2] + m[12];
         }
+    }
     return TERRIMP_OK;
 }
 
@@ -7513,16 +7538,74 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          19 of 20 would spare too little (seven flights) */
 #define TERRIMPI_NO_PICTURE 0xffffu
 
+/* How the eye moves: how far it is from where it was in the mean of the last 4, 16, 64 and 256
+   frames. Who bobs is fast, but not far away from where he was: a picture that is good as far as
+   that lasts. And how often all pictures are lost at once, by jumps or because the host says so. */
+#define TERRIMPI_MOTIONS 4u
+typedef struct terrimpi_motion {
+    float away[TERRIMPI_MOTIONS][3]; /* [wu] */
+    float frames[TERRIMPI_MOTIONS];  /* which an eye of constant speed needs for that way */
+    float since, between;            /* [frames] since the last loss, and between two in the mean */
+} terrimpi_motion;
+
+static void terrimpi_motion_begin(terrimpi_motion *m)
+{
+    memset(m, 0, sizeof *m);
+    m->between = TERRIMPI_VIEW_LIFE;
+}
+
+/* Notes that all pictures are lost, or of no use. */
+static void terrimpi_motion_lose(terrimpi_motion *m)
+{
+    m->between = 0.5f * (m->between + m->since);
+    m->since = 0.0f;
+}
+
+/* A frame later; a jump is no motion. */
+static void terrimpi_motion_step(terrimpi_motion *m, const float step[3], float jump)
+{
+    float way[3] = {0.0f, 0.0f, 0.0f}, frames = 4.0f;
+    uint32_t k, i;
+    m->since += 1.0f;
+    if (terrimpi_length(step) > jump)
+        terrimpi_motion_lose(m);
+    else
+        memcpy(way, step, sizeof way);
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        float keep = 1.0f - 1.0f / frames;
+        for (i = 0; i < 3u; i++) {
+            m->away[k][i] = keep * (m->away[k][i] + way[i]);
+            if (terrimpi_abs(m->away[k][i]) < 1e-6f * jump) /* at rest, some time */
+                m->away[k][i] = 0.0f;
+        }
+        m->frames[k] = keep * (m->frames[k] + 1.0f);
+    }
+}
+
+/* The speed [wu a frame] with which an eye gets to `reach` away: the mean over about as many frames
+   as it needs for that. */
+static float terrimpi_motion_speed(const terrimpi_motion *m, float reach)
+{
+    float frames = 4.0f, speed = 0.0f;
+    uint32_t k;
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        speed = terrimpi_length(m->away[k]) / terrimpi_max(m->frames[k], 0.75f);
+        if (!(speed * frames < reach))
+            break;
+    }
+    return speed;
+}
+
 /* What the whole of a frame looks at, and nothing changes. */
 typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
     terrimp_camera camera;         /* resolved */
+    int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
     float pixel_factor;
-    float motion[3];               /* [wu] a frame, smoothed */
-    float speed;
+    terrimpi_motion motion;
 } terrimpi_frame;
 
 /* ---- settings ---- */
@@ -7638,6 +7721,7 @@ typedef struct terrimpi_picture {
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
     uint32_t draw;            /* ... and its place on the list of that frame */
+    uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
     uint32_t layer_count;     /* 0: not made yet */
     uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
@@ -7657,6 +7741,7 @@ typedef struct terrimpi_cache {
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
     uint32_t frame;              /* what is seen in it is not given up */
+    uint32_t freed;              /* the last frame that gave room back */
     uint32_t failures, evictions; /* so far */
 } terrimpi_cache;
 
@@ -7679,6 +7764,8 @@ static terrimpi_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t n
 static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, uint32_t count)
 {
     uint32_t i;
+    if (count > 0)
+        c->freed = c->frame;
     for (i = 0; i < count; i++)
         terrimp_live_atlas_free(&c->atlases[slots[i].atlas], slots[i].slot);
 }
@@ -7755,12 +7842,23 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2], terrim
 static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slots,
                                 uint32_t count)
 {
-    uint32_t i;
+    uint32_t i, freed = c->freed;
     for (i = 0; i < count; i++)
         if (!terrimpi_cache_slot(c, size, &slots[i])) {
             terrimpi_cache_free(c, slots, i);
+            c->freed = freed; /* there is no more room than before */
             return 0;
         }
+    return 1;
+}
+
+/* Whether there is no room for a picture since there was none a frame before, and nothing has
+   changed. */
+static int terrimpi_cache_refuses(const terrimpi_cache *c, int still, terrimpi_picture *picture)
+{
+    if (!still || picture->refused + 1u != c->frame || c->freed >= picture->refused)
+        return 0;
+    picture->refused = c->frame;
     return 1;
 }
 
@@ -8030,14 +8128,16 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
     float way = f->desc->no_lookahead ? 1.0f : 1.0f + TERRIMPI_VIEW_AHEAD;
-    float life = way * closest * terrimpi_view_sine(f, node, closest) /
-                 terrimpi_max(f->speed, 1e-20f);
+    float reach = way * closest * terrimpi_view_sine(f, node, closest);
+    float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
+    life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
 static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 {
-    return f->pixel_factor * f->desc->texels_per_px / terrimpi_max(closest, 1e-6f);
+    return f->pixel_factor * f->desc->texels_per_px /
+           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
@@ -8055,15 +8155,16 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
 static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
                                 const terrimp_box *box, float closest, float eye[3])
 {
-    float ahead;
+    const float *way = f->motion.away[0];
+    float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
     memcpy(eye, f->camera.eye, sizeof f->camera.eye);
-    if (f->desc->no_lookahead || !(f->speed > 0.0f))
+    if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
-    ahead = TERRIMPI_VIEW_AHEAD * closest * terrimpi_view_sine(f, node->number, closest);
-    ahead = terrimpi_min(ahead, f->speed * 0.5f * TERRIMPI_VIEW_LIFE);
+    ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
+    ahead = terrimpi_min(TERRIMPI_VIEW_AHEAD * reach, ahead * 0.5f * TERRIMPI_VIEW_LIFE);
     for (i = 0; i < 3u; i++)
-        eye[i] += f->motion[i] / f->speed * ahead;
+        eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
         memcpy(eye, f->camera.eye, sizeof f->camera.eye);
 }
@@ -8273,6 +8374,14 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     return terrimpi_view_layout(&v, NULL);
 }
 
+static void terrimpi_view_set_ground(const terrimp_view_desc *d, terrimp_geomip_view *ground)
+{
+    ground->rule = d->ground_rule;
+    ground->morph_ratio = d->morph_ratio;
+    ground->tolerance_px = d->ground_tolerance_px;
+    ground->hysteresis = TERRIMPI_VIEW_HYSTERESIS;
+}
+
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view)
@@ -8288,17 +8397,35 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_view_layout(&v, (unsigned char *)memory);
-    v.ground.rule = v.desc.ground_rule;
-    v.ground.morph_ratio = v.desc.morph_ratio;
-    v.ground.tolerance_px = v.desc.ground_tolerance_px;
-    v.ground.hysteresis = TERRIMPI_VIEW_HYSTERESIS;
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
+    terrimpi_view_set_ground(&v.desc, &v.ground);
     v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
+}
+
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc)
+{
+    terrimp_view_desc d;
+    const terrimp_view_desc *has;
+    TERRIMPI_REFUSE(!view || !desc, TERRIMP_E_NULL);
+    has = &view->desc;
+    d = *desc;
+    TERRIMPI_DEFAULT(d.atlas_size, has->atlas_size);
+    TERRIMPI_DEFAULT(d.atlas_count, has->atlas_count);
+    TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
+    TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
+    TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
+    TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
+                    d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
+                    d.max_captures != has->max_captures, TERRIMP_E_RANGE);
+    view->desc = d;
+    terrimpi_view_set_ground(&view->desc, &view->ground);
+    return TERRIMP_OK;
 }
 
 /* ---- captures that are not made ---- */
@@ -8335,6 +8462,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
+    terrimpi_motion_lose(&view->frame.motion);
     view->job_count = view->open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
@@ -8696,6 +8824,7 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
+    memcpy(command.eye, picture->eye, sizeof command.eye);
     picture->drawn_count++;
     for (layer = 0; layer < picture->layer_count; layer++) {
         command.part = layer;
@@ -8829,6 +8958,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
     terrimp_mesh_info mesh;
     memset(job, 0, sizeof *job);
+    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
+    if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
+        return 0;
     plan->node = c->node;
     plan->layer_count = 1;
     terrimpi_node_box(f->terrain, &c->node, &plan->box);
@@ -8839,7 +8971,6 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
         return 0;
-    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
@@ -8853,8 +8984,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
-    if (!terrimpi_job_slots(&v->cache, size, job))
+    if (!terrimpi_job_slots(&v->cache, size, job)) {
+        job->picture->refused = f->number;
         return 0;
+    }
     size[0] = terrimpi_cache_rect(&v->cache, &job->slots[0]).width;
     size[1] = terrimpi_cache_rect(&v->cache, &job->slots[0]).height;
     terrimpi_capture_spread(f->terrain, plan, size, texels);
@@ -9153,17 +9286,17 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     float step[3];
     uint32_t i;
     f.number++;
+    f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
-    for (i = 0; i < 3u; i++) {
-        step[i] = camera->eye[i] - before->camera.eye[i];
-        f.motion[i] = 0.75f * before->motion[i] + 0.25f * step[i];
+    if (f.number == 1u) {
+        terrimpi_motion_begin(&f.motion);
+        return f;
     }
-    if (f.number <= 1u || terrimpi_length(step) > TERRIMPI_VIEW_JUMP * f.desc->fade_start ||
-        terrimpi_length(f.motion) < 1e-6f * f.desc->fade_start)
-        memset(f.motion, 0, sizeof f.motion);
-    f.speed = terrimpi_length(f.motion);
+    for (i = 0; i < 3u; i++)
+        step[i] = camera->eye[i] - before->camera.eye[i];
+    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
     return f;
 }
 
@@ -9663,13 +9796,15 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
-/* Which sides of a square are split, for its neighbours are: bits as in the patterns of nodes. */
-static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s, const int32_t at[2],
-                                        uint32_t level)
+/* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
+   nodes. None is when even the neighbour that is closest, by a side, is not. */
+static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
+    const int32_t *at = s->at;
+    uint32_t level = s->level;
     int32_t size = 1 << level;
     terrimp_sorted_int x, z, split = s->split[level] - s->rise;
-    if (level == 0)
+    if (level == 0 || s->away > s->whole[level])
         return 0;
     x = terrimpi_sorted_away(s, 0, at[0], size);
     z = terrimpi_sorted_away(s, 1, at[1], size);
@@ -9709,8 +9844,9 @@ static int terrimpi_sorted_visit(terrimp_sorted *s, const int32_t at[2], uint32_
     s->at[0] = at[0];
     s->at[1] = at[1];
     s->level = level;
-    if (!(terrimpi_sorted_away(s, 0, at[0], 1 << level) +
-          terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise < s->split[level]))
+    s->away = terrimpi_sorted_away(s, 0, at[0], 1 << level) +
+              terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise;
+    if (s->away >= s->split[level])
         return 1;
     s->depth++;
     s->stack[s->depth].at[0] = at[0];
@@ -10011,13 +10147,12 @@ static terrimp_sorted_height terrimpi_sorted_blend(const terrimp_sorted *s, int3
 #endif
 }
 
-/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. */
+/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. away:
+   the square of its distance. */
 static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *out, int32_t x,
-                                int32_t z, uint32_t level)
+                                int32_t z, uint32_t level, terrimp_sorted_int away)
 {
     terrimp_sorted_vertex *v = &out->vertices[out->vertex_count++];
-    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0] + x, 0) +
-                              terrimpi_sorted_away(s, 1, s->corner[1] + z, 0) + s->rise;
     terrimp_sorted_height height;
     v->x = s->page.x * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 0, x);
     v->z = s->page.z * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 1, z);
@@ -10117,22 +10252,31 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
 /* Writes the present square. */
 static void terrimpi_sorted_emit(const terrimp_sorted *s, terrimp_sorted_square *out)
 {
-    uint32_t pattern = terrimpi_sorted_pattern(s, s->at, s->level);
+    uint32_t pattern = terrimpi_sorted_pattern(s);
     int32_t x = s->at[0] - s->corner[0], z = s->at[1] - s->corner[1], size = 1 << s->level;
     int32_t half = size / 2;
+    terrimp_sorted_int away_x[2], away_z[2];
     int i, middle[4] = { 0, 0, 0, 0 };
     out->page_x = s->page.x;
     out->page_z = s->page.z;
     out->level = (uint8_t)s->level;
     out->texture_level = (uint8_t)s->page.texture_level;
     out->vertex_count = 0;
+    for (i = 0; i < 2; i++) {
+        away_x[i] = terrimpi_sorted_away(s, 0, s->at[0] + i * size, 0);
+        away_z[i] = terrimpi_sorted_away(s, 1, s->at[1] + i * size, 0) + s->rise;
+    }
     for (i = 0; i < 4; i++)
-        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level);
+        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level,
+                            away_x[i & 1] + away_z[i >> 1]);
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
+            int32_t along_x = i < 2 ? half : (i & 1) * size;
+            int32_t along_z = i < 2 ? (i & 1) * size : half;
             middle[i] = out->vertex_count;
-            terrimpi_sorted_put(s, out, x + (i < 2 ? half : (i & 1) * size),
-                                z + (i < 2 ? (i & 1) * size : half), s->level - 1u);
+            terrimpi_sorted_put(s, out, x + along_x, z + along_z, s->level - 1u,
+                                terrimpi_sorted_away(s, 0, s->at[0] + along_x, 0) + s->rise +
+                                terrimpi_sorted_away(s, 1, s->at[1] + along_z, 0));
         }
     terrimpi_sorted_triangles(s, out, middle);
 }
@@ -10220,7 +10364,7 @@ static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
     terrimpi_sorted_set_scale(s, scale);
     terrimpi_sorted_restart(s);
     while (terrimpi_sorted_step(s, 1))
-        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s, s->at, s->level));
+        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
     terrimpi_sorted_restart(s);
     return count;
 }
@@ -14007,7 +14151,6 @@ typedef struct terrimpi_cover {
     uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
     uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
     uint32_t *seen;       /* a row of bits */
-    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
     terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
 } terrimpi_cover;
 
@@ -14368,7 +14511,10 @@ static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects
         for (a = 0; a < count; a++)
             for (b = a + 1u; b < count; b++) {
                 terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
-                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                if (terrimpi_cover_cost(c, r.width, r.height) / 2u > /* far apart */
+                        terrimpi_cover_cost(c, rects[a].width, rects[a].height) +
+                            terrimpi_cover_cost(c, rects[b].width, rects[b].height) ||
+                    terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
                     continue;
                 count = terrimpi_cover_swallow(&r, rects, count);
                 joined = 1;
@@ -14396,9 +14542,6 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
     c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
     c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
-    c->cells = (uint32_t *)terrimpi_take(
-        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
-        sizeof *c->cells);
     c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
         &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
     c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
@@ -14411,19 +14554,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
     terrimpi_cover c;
     size_t bytes;
     return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
-}
-
-/* What both ways to cover begin with. */
-static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
-                                          size_t bytes, const terrimp_rect *rects,
-                                          uint32_t capacity, const uint32_t *count,
-                                          terrimpi_cover *c)
-{
-    size_t needed;
-    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
-    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 /* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
@@ -14459,8 +14589,12 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
                                          uint32_t *count)
 {
     terrimpi_cover c;
+    size_t needed;
     uint32_t i, kept;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, &c, &needed));
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
     c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
     c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
     for (i = 0; i < c.node_count; i++)
@@ -14468,140 +14602,6 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
     kept = terrimpi_cover_prune(&c, rects, capacity);
     TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
     *count = terrimpi_cover_join(&c, rects, kept);
-    return TERRIMP_OK;
-}
-
-/* A box of cells, ends excluded, and how many of them are filled. */
-typedef struct terrimpi_grow_box {
-    uint32_t x0, y0, x1, y1, filled;
-} terrimpi_grow_box;
-
-/* How many cells of a box are filled, on a grid that is a mask. */
-static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
-                                     uint32_t x1, uint32_t y1)
-{
-    uint32_t y, word, filled = 0;
-    for (y = y0; y < y1 && x0 < x1; y++)
-        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
-            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
-    return filled;
-}
-
-/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
-static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
-                              int dy, terrimpi_grow_box *out)
-{
-    *out = *b;
-    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
-        (dy > 0 && b->y1 == g->height))
-        return 0;
-    out->x0 -= dx < 0;
-    out->x1 += dx > 0;
-    out->y0 -= dy < 0;
-    out->y1 += dy > 0;
-    if (dx)
-        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
-                                            dx < 0 ? b->x0 : out->x1, out->y1);
-    if (dy)
-        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
-                                            dy < 0 ? b->y0 : out->y1);
-    return 1;
-}
-
-static float terrimpi_grow_area(const terrimpi_grow_box *b)
-{
-    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
-}
-
-/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
-static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
-                                 terrimpi_grow_box *box)
-{
-    for (;;) {
-        terrimpi_grow_box best = *box, next;
-        float best_ratio = 0.0f;
-        int k;
-        for (k = 0; k < 9; k++) {
-            float ratio;
-            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
-                continue;
-            ratio = (float)(next.filled - box->filled) /
-                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
-            if (ratio > best_ratio) {
-                best_ratio = ratio;
-                best = next;
-            }
-        }
-        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
-            return;
-        *box = best;
-    }
-}
-
-/* The mask of the cells that hold opaque texels. */
-static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
-{
-    terrimp_cover_desc g = c->desc;
-    uint32_t y, word;
-    g.mask = c->cells;
-    g.width = (c->desc.width - 1u) / cell + 1u;
-    g.height = (c->desc.height - 1u) / cell + 1u;
-    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
-    for (y = 0; y < c->desc.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
-            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
-            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
-            while (bits) {
-                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
-                row[x / 32u] |= 1u << x % 32u;
-            }
-        }
-    return g;
-}
-
-/* Grows a box from a cell, empties its cells, and returns it in texels. */
-static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
-                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
-{
-    terrimpi_grow_box b;
-    b.x0 = x;
-    b.y0 = y;
-    b.x1 = x + 1u;
-    b.y1 = y + 1u;
-    b.filled = 1;
-    terrimpi_grow_box_up(g, min_fill, &b);
-    for (y = b.y0; y < b.y1; y++)
-        for (x = b.x0; x < b.x1; x++)
-            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
-    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
-                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
-                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
-}
-
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count)
-{
-    terrimpi_cover c;
-    terrimp_cover_desc g;
-    uint32_t made = 0, y, word;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
-    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
-                        !terrimpi_within_u32(cell, 1, 16384),
-                    TERRIMP_E_RANGE);
-    g = terrimpi_grow_grid(&c, cell);
-    for (y = 0; y < g.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
-            uint32_t bits;
-            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
-                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
-                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
-                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
-                terrimpi_cover_tighten(&c, &rects[made++]);
-            }
-        }
-    *count = made;
     return TERRIMP_OK;
 }
 
@@ -15847,7 +15847,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
 
 #define TERRIMPI_PLACE_NONE 0xffffffffu
 enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
-#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+#define TERRIMPI_PLACE_WORK 3000000u /* numbers that attempts may go over, some 10 ns each */
 
 typedef struct terrimpi_placing {
     const terrimp_place_desc *desc;

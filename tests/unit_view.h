@@ -477,20 +477,24 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     const flight_picture *parts = &f->latest[command->node * FLIGHT_PARTS];
     const terrimp_capture_command *capture = &parts[command->part].capture;
     double size = (double)f->desc.atlas_size;
+    float view[16]; /* of positions relative to the eye */
     terrimp_mesh_info mesh;
     uint32_t i, step, part;
+    memcpy(view, capture->view, sizeof view);
+    view[12] = view[13] = view[14] = 0.0f;
+    CHECK(memcmp(command->eye, capture->eye, sizeof command->eye) == 0);
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     step = mesh.vertex_count / 5u + 1u;
     for (i = 0; i < mesh.vertex_count; i += step) {
         double p[3], seen[4], clip[4], out[4], x, y;
         double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height), rim_y;
-        int shown = 0;
+        int shown = 0, k;
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
-        oracle_transform(capture->view, p, seen);
+        for (k = 0; k < 3; k++)
+            p[k] -= (double)command->eye[k];
+        oracle_transform(view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
         oracle_transform(command->texture_matrix, p, out);
-        /* close to the capture's eye floats of the world's size are coarse */
-        rim += 2e-6 * fabs(p[1]) * (double)(capture->slot.width + capture->slot.height) / clip[3];
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
         rim_y = rim + texture_rounding(command->texture_matrix, p, 1, size);
@@ -500,7 +504,6 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         CHECK(x > -rim && x < (double)capture->slot.width + rim);
         CHECK(y > -rim_y && y < (double)capture->slot.height + rim_y);
         for (part = 0; part < command->part_count; part++) {
-            oracle_transform(parts[part].capture.view, p, seen);
             oracle_transform4(parts[part].capture.projection, seen, clip);
             shown |= clip[2] < clip[3] &&
                      clip[2] > (f->camera.depth_zero_to_one ? 0.0 : -clip[3]);
@@ -1236,7 +1239,7 @@ static void flights_with_the_band_inside_boxes_keep_every_law(void)
 static void flights_with_random_settings_keep_every_law(void)
 {
     uint32_t pieces = 0, high = 0, waiting = 0, run;
-    for (run = 0; run < check_rounds(16, 96); run++) {
+    for (run = 0; run < check_rounds(32, 96); run++) {
         terrimp_view_desc d;
         land l;
         random_land(&l);
@@ -1492,6 +1495,47 @@ static void touch_forgets_what_shows_the_samples_and_little_else(void)
     land_free(&l);
 }
 
+/* New settings are those of the next frame; pictures that are good by them stay. */
+static void settings_change_without_a_loss(void)
+{
+    flight *f = &flight_room;
+    terrimp_view_desc d, wrong;
+    terrimp_camera camera;
+    uint32_t i;
+    land l;
+    make_hills(&l);
+    memset(&d, 0, sizeof d);
+    d.texels_per_px = 2.0f;
+    d.fade_start = 16.0f;
+    if (land_build(&l) && flight_open(f, &l, &d)) {
+        camera = camera_beside(&l);
+        CHECK(rest(f, &camera) < REST_FRAMES && f->impostor_count > 0);
+        d.tolerance_px = 1.5f; /* all pictures do for a larger one */
+        CHECK(terrimp_view_set(f->view, &d) == TERRIMP_OK);
+        for (i = 0; i < 3u; i++) {
+            CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+            CHECK(f->stats.captures == 0 && f->stats.impostors > 0);
+        }
+        d.mode = TERRIMP_MODE_GEOMIP;
+        CHECK(terrimp_view_set(f->view, &d) == TERRIMP_OK);
+        wrong = d;
+        wrong.atlas_size = 512;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        wrong = d;
+        wrong.mode = TERRIMP_MODE_IMPOSTOR;
+        wrong.tolerance_px = -1.0f;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        CHECK(terrimp_view_set(f->view, NULL) == TERRIMP_E_NULL);
+        CHECK(terrimp_view_set(NULL, &d) == TERRIMP_E_NULL);
+        CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+        CHECK(f->stats.impostors == 0 && f->stats.ground > 0);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
 static void invalidate_forgets_every_picture(void)
 {
     flight *f = &flight_room;
@@ -1640,11 +1684,14 @@ static void dear_captures_leave_only_ground(void)
 }
 
 /* With its default costs AUTO is not much dearer than the cheaper one of ground alone and
-   impostors alone, by its own currency, over flights that rest now and then. */
-static double flight_cost(const land *l, int mode, flight *f)
+   impostors alone, by its own currency, over flights that rest now and then. The eye moves by
+   `step`, or with a step below 0 jumps; after each `lose` frames all pictures are lost. What is
+   learnt at the start, in the first `begin` frames, does not count. */
+static double flight_cost(const land *l, int mode, float step, int lose, int begin, flight *f)
 {
     terrimp_view_desc d;
     terrimp_camera camera = camera_beside(l);
+    float side = l->info.box.max[0] - l->info.box.min[0], start = camera.eye[0];
     double cost = 0.0;
     int i;
     memset(&d, 0, sizeof d);
@@ -1652,10 +1699,16 @@ static double flight_cost(const land *l, int mode, flight *f)
     d.ground_tolerance_px = 0.3f;
     if (!flight_open(f, l, &d))
         return 0.0;
-    for (i = 0; i < 120; i++) {
-        camera.eye[0] += 0.05f;
+    check_state = 77u;
+    for (i = 0; i < 120 + begin; i++) {
+        camera.eye[0] = step < 0.0f ? start + random_float(0.0f, side)
+                                    : start + fmodf((float)(i + 1) * step, side);
+        if (lose && i % lose == 0)
+            CHECK(terrimp_view_invalidate(f->view) == TERRIMP_OK);
         flight_update(f, &camera);
         flight_render(f);
+        if (i < begin)
+            continue;
         cost += (double)f->stats.draws * 40.0 + (double)f->stats.triangles;
         cost += (double)f->stats.captures * 1400.0 + (double)f->stats.captured_triangles +
                 0.25 * (double)f->stats.captured_texels;
@@ -1669,13 +1722,59 @@ static void auto_is_not_dearer_than_ground_or_impostors_alone(void)
     land l;
     make_hills(&l);
     if (land_build(&l)) {
-        double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, &flight_room);
-        double impostors = flight_cost(&l, TERRIMP_MODE_IMPOSTOR, &flight_room);
-        double both = flight_cost(&l, TERRIMP_MODE_AUTO, &flight_room);
+        double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, 0.05f, 0, 0, &flight_room);
+        double impostors = flight_cost(&l, TERRIMP_MODE_IMPOSTOR, 0.05f, 0, 0, &flight_room);
+        double both = flight_cost(&l, TERRIMP_MODE_AUTO, 0.05f, 0, 0, &flight_room);
         CHECK(both < 1.1 * fmin(ground, impostors));
         CHECK(flight_room.total_impostors > 100);
     }
     land_free(&l);
+}
+
+/* Nor is it when pictures do not last: at any speed, with jumps, and however often all are lost. */
+static void auto_is_not_dearer_than_ground_where_pictures_do_not_last(void)
+{
+    static const float steps[] = {0.0f, 0.5f, 3.0f, 9.0f, 17.0f, 30.0f, -1.0f};
+    static const int losses[] = {0, 1, 3, 20};
+    uint32_t i, k;
+    land l;
+    make_hills(&l);
+    if (land_build(&l))
+        for (i = 0; i < sizeof steps / sizeof *steps; i++)
+            for (k = 0; k < 4u; k++) {
+                double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, steps[i], losses[k], 80,
+                                            &flight_room);
+                double both = flight_cost(&l, TERRIMP_MODE_AUTO, steps[i], losses[k], 80,
+                                          &flight_room);
+                CHECK(both <= 1.1 * ground);
+            }
+    land_free(&l);
+}
+
+/* Speed counts over the way that a picture lasts for. An eye that only moves to and fro within that
+   way lets it last; a steady one has its own speed; a jump is none. */
+static void an_eye_that_bobs_is_not_fast(void)
+{
+    uint32_t run, i;
+    for (run = 0; run < 200u; run++) {
+        float reach = random_magnitude(0.1f, 100.0f), swing = reach * random_float(0.01f, 0.45f);
+        float often = random_float(0.1f, 1.5f), steady = reach * random_magnitude(0.002f, 0.5f);
+        float at = 0.0f, step[3] = {0.0f, 0.0f, 0.0f};
+        terrimpi_motion bob, cruise;
+        terrimpi_motion_begin(&bob);
+        terrimpi_motion_begin(&cruise);
+        for (i = 0; i < 1500u; i++) {
+            float next = swing * sinf((float)i * often);
+            step[0] = next - at;
+            terrimpi_motion_step(&bob, step, 1e3f * reach);
+            CHECK(i < 300u || terrimpi_motion_speed(&bob, reach) * 100.0f < reach);
+            at = next;
+            step[0] = i == 200u ? 2e3f * reach : steady;
+            terrimpi_motion_step(&cruise, step, 1e3f * reach);
+            CHECK(i < 1u || (i >= 200u && i < 1400u) ||
+                  fabsf(terrimpi_motion_speed(&cruise, reach) - steady) < 0.02f * steady);
+        }
+    }
 }
 
 /* ---- the ground ---- */
@@ -2075,11 +2174,14 @@ static void view_tests(void)
     RUN(a_resting_eye_captures_nothing);
     RUN(nothing_waits_after_some_frames_of_rest);
     RUN(touch_forgets_what_shows_the_samples_and_little_else);
+    RUN(settings_change_without_a_loss);
     RUN(invalidate_forgets_every_picture);
     RUN(what_was_forgotten_since_the_update_is_not_drawn);
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);
     RUN(dear_captures_leave_only_ground);
     RUN(auto_is_not_dearer_than_ground_or_impostors_alone);
+    RUN(auto_is_not_dearer_than_ground_where_pictures_do_not_last);
+    RUN(an_eye_that_bobs_is_not_fast);
     RUN(geomip_draws_the_selection);
     RUN(scarce_ground_is_coarser_ground);
     RUN(the_frame_before_stays_when_there_are_too_many_chunks);
