@@ -447,6 +447,92 @@ static void visibility_of_a_wall(void)
     free(walls);
 }
 
+/* ---- in a view ---- */
+
+/* The ground nodes that a view draws. */
+typedef struct visible_drawn {
+    uint32_t nodes[600], count;
+} visible_drawn;
+
+static void visible_note(void *user, const terrimp_ground_command *command)
+{
+    visible_drawn *d = (visible_drawn *)user;
+    if (d->count < 600)
+        d->nodes[d->count++] = command->node;
+}
+
+static void visible_draw(terrimp_view *view, const terrimp_camera *c, visible_drawn *drawn,
+                         terrimp_stats *stats)
+{
+    terrimp_callbacks draw;
+    memset(&draw, 0, sizeof draw);
+    draw.user = drawn;
+    draw.draw_ground = visible_note;
+    drawn->count = 0;
+    CHECK(terrimp_view_update(view, c) == TERRIMP_OK);
+    CHECK(terrimp_view_get_stats(view, stats) == TERRIMP_OK);
+    CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
+}
+
+/* With walls a view at full resolution leaves out ground of which nothing shows, and no other; and
+   the commands that are left are those of before, in their order, also at the tolerance. */
+static void views_leave_out_what_is_hidden(void)
+{
+    static visible_drawn with, without;
+    uint32_t round, hidden = 0;
+    for (round = 0; round < 30; round++) {
+        visible_scene s;
+        terrimp_terrain_desc desc;
+        terrimp_view_desc settings;
+        terrimp_terrain *terrain;
+        terrimp_view *views[2];
+        terrimp_stats stats;
+        uint32_t i, j, k, eye;
+        visible_make(&s, 129, 129, 8);
+        memset(&desc, 0, sizeof desc);
+        memset(&settings, 0, sizeof settings);
+        desc.field = s.tree.field;
+        desc.chunk_quads = 8;
+        settings.mode = round % 2u ? TERRIMP_MODE_FULL : TERRIMP_MODE_GEOMIP;
+        settings.ground_tolerance_px = 4.0f;
+        settings.atlas_size = 64;
+        settings.max_impostors = 4;
+        CHECK(terrimp_terrain_create(&desc, NULL, &terrain) == TERRIMP_OK);
+        CHECK(terrimp_walls_build(terrimp_terrain_tree(terrain), NULL, s.walls) == TERRIMP_OK);
+        CHECK(terrimp_view_create(terrain, &settings, NULL, &views[0]) == TERRIMP_OK);
+        settings.walls = s.walls;
+        CHECK(terrimp_view_create(terrain, &settings, NULL, &views[1]) == TERRIMP_OK);
+        for (eye = 0; eye < 6; eye++) {
+            terrimp_camera c = visible_camera(&s);
+            visible_draw(views[0], &c, &without, &stats);
+            CHECK(stats.hidden == 0);
+            visible_draw(views[1], &c, &with, &stats);
+            CHECK(with.count <= without.count);
+            CHECK(with.count == without.count || stats.hidden > 0);
+            for (i = j = 0; i < without.count; i++) {
+                terrimp_node node = terrimpi_tree_node(&s.tree, without.nodes[i]);
+                if (j < with.count && with.nodes[j] == without.nodes[i]) {
+                    j++;
+                    continue;
+                }
+                hidden++;
+                for (k = 0; k < 10 && settings.mode == TERRIMP_MODE_FULL; k++) {
+                    double point[3], start;
+                    visible_point(&s, &node, point);
+                    start = visible_start(&c, point);
+                    CHECK(start > 1.0 || visible_blocked(&s.tree.field, c.eye, point, start));
+                }
+            }
+            CHECK(j == with.count);
+        }
+        terrimp_view_destroy(views[0]);
+        terrimp_view_destroy(views[1]);
+        terrimp_terrain_destroy(terrain);
+        visible_free(&s);
+    }
+    CHECK(hidden > 1000);
+}
+
 static void visibility_refuses_what_makes_no_sense(void)
 {
     static terrimp_horizon h;
@@ -495,6 +581,7 @@ static void visibility_tests(void)
     RUN(culled_draws_are_behind_those_that_are_left);
     RUN(walls_are_rebuilt_where_samples_change);
     RUN(visibility_of_a_wall);
+    RUN(views_leave_out_what_is_hidden);
     RUN(visibility_refuses_what_makes_no_sense);
 }
 
