@@ -6,6 +6,7 @@
 ##                  DEM=FILE     over this elevation file instead of a made-up terrain
 ##                  ARGS='...'   more options for build/flyover
 ## make deps-viewer viewer   a window to fly in, build/viewer [FILE]; needs GLFW
+## make deps-web web   the same as a page: build/web/, for any static server; needs Emscripten
 ## make test      runs every test, as many suites at once as there are cores
 ##                  JOBS=N   so many at once; 1: one after the other
 ## make bench     measures; tables and plots also go to build/bench/
@@ -74,7 +75,7 @@ DEPS     := $(filter deps deps-portable deps-viewer deps-web,$(MAKECMDGOALS))
 
 all: $(EXAMPLES) $(if $(shell command -v $(firstword $(CXX))),$(EXAMPLES_CPP))
 
-$(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer: %: $(BUILD)/%
+$(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer compare_pictures: %: $(BUILD)/%
 
 help:
 	@sed -n 's/^## \{0,1\}//p' Makefile
@@ -87,6 +88,28 @@ deps-viewer:
 
 test-viewer: | $(DEPS)
 	@sh tests/viewer.sh
+
+deps-web:
+	@sh tests/deps_viewer.sh web
+
+test-web: | $(DEPS)
+	@sh tests/web.sh
+
+# The viewer as a page: what it uses of examples/host, without threads and libraries.
+WEB_HOST := dem dem_png dem_text dem_tiff flight frame gl_terrain hud image job lightmap options \
+            procedural sea stats tour trees walker
+web: build/web/viewer.js build/web/index.html
+
+build/web/index.html: examples/viewer.html
+	@mkdir -p $(@D) && cp $< $@
+
+build/web/viewer.js: examples/viewer.c $(WEB_HOST:%=examples/host/%.c) examples/viewer_web.h \
+                     $(wildcard examples/host/*.h) terrimp.h | $(DEPS)
+	@mkdir -p $(@D)
+	@echo "compile $@"
+	@NODE_PATH=/usr/share/nodejs emcc -std=c99 -O2 -I. -DHOST_NO_THREADS -DHOST_NO_PNG \
+	    $(filter %.c,$^) -sUSE_GLFW=3 -sMIN_WEBGL_VERSION=2 -sMAX_WEBGL_VERSION=2 \
+	    -sALLOW_MEMORY_GROWTH -sENVIRONMENT=web -sEXPORTED_RUNTIME_METHODS=ccall,FS -o $@
 
 demo: flyover
 	@mkdir -p build/demo
@@ -168,6 +191,6 @@ $(BUILD)/viewer $(BUILD)/test_viewer: GL_LIBS = -lglfw -lGL
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
 .PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz golden \
-        $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer test-viewer deps-viewer web \
+        $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer compare_pictures test-viewer deps-viewer web \
         deps-web test-web
 .SECONDARY:

@@ -1636,6 +1636,24 @@ TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
                                                  const uint32_t atlas[2], float xyz[12],
                                                  float st[8]);
 
+/* A vertex of a depth mesh, in the grid of its layers: column and row of the picture in texels, and
+   the layer, whole numbers at the layers themselves. One unit in any direction is about one pixel
+   from where it shows most. With layers planned `even` planes of the world are planes in it. */
+typedef struct terrimp_depth_vertex {
+    float u, v, layer;
+} terrimp_depth_vertex;
+
+/* Where the vertices of a depth mesh stand in the world.
+
+   vertices    [count]
+   xyz         [count][3] out [wu]
+   Errors      E_NULL; E_RANGE for layers that are none
+   Cost        O(count * log(layers)) */
+TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
+                                                const terrimp_capture *picture,
+                                                const terrimp_depth_vertex *vertices,
+                                                uint32_t count, float *xyz);
+
 #ifndef TERRIMP_NO_BUILD
 
 /* ==== Simplifier ========================================================= >>simplifier */
@@ -2012,8 +2030,8 @@ typedef struct terrimp_cover_desc {
     uint32_t gutter;      /* texels round each rectangle that count as its own [Limits: 0..64] */
 } terrimp_cover_desc;
 
-/* Bytes of scratch memory that terrimp_cover needs, and terrimp_cover_grow at most; 0 when the
-   numbers of the descriptor are outside of their limits or capacity is 0. */
+/* Bytes of scratch memory that terrimp_cover needs; 0 when the numbers of the descriptor are out of
+   their limits or capacity is 0. */
 TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
 
 /* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
@@ -2028,18 +2046,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
 TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
                                          size_t bytes, terrimp_rect *rects, uint32_t capacity,
                                          uint32_t *count);
-
-/* The same, as Jeschke covers layers: on a grid of cells, boxes grow from seeds as long as enough
-   of their cells is filled. As a yardstick: terrimp_cover takes fewer texels.
-
-   cell       [texels] side of a cell [Limits: 1..16384]
-   min_fill   [Limits: 0..1] he found 0.8 to work well
-   Errors     those of terrimp_cover
-   Source     Jeschke 2004, section 3.5 */
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count);
 
 /* Places the quads of one or more layers in an atlas, each with a gutter round it that the host
    fills with copies of its outermost texels. Never scales.
@@ -2118,6 +2124,93 @@ TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uin
                                                 uint32_t width, uint32_t height,
                                                 uint32_t *wanted);
 
+/* --- textured depth meshes (Jeschke 4) --- */
+
+/* A part of a depth mesh that shows each texel once, and so has one texture: its rectangle of the
+   picture, where each texel has the colour of one of the layers. */
+typedef struct terrimp_depth_sheet {
+    terrimp_rect texels;
+    uint32_t first_texel;              /* of its rectangle, row by row, in texel_layers */
+    uint32_t first_index, index_count; /* its triangles */
+} terrimp_depth_sheet;
+
+#define TERRIMP_DEPTH_NONE 0xffffu /* a texel that no layer has a colour for */
+
+typedef struct terrimp_depth_mesh_desc {
+    const uint32_t *opaque;  /* (required) [layers][height][TERRIMP_MASK_WORDS(width)] all texels:
+                                where layers touch in these, the mesh is connected */
+    const uint32_t *visible; /* (required) the same, culled: what must be shown; may be opaque */
+    uint32_t width;        /* (required) [texels] [Limits: 1..16384] */
+    uint32_t height;       /* (required) [texels] [Limits: 1..16384] */
+    uint32_t layers;       /* (required) [Limits: 1..65535] */
+    float tolerance;       /* [texels, layers] from the middle of each opaque texel to the mesh, and
+                              in each direction from the mesh to such a middle, looked at in steps
+                              of up to 1
+                              [Limits: 0.75..64] [Default 0 -> 1] */
+} terrimp_depth_mesh_desc;
+
+/* A depth mesh in arrays of the caller. */
+typedef struct terrimp_depth_mesh {
+    terrimp_depth_vertex *vertices; /* (required) [vertex_capacity] */
+    uint32_t *indices;              /* (required) [index_capacity] they wind counter-clockwise */
+    terrimp_depth_sheet *sheets;    /* (required) [sheet_capacity] */
+    uint16_t *texel_layers;         /* (required) [texel_capacity] or TERRIMP_DEPTH_NONE */
+    uint32_t vertex_capacity, index_capacity, sheet_capacity, texel_capacity;
+    uint32_t vertex_count, index_count, sheet_count, texel_count; /* out, also when too many */
+    uint32_t first_triangle_count;  /* out: before any was saved */
+} terrimp_depth_mesh;
+
+/* Bytes of scratch memory for a depth mesh of these masks; 0 for bad ones, or when they overflow.
+   Looks at all of them. */
+TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_desc *desc);
+
+/* Makes one mesh of all layers: as many triangles as the shape needs, however many layers that
+   reaches through. Texels are connected where layers touch; then edges collapse, short ones first,
+   as long as the mesh stays within the tolerance of the texels and they of it. Its border and the
+   seams between sheets only move along themselves. The texture needs no perspective: it is the
+   picture, as terrimp_texture_matrix projects it. Texels at a sheet's border may be wanted that
+   have no colour: hosts fill them from their neighbours, as gutters.
+
+   scratch    aligned to 8 bytes
+   mesh       in: arrays; out: the rest
+   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY: counts say how much is needed
+   Cost       about 3 us for each visible texel; 0.14 s for 58,000 in 113 layers
+   Source     Jeschke 2004, chapter 4. Ours: one vertex for each corner of texels where he has four
+              for each texel; the bound from mesh to layers; sheets */
+TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc *desc,
+                                                   void *scratch, size_t bytes,
+                                                   terrimp_depth_mesh *mesh);
+
+/* --- layers all round a cell, and for all views of an object (Jeschke 3.8) --- */
+
+/* Layers for everything beyond a distance from a cube: the same ones before each of its six sides,
+   each from the middle of its side. A side's picture holds its sixth of the world, the pyramid
+   from the cube's centre, and some of its neighbours', since it is taken from closer by.
+
+   centre     [3] of the cube [wu]
+   desc       distance, depth, texel, tolerance_rad and even; distance counts from the sides. Its
+              cell_size, cell_depth, cell_tan and view_tan are not looked at
+   half       [wu] of the cube's side [Limits: > 0]
+   layers     out
+   pictures   [6] out: +x, -x, +y, -y, +z, -z
+   Errors     those of terrimp_layers_plan */
+TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
+                                                 const float centre[3], float half,
+                                                 terrimp_layers *layers,
+                                                 terrimp_capture pictures[6]);
+
+/* Layers for an object that is seen from everywhere: three sets, across x, y and z, recorded in
+   parallel projection. An eye draws the set across the direction that it looks along most, from
+   either side. Layer i of `count` stands at box->min + (i + 0.5) / count of the extent.
+
+   texel      [wu] of all layers; for an eye at a distance d no more than d / K [Limits: > 0]
+   slope      largest tangent between a line of sight and the axis of the set that is drawn: 1 for
+              eyes far away, 1 + extent / distance for closer ones [Limits: >= 1]
+   counts     [3] out: layers across x, y, z. Texels pass each other by one at most
+   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed */
+TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
+                                                 uint32_t counts[3]);
+
 /* ==== Placement ========================================================== >>placement */
 
 /* Which pictures to prepare, so that no view costs more than a budget and the pictures take little
@@ -2180,6 +2273,67 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
 TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
                                          size_t bytes, uint8_t *shown, float *costs,
                                          terrimp_placement *placement);
+
+
+/* --- a prepared set for a terrain --- */
+
+/* Eyes are anywhere in a box, which is cut along x and z into 2^cell_levels x 2^cell_levels cells;
+   they look level, or up and down as far as the same nodes are in sight. Costs are those of draws
+   and triangles of ground, at the level that keeps the tolerance, and of coarse meshes. */
+typedef struct terrimp_place_terrain_desc {
+    const terrimp_terrain *terrain; /* (required) built */
+    terrimp_box eyes;        /* (required) [wu] */
+    uint32_t cell_levels;    /* [Limits: 0..6] */
+    uint32_t directions;     /* parts of the circle, each with its views [Limits: 1..64]
+                                [Default 0 -> 8] */
+    float fov_rad;           /* (required) width of what an eye sees, seen from above
+                                [Limits: 0.01..6.3] */
+    float pixel_factor;      /* (required) K [Limits: > 0] */
+    float tolerance_px;      /* of ground and of pictures [Limits: > 0] [Default 0 -> 1] */
+    float max_angle_rad;     /* by which a picture's node may turn over its cells [Limits: > 0]
+                                [Default 0 -> 0.1] */
+    float texels_per_px;     /* from the closest eye [Limits: > 0] [Default 0 -> 1] */
+    float draw_cost, triangle_cost; /* [Limits: >= 0] [Default both 0 -> 40 and 1] */
+} terrimp_place_terrain_desc;
+
+/* A picture that may be prepared: of a node, for a square of cells, from its middle. */
+typedef struct terrimp_place_picture {
+    uint32_t node;
+    uint32_t level;         /* 2^level x 2^level cells */
+    uint32_t x, z;          /* squares of that size from the corner of the eyes' box */
+    float eye[3];           /* [wu] terrimp_capture_fit of the node's box from here */
+    uint32_t width, height; /* [texels] without margins */
+} terrimp_place_picture;
+
+/* Arrays of the caller; counts are written also when they are more than the capacities. View
+   (z * cells + x) * directions + k looks from cell (x, z) into the k-th part of the circle, from +x
+   towards +z. Candidates' memory counts texels. */
+typedef struct terrimp_place_set {
+    terrimp_place_candidate *candidates; /* [candidate_capacity] out */
+    terrimp_place_picture *pictures;     /* [candidate_capacity] out, the same in other words */
+    terrimp_place_gain *gains;           /* [gain_capacity] out */
+    uint32_t *parents;                   /* [cluster_capacity] out: one a node */
+    float *costs;                        /* [view_capacity] out */
+    uint32_t candidate_capacity, gain_capacity, cluster_capacity, view_capacity;
+    uint32_t candidate_count, gain_count, cluster_count, view_count; /* out */
+} terrimp_place_set;
+
+/* Bytes of scratch memory that terrimp_place_terrain needs; 0 for a descriptor that it refuses. */
+TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terrain_desc *desc);
+
+/* Makes the input of terrimp_place from a terrain: every node, for every square of cells from which
+   its picture would keep within the tolerance and the angle, wherever it saves something. What is
+   chosen then is rendered once, by the captures that are always used, and drawn from read-only
+   memory: for machines that cannot render into textures.
+
+   scratch    aligned to 8 bytes
+   Errors     E_NULL; E_STATE for a terrain that is not built; E_NOT_FINITE; E_RANGE; E_ALIGN;
+              E_MEMORY; E_CAPACITY: the counts say how much is needed
+   Cost       O(views * nodes * cell_levels)
+   Source     Jeschke 2004, sections 5.5 and 5.6; box cells */
+TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
+                                                 void *scratch, size_t bytes,
+                                                 terrimp_place_set *set);
 
 #endif /* TERRIMP_NO_BUILD */
 
@@ -7341,6 +7495,64 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          19 of 20 would spare too little (seven flights) */
 #define TERRIMPI_NO_PICTURE 0xffffu
 
+/* How the eye moves: how far it is from where it was in the mean of the last 4, 16, 64 and 256
+   frames. Who bobs is fast, but not far away from where he was: a picture that is good as far as
+   that lasts. And how often all pictures are lost at once, by jumps or because the host says so. */
+#define TERRIMPI_MOTIONS 4u
+typedef struct terrimpi_motion {
+    float away[TERRIMPI_MOTIONS][3]; /* [wu] */
+    float frames[TERRIMPI_MOTIONS];  /* which an eye of constant speed needs for that way */
+    float since, between;            /* [frames] since the last loss, and between two in the mean */
+} terrimpi_motion;
+
+static void terrimpi_motion_begin(terrimpi_motion *m)
+{
+    memset(m, 0, sizeof *m);
+    m->between = TERRIMPI_VIEW_LIFE;
+}
+
+/* Notes that all pictures are lost, or of no use. */
+static void terrimpi_motion_lose(terrimpi_motion *m)
+{
+    m->between = 0.5f * (m->between + m->since);
+    m->since = 0.0f;
+}
+
+/* A frame later; a jump is no motion. */
+static void terrimpi_motion_step(terrimpi_motion *m, const float step[3], float jump)
+{
+    float way[3] = {0.0f, 0.0f, 0.0f}, frames = 4.0f;
+    uint32_t k, i;
+    m->since += 1.0f;
+    if (terrimpi_length(step) > jump)
+        terrimpi_motion_lose(m);
+    else
+        memcpy(way, step, sizeof way);
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        float keep = 1.0f - 1.0f / frames;
+        for (i = 0; i < 3u; i++) {
+            m->away[k][i] = keep * (m->away[k][i] + way[i]);
+            if (terrimpi_abs(m->away[k][i]) < 1e-6f * jump) /* at rest, some time */
+                m->away[k][i] = 0.0f;
+        }
+        m->frames[k] = keep * (m->frames[k] + 1.0f);
+    }
+}
+
+/* The speed [wu a frame] with which an eye gets to `reach` away: the mean over about as many frames
+   as it needs for that. */
+static float terrimpi_motion_speed(const terrimpi_motion *m, float reach)
+{
+    float frames = 4.0f, speed = 0.0f;
+    uint32_t k;
+    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+        speed = terrimpi_length(m->away[k]) / terrimpi_max(m->frames[k], 0.75f);
+        if (!(speed * frames < reach))
+            break;
+    }
+    return speed;
+}
+
 /* What the whole of a frame looks at, and nothing changes. */
 typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
@@ -7349,8 +7561,7 @@ typedef struct terrimpi_frame {
     terrimp_camera camera;         /* resolved */
     terrimp_frustum frustum;
     float pixel_factor;
-    float motion[3];               /* [wu] a frame, smoothed */
-    float speed;
+    terrimpi_motion motion;
 } terrimpi_frame;
 
 /* ---- settings ---- */
@@ -7808,8 +8019,9 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
     float way = f->desc->no_lookahead ? 1.0f : 1.0f + TERRIMPI_VIEW_AHEAD;
-    float life = way * closest * terrimpi_view_sine(f, node, closest) /
-                 terrimpi_max(f->speed, 1e-20f);
+    float reach = way * closest * terrimpi_view_sine(f, node, closest);
+    float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
+    life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -7833,15 +8045,16 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
 static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
                                 const terrimp_box *box, float closest, float eye[3])
 {
-    float ahead;
+    const float *way = f->motion.away[0];
+    float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
     memcpy(eye, f->camera.eye, sizeof f->camera.eye);
-    if (f->desc->no_lookahead || !(f->speed > 0.0f))
+    if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
-    ahead = TERRIMPI_VIEW_AHEAD * closest * terrimpi_view_sine(f, node->number, closest);
-    ahead = terrimpi_min(ahead, f->speed * 0.5f * TERRIMPI_VIEW_LIFE);
+    ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
+    ahead = terrimpi_min(TERRIMPI_VIEW_AHEAD * reach, ahead * 0.5f * TERRIMPI_VIEW_LIFE);
     for (i = 0; i < 3u; i++)
-        eye[i] += f->motion[i] / f->speed * ahead;
+        eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
         memcpy(eye, f->camera.eye, sizeof f->camera.eye);
 }
@@ -8110,6 +8323,7 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
+    terrimpi_motion_lose(&view->frame.motion);
     view->job_count = view->open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
@@ -8930,14 +9144,13 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
-    for (i = 0; i < 3u; i++) {
-        step[i] = camera->eye[i] - before->camera.eye[i];
-        f.motion[i] = 0.75f * before->motion[i] + 0.25f * step[i];
+    if (f.number == 1u) {
+        terrimpi_motion_begin(&f.motion);
+        return f;
     }
-    if (f.number <= 1u || terrimpi_length(step) > TERRIMPI_VIEW_JUMP * f.desc->fade_start ||
-        terrimpi_length(f.motion) < 1e-6f * f.desc->fade_start)
-        memset(f.motion, 0, sizeof f.motion);
-    f.speed = terrimpi_length(f.motion);
+    for (i = 0; i < 3u; i++)
+        step[i] = camera->eye[i] - before->camera.eye[i];
+    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
     return f;
 }
 
@@ -10208,6 +10421,27 @@ TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
             continue;
         st[2u * i] = (float)(quad->x + x) / (float)atlas[0];
         st[2u * i + 1u] = (float)(quad->y + y) / (float)atlas[1];
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
+                                                const terrimp_capture *picture,
+                                                const terrimp_depth_vertex *vertices,
+                                                uint32_t count, float *xyz)
+{
+    uint32_t i;
+    TERRIMPI_REFUSE(!layers || !picture || !vertices || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!layers->count, TERRIMP_E_RANGE);
+    for (i = 0; i < count; i++) {
+        float last = (float)(layers->count - 1u);
+        float layer = terrimpi_min(terrimpi_max(vertices[i].layer, 0.0f), last), d;
+        uint32_t k = (uint32_t)layer;
+        d = terrimpi_layer_inverse(layers, k);
+        if (layer > (float)k) /* between two layers 1 / depth is what goes on evenly */
+            d += (layer - (float)k) * (terrimpi_layer_inverse(layers, k + 1u) - d);
+        terrimpi_layer_point(picture, layers->texel, vertices[i].u, vertices[i].v, 1.0f / d,
+                             xyz + (size_t)3 * i);
     }
     return TERRIMP_OK;
 }
@@ -13752,7 +13986,6 @@ typedef struct terrimpi_cover {
     uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
     uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
     uint32_t *seen;       /* a row of bits */
-    uint32_t *cells;      /* a mask of the same size: of terrimp_cover_grow */
     terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
 } terrimpi_cover;
 
@@ -14113,7 +14346,10 @@ static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects
         for (a = 0; a < count; a++)
             for (b = a + 1u; b < count; b++) {
                 terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
-                if (terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
+                if (terrimpi_cover_cost(c, r.width, r.height) / 2u > /* far apart */
+                        terrimpi_cover_cost(c, rects[a].width, rects[a].height) +
+                            terrimpi_cover_cost(c, rects[b].width, rects[b].height) ||
+                    terrimpi_cover_gain(c, &r, rects, count) <= 0.0f)
                     continue;
                 count = terrimpi_cover_swallow(&r, rects, count);
                 joined = 1;
@@ -14141,9 +14377,6 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
     c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
     c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
-    c->cells = (uint32_t *)terrimpi_take(
-        &arena, terrimpi_mul(desc->height, TERRIMP_MASK_WORDS(desc->width), &arena.ok),
-        sizeof *c->cells);
     c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
         &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
     c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
@@ -14156,19 +14389,6 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
     terrimpi_cover c;
     size_t bytes;
     return desc && terrimpi_cover_begin(desc, NULL, capacity, &c, &bytes) == TERRIMP_OK ? bytes : 0;
-}
-
-/* What both ways to cover begin with. */
-static terrimp_result terrimpi_cover_open(const terrimp_cover_desc *desc, void *scratch,
-                                          size_t bytes, const terrimp_rect *rects,
-                                          uint32_t capacity, const uint32_t *count,
-                                          terrimpi_cover *c)
-{
-    size_t needed;
-    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
-    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, c, &needed));
-    return bytes < needed ? TERRIMP_E_MEMORY : TERRIMP_OK;
 }
 
 /* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
@@ -14204,8 +14424,12 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
                                          uint32_t *count)
 {
     terrimpi_cover c;
+    size_t needed;
     uint32_t i, kept;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
+    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, &c, &needed));
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
     c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
     c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
     for (i = 0; i < c.node_count; i++)
@@ -14213,140 +14437,6 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
     kept = terrimpi_cover_prune(&c, rects, capacity);
     TERRIMPI_REFUSE(kept > capacity, TERRIMP_E_CAPACITY);
     *count = terrimpi_cover_join(&c, rects, kept);
-    return TERRIMP_OK;
-}
-
-/* A box of cells, ends excluded, and how many of them are filled. */
-typedef struct terrimpi_grow_box {
-    uint32_t x0, y0, x1, y1, filled;
-} terrimpi_grow_box;
-
-/* How many cells of a box are filled, on a grid that is a mask. */
-static uint32_t terrimpi_grow_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
-                                     uint32_t x1, uint32_t y1)
-{
-    uint32_t y, word, filled = 0;
-    for (y = y0; y < y1 && x0 < x1; y++)
-        for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
-            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
-    return filled;
-}
-
-/* The box one cell larger towards a side or a corner; 0 when the grid ends there. */
-static int terrimpi_grow_step(const terrimp_cover_desc *g, const terrimpi_grow_box *b, int dx,
-                              int dy, terrimpi_grow_box *out)
-{
-    *out = *b;
-    if ((dx < 0 && b->x0 == 0) || (dx > 0 && b->x1 == g->width) || (dy < 0 && b->y0 == 0) ||
-        (dy > 0 && b->y1 == g->height))
-        return 0;
-    out->x0 -= dx < 0;
-    out->x1 += dx > 0;
-    out->y0 -= dy < 0;
-    out->y1 += dy > 0;
-    if (dx)
-        out->filled += terrimpi_grow_filled(g, dx < 0 ? out->x0 : b->x1, out->y0,
-                                            dx < 0 ? b->x0 : out->x1, out->y1);
-    if (dy)
-        out->filled += terrimpi_grow_filled(g, b->x0, dy < 0 ? out->y0 : b->y1, b->x1,
-                                            dy < 0 ? b->y0 : out->y1);
-    return 1;
-}
-
-static float terrimpi_grow_area(const terrimpi_grow_box *b)
-{
-    return (float)(b->x1 - b->x0) * (float)(b->y1 - b->y0);
-}
-
-/* Grows a box towards where most of the new cells are filled, while it stays filled enough. */
-static void terrimpi_grow_box_up(const terrimp_cover_desc *g, float min_fill,
-                                 terrimpi_grow_box *box)
-{
-    for (;;) {
-        terrimpi_grow_box best = *box, next;
-        float best_ratio = 0.0f;
-        int k;
-        for (k = 0; k < 9; k++) {
-            float ratio;
-            if (k == 4 || !terrimpi_grow_step(g, box, k % 3 - 1, k / 3 - 1, &next))
-                continue;
-            ratio = (float)(next.filled - box->filled) /
-                    (terrimpi_grow_area(&next) - terrimpi_grow_area(box));
-            if (ratio > best_ratio) {
-                best_ratio = ratio;
-                best = next;
-            }
-        }
-        if (!(best_ratio > 0.0f) || (float)best.filled < min_fill * terrimpi_grow_area(&best))
-            return;
-        *box = best;
-    }
-}
-
-/* The mask of the cells that hold opaque texels. */
-static terrimp_cover_desc terrimpi_grow_grid(const terrimpi_cover *c, uint32_t cell)
-{
-    terrimp_cover_desc g = c->desc;
-    uint32_t y, word;
-    g.mask = c->cells;
-    g.width = (c->desc.width - 1u) / cell + 1u;
-    g.height = (c->desc.height - 1u) / cell + 1u;
-    memset(c->cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *c->cells);
-    for (y = 0; y < c->desc.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
-            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
-            uint32_t *row = c->cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
-            while (bits) {
-                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
-                row[x / 32u] |= 1u << x % 32u;
-            }
-        }
-    return g;
-}
-
-/* Grows a box from a cell, empties its cells, and returns it in texels. */
-static terrimp_rect terrimpi_grow_take(const terrimpi_cover *c, const terrimp_cover_desc *g,
-                                       uint32_t x, uint32_t y, uint32_t cell, float min_fill)
-{
-    terrimpi_grow_box b;
-    b.x0 = x;
-    b.y0 = y;
-    b.x1 = x + 1u;
-    b.y1 = y + 1u;
-    b.filled = 1;
-    terrimpi_grow_box_up(g, min_fill, &b);
-    for (y = b.y0; y < b.y1; y++)
-        for (x = b.x0; x < b.x1; x++)
-            c->cells[(size_t)y * TERRIMP_MASK_WORDS(g->width) + x / 32u] &= ~(1u << x % 32u);
-    return terrimpi_rect(b.x0 * cell, b.y0 * cell,
-                         terrimpi_min_u32(b.x1 * cell, c->desc.width) - b.x0 * cell,
-                         terrimpi_min_u32(b.y1 * cell, c->desc.height) - b.y0 * cell);
-}
-
-TERRIMP_API terrimp_result terrimp_cover_grow(const terrimp_cover_desc *desc, uint32_t cell,
-                                              float min_fill, void *scratch, size_t bytes,
-                                              terrimp_rect *rects, uint32_t capacity,
-                                              uint32_t *count)
-{
-    terrimpi_cover c;
-    terrimp_cover_desc g;
-    uint32_t made = 0, y, word;
-    TERRIMPI_TRY(terrimpi_cover_open(desc, scratch, bytes, rects, capacity, count, &c));
-    TERRIMPI_REFUSE(!terrimpi_within(min_fill, 0.0f, 1.0f) ||
-                        !terrimpi_within_u32(cell, 1, 16384),
-                    TERRIMP_E_RANGE);
-    g = terrimpi_grow_grid(&c, cell);
-    for (y = 0; y < g.height; y++)
-        for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
-            uint32_t bits;
-            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
-                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
-                TERRIMPI_REFUSE(made == capacity, TERRIMP_E_CAPACITY);
-                rects[made] = terrimpi_grow_take(&c, &g, x, y, cell, min_fill);
-                terrimpi_cover_tighten(&c, &rects[made++]);
-            }
-        }
-    *count = made;
     return TERRIMP_OK;
 }
 
@@ -14621,12 +14711,978 @@ TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uin
     return TERRIMP_OK;
 }
 
+
+/* --- textured depth meshes --- */
+
+#define TERRIMPI_DEPTH_STAR 48u /* triangles round a vertex at most, or it stays */
+#define TERRIMPI_DEPTH_END 0xffffffffu
+
+/* A run of opaque texels of one column and row through neighbouring layers: where a surface passes
+   it is one cell of its mesh. Its corners are numbered x + 2 y. */
+typedef struct terrimpi_depth_cell {
+    uint16_t x, y, k0, k1;
+    uint32_t sheet;
+} terrimpi_depth_cell;
+
+/* A corner that cells share. */
+typedef struct terrimpi_depth_corner {
+    float at[3]; /* column, row, layer */
+    uint16_t low, high; /* layers that all of its cells have */
+    uint8_t fixed;      /* which of these it takes is settled */
+} terrimpi_depth_corner;
+
+typedef struct terrimpi_depth_triangle {
+    uint32_t corner[3]; /* the first one is TERRIMPI_DEPTH_END once it is gone */
+    uint32_t next[3];   /* corners of other triangles at the same vertex: 3 * triangle + number */
+    uint32_t sheet;
+    uint32_t points;    /* the opaque texels that it stands for, as a list */
+} terrimpi_depth_triangle;
+
+/* A texel of a layer that can be seen, by its middle. */
+typedef struct terrimpi_depth_point {
+    uint16_t x, y, k;
+    uint32_t next;
+} terrimpi_depth_point;
+
+typedef struct terrimpi_depth {
+    const terrimp_depth_mesh_desc *desc;
+    float tolerance;
+    terrimpi_depth_cell *cells;        /* sorted by row, column, layer */
+    uint32_t *first_cell;              /* [height * width + 1] */
+    terrimpi_depth_cell *whole;        /* the same before runs are cut in two */
+    uint32_t *beside;                  /* [4 * cells] the cells that they go on in, side by side */
+    uint32_t *joined;                  /* [4 * cells] corners that are one, as trees */
+    uint32_t *vertex_of;               /* [4 * cells] and where they stand in: */
+    terrimpi_depth_corner *corners;    /* [4 * cells + 4 * cells] */
+    terrimpi_depth_triangle *triangles; /* [4 * cells] */
+    terrimpi_depth_point *points;      /* [points] */
+    uint32_t *at;                      /* [8 * cells] first triangle corner of each vertex; before
+                                          that a slot for each texel */
+    uint8_t *stale;                    /* [8 * cells] nothing has changed round it */
+    uint32_t *queue;                   /* [8 * cells] */
+    uint32_t cell_count, corner_count, triangle_count, point_count, sheet_count;
+} terrimpi_depth;
+
+static int terrimpi_depth_set(const terrimp_depth_mesh_desc *d, const uint32_t *masks, uint32_t x,
+                              uint32_t y, uint32_t k)
+{
+    return (int)(masks[((size_t)k * d->height + y) * TERRIMP_MASK_WORDS(d->width) + x / 32u] >>
+                     x % 32u & 1u);
+}
+
+/* Finds the next run of opaque texels from layer k on, and how many of them can be seen; 0 when
+   there are no more. */
+static int terrimpi_depth_run(const terrimp_depth_mesh_desc *s, uint32_t x, uint32_t y, uint32_t k,
+                              terrimpi_depth_cell *run, uint32_t *seen)
+{
+    while (k < s->layers && !terrimpi_depth_set(s, s->opaque, x, y, k))
+        k++;
+    run->x = (uint16_t)x;
+    run->y = (uint16_t)y;
+    run->k0 = (uint16_t)k;
+    run->sheet = TERRIMPI_DEPTH_END;
+    if (k >= s->layers)
+        return 0;
+    for (*seen = 0; k < s->layers && terrimpi_depth_set(s, s->opaque, x, y, k); k++) {
+        *seen += (uint32_t)terrimpi_depth_set(s, s->visible, x, y, k);
+        run->k1 = (uint16_t)k;
+    }
+    return 1;
+}
+
+/* Finds the cells, runs of which something can be seen, or only counts them and their texels. */
+static void terrimpi_depth_cells(terrimpi_depth *d, int fill)
+{
+    const terrimp_depth_mesh_desc *s = d->desc;
+    uint32_t x, y, k, seen;
+    d->cell_count = d->point_count = 0;
+    for (y = 0; y < s->height; y++)
+        for (x = 0; x < s->width; x++) {
+            terrimpi_depth_cell run;
+            if (fill)
+                d->first_cell[y * s->width + x] = d->cell_count;
+            for (k = 0; terrimpi_depth_run(s, x, y, k, &run, &seen); k = run.k1 + 1u) {
+                if (seen && fill)
+                    d->whole[d->cell_count] = run;
+                d->cell_count += seen > 0;
+                d->point_count += seen;
+            }
+        }
+    if (fill)
+        d->first_cell[s->height * s->width] = d->cell_count;
+}
+
+static uint32_t terrimpi_depth_root(uint32_t *joined, uint32_t i)
+{
+    while (joined[i] != i)
+        i = joined[i] = joined[joined[i]];
+    return i;
+}
+
+static void terrimpi_depth_join(uint32_t *joined, uint32_t a, uint32_t b)
+{
+    a = terrimpi_depth_root(joined, a);
+    b = terrimpi_depth_root(joined, b);
+    joined[a > b ? a : b] = a > b ? b : a;
+}
+
+static int terrimpi_depth_touch(const terrimpi_depth_cell *a, const terrimpi_depth_cell *b)
+{
+    return a->k0 <= b->k1 + 1u && b->k0 <= a->k1 + 1u;
+}
+
+/* The texel beside one: sides are +x, +y, -x, -y. TERRIMPI_DEPTH_END: the picture ends there. */
+static uint32_t terrimpi_depth_texel(const terrimpi_depth *d, uint32_t x, uint32_t y, uint32_t side)
+{
+    uint32_t width = d->desc->width, texel = y * width + x;
+    switch (side) {
+    case 0: return x + 1u < width ? texel + 1u : TERRIMPI_DEPTH_END;
+    case 1: return y + 1u < d->desc->height ? texel + width : TERRIMPI_DEPTH_END;
+    case 2: return x > 0 ? texel - 1u : TERRIMPI_DEPTH_END;
+    default: return y > 0 ? texel - width : TERRIMPI_DEPTH_END;
+    }
+}
+
+/* Where a surface turns back behind itself two surfaces share a run, and part in the next texel:
+   there two cells touch it. Returns the last layer of the closer one; or the run's own last one. */
+static uint16_t terrimpi_depth_fold(const terrimpi_depth *d, const terrimpi_depth_cell *c)
+{
+    uint32_t side, i;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side), touching = 0;
+        uint16_t end = c->k1;
+        if (texel == TERRIMPI_DEPTH_END)
+            continue;
+        for (i = d->first_cell[texel]; i < d->first_cell[texel + 1u]; i++)
+            if (terrimpi_depth_touch(c, &d->whole[i]) && touching++ == 0)
+                end = d->whole[i].k1;
+        if (touching > 1u)
+            return end < c->k0 ? c->k0 : end;
+    }
+    return c->k1;
+}
+
+/* A run that goes no further itself, but reaches over both halves of one beside it, is cut like
+   that. */
+static uint16_t terrimpi_depth_fold_on(const terrimpi_depth *d, const terrimpi_depth_cell *c,
+                                       const uint16_t *folds)
+{
+    uint32_t side, i;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+        if (texel == TERRIMPI_DEPTH_END)
+            continue;
+        for (i = d->first_cell[texel]; i < d->first_cell[texel + 1u]; i++)
+            if (folds[i] < d->whole[i].k1 && c->k0 <= folds[i] + 1u && c->k1 > folds[i] + 1u)
+                return folds[i] < c->k0 ? c->k0 : folds[i];
+    }
+    return c->k1;
+}
+
+/* Cuts such runs in two cells that have that layer in common. */
+static void terrimpi_depth_unfold(terrimpi_depth *d)
+{
+    uint32_t texels = d->desc->width * d->desc->height, texel, i, end = 0, count = 0;
+    uint16_t *folds = (uint16_t *)d->vertex_of; /* [cells] these two are used later */
+    uint16_t *on = (uint16_t *)d->joined;       /* [cells] */
+    for (i = 0; i < d->cell_count; i++)
+        folds[i] = terrimpi_depth_fold(d, &d->whole[i]);
+    for (i = 0; i < d->cell_count; i++)
+        on[i] = folds[i] < d->whole[i].k1 ? folds[i]
+                                          : terrimpi_depth_fold_on(d, &d->whole[i], folds);
+    memcpy(folds, on, d->cell_count * sizeof *on);
+    for (texel = 0, i = 0; texel < texels; texel++) {
+        end = d->first_cell[texel + 1u];
+        d->first_cell[texel] = count;
+        for (; i < end; i++) {
+            terrimpi_depth_cell run = d->whole[i]; /* cells are written over runs that are done */
+            d->cells[count] = run;
+            d->cells[count++].k1 = folds[i];
+            if (folds[i] == run.k1)
+                continue;
+            d->cells[count] = run;
+            d->cells[count++].k0 = folds[i];
+        }
+    }
+    d->first_cell[texels] = d->cell_count = count;
+}
+
+/* Finds the cells that go on in each other, texel by texel: of those that touch, the closest with
+   the closest. */
+static void terrimpi_depth_match(terrimpi_depth *d)
+{
+    uint32_t i, n, end, last, side, first;
+    memset(d->beside, 0xff, 4u * d->cell_count * sizeof *d->beside);
+    for (first = 0; first < d->cell_count; first = last) {
+        const terrimpi_depth_cell *c = &d->cells[first];
+        last = d->first_cell[c->y * d->desc->width + c->x + 1u];
+        for (side = 0; side < 2u; side++) {
+            uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+            if (texel == TERRIMPI_DEPTH_END)
+                continue;
+            end = d->first_cell[texel + 1u];
+            for (i = first, n = d->first_cell[texel]; i < last && n < end;) {
+                if (terrimpi_depth_touch(&d->cells[i], &d->cells[n])) {
+                    d->beside[4u * i + side] = n;
+                    d->beside[4u * n++ + side + 2u] = i++;
+                } else if (d->cells[i].k1 < d->cells[n].k1)
+                    i++;
+                else
+                    n++;
+            }
+        }
+    }
+}
+
+/* Whether a cell and the one behind it are a run that was cut in two. */
+static int terrimpi_depth_folded(const terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *a = &d->cells[cell], *b = a + 1;
+    return cell + 1u < d->cell_count && a->x == b->x && a->y == b->y && a->k1 == b->k0;
+}
+
+/* At a side of such a run: 0 when neither of its halves goes on, 1 when they go on together, in the
+   halves of another one, or only one does; 2 when they part. */
+static int terrimpi_depth_parting(const terrimpi_depth *d, uint32_t cell, uint32_t side)
+{
+    uint32_t a = d->beside[4u * cell + side], b = d->beside[4u * (cell + 1u) + side];
+    if (a == TERRIMPI_DEPTH_END && b == TERRIMPI_DEPTH_END)
+        return 0;
+    return a == TERRIMPI_DEPTH_END || b == TERRIMPI_DEPTH_END ||
+                   (b == a + 1u && terrimpi_depth_folded(d, a))
+               ? 1
+               : 2;
+}
+
+/* Joins the halves of cut runs along the edge where the surface turns back. */
+static void terrimpi_depth_hem(terrimpi_depth *d)
+{
+    uint32_t i, k;
+    for (i = 0; i < d->cell_count; i++)
+        for (k = 0; terrimpi_depth_folded(d, i) && k < 4u; k++) {
+            int across = terrimpi_depth_parting(d, i, k & 1u ? 0 : 2);
+            int up = terrimpi_depth_parting(d, i, k & 2u ? 1 : 3);
+            if ((!across && up < 2) || (!up && across < 2))
+                terrimpi_depth_join(d->joined, 4u * i + k, 4u * (i + 1u) + k);
+        }
+}
+
+/* Makes one vertex of all corners that connected cells share, with the layers common to them. */
+static void terrimpi_depth_connect(terrimpi_depth *d)
+{
+    uint32_t i, k;
+    for (i = 0; i < 4u * d->cell_count; i++)
+        d->joined[i] = i;
+    for (i = 0; i < d->cell_count; i++) {
+        uint32_t right = d->beside[4u * i], above = d->beside[4u * i + 1u];
+        for (k = 0; k < 2u && right != TERRIMPI_DEPTH_END; k++)
+            terrimpi_depth_join(d->joined, 4u * i + 1u + 2u * k, 4u * right + 2u * k);
+        for (k = 0; k < 2u && above != TERRIMPI_DEPTH_END; k++)
+            terrimpi_depth_join(d->joined, 4u * i + 2u + k, 4u * above + k);
+    }
+    terrimpi_depth_hem(d);
+    d->corner_count = 0;
+    for (i = 0; i < 4u * d->cell_count; i++) {
+        const terrimpi_depth_cell *c = &d->cells[i / 4u];
+        uint32_t root = terrimpi_depth_root(d->joined, i);
+        terrimpi_depth_corner *v;
+        d->vertex_of[i] = root == i ? d->corner_count++ : d->vertex_of[root];
+        v = &d->corners[d->vertex_of[i]];
+        if (root == i) {
+            v->at[0] = (float)(c->x + (i & 1u));
+            v->at[1] = (float)(c->y + (i >> 1 & 1u));
+            v->low = c->k0;
+            v->high = c->k1;
+        }
+        v->low = v->low > c->k0 ? v->low : c->k0;
+        v->high = v->high < c->k1 ? v->high : c->k1;
+        v->fixed = 0;
+    }
+    for (i = 0; i < d->corner_count; i++) {
+        d->corners[i].at[2] = 0.5f * ((float)d->corners[i].low + (float)d->corners[i].high);
+        d->corners[i].fixed = d->corners[i].high <= d->corners[i].low + 1u;
+    }
+}
+
+static void terrimpi_depth_fix(terrimpi_depth_corner *v, int high)
+{
+    if (v->fixed)
+        return;
+    v->at[2] = (float)(high ? v->high : v->low);
+    v->fixed = 1;
+}
+
+/* A surface that is seen edge-on is one long cell in each texel. Its corners take the ends of that,
+   which is left to choose where other cells do not say. */
+static void terrimpi_depth_stretch(terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    int low = 0, high = 0, upright = d->beside[4u * cell + 1u] != TERRIMPI_DEPTH_END;
+    uint32_t i;
+    for (i = 0; i < 4u; i++) {
+        const terrimpi_depth_corner *v = &d->corners[d->vertex_of[4u * cell + i]];
+        low |= v->fixed && v->at[2] < (float)c->k0 + 1.0f;
+        high |= v->fixed && v->at[2] > (float)c->k1 - 1.0f;
+    }
+    for (i = 0; i < 4u && !(low && high); i++)
+        terrimpi_depth_fix(&d->corners[d->vertex_of[4u * cell + i]],
+                           low || (!high && (upright ? i & 1u : i >> 1)));
+}
+
+static uint32_t terrimpi_depth_triangle_add(terrimpi_depth *d, uint32_t a, uint32_t b, uint32_t c,
+                                            uint32_t sheet)
+{
+    terrimpi_depth_triangle *t = &d->triangles[d->triangle_count];
+    uint32_t k;
+    t->corner[0] = a;
+    t->corner[1] = b;
+    t->corner[2] = c;
+    t->sheet = sheet;
+    t->points = TERRIMPI_DEPTH_END;
+    for (k = 0; k < 3u; k++) {
+        t->next[k] = d->at[t->corner[k]];
+        d->at[t->corner[k]] = 3u * d->triangle_count + k;
+    }
+    return d->triangle_count++;
+}
+
+/* A cell of which no triangle would come near one end gets two more, along the line of sight. */
+static uint32_t terrimpi_depth_spine(terrimpi_depth *d, const terrimpi_depth_cell *c)
+{
+    uint32_t first = d->corner_count, k;
+    for (k = 0; k < 4u; k++) {
+        terrimpi_depth_corner *v = &d->corners[d->corner_count];
+        v->at[0] = (float)c->x + 0.5f;
+        v->at[1] = (float)(c->y + (k & 1u));
+        v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
+        d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
+    }
+    terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
+    return terrimpi_depth_triangle_add(d, first + 2u, first + 1u, first + 3u, c->sheet);
+}
+
+/* Squared distance from a point to a segment. */
+static float terrimpi_depth_to_edge(const float p[3], const float a[3], const float b[3])
+{
+    float ab[3], ap[3], square, part;
+    int k;
+    terrimpi_sub(b, a, ab);
+    terrimpi_sub(p, a, ap);
+    square = terrimpi_dot(ab, ab);
+    part = square > 0.0f ? terrimpi_dot(ap, ab) / square : 0.0f;
+    part = terrimpi_min(terrimpi_max(part, 0.0f), 1.0f);
+    for (k = 0; k < 3; k++)
+        ap[k] -= part * ab[k];
+    return terrimpi_dot(ap, ap);
+}
+
+/* Squared distance from a point to a triangle. */
+static float terrimpi_depth_to_triangle(const float p[3], const float a[3], const float b[3],
+                                        const float c[3])
+{
+    float ab[3], ac[3], ap[3], aa, bb, mix, s, t, scale, best;
+    int k;
+    terrimpi_sub(b, a, ab);
+    terrimpi_sub(c, a, ac);
+    terrimpi_sub(p, a, ap);
+    aa = terrimpi_dot(ab, ab);
+    bb = terrimpi_dot(ac, ac);
+    mix = terrimpi_dot(ab, ac);
+    s = bb * terrimpi_dot(ap, ab) - mix * terrimpi_dot(ap, ac);
+    t = aa * terrimpi_dot(ap, ac) - mix * terrimpi_dot(ap, ab);
+    scale = aa * bb - mix * mix;
+    if (s >= 0.0f && t >= 0.0f && s + t <= scale && scale > 0.0f) {
+        for (k = 0; k < 3; k++)
+            ap[k] -= (s * ab[k] + t * ac[k]) / scale;
+        return terrimpi_dot(ap, ap);
+    }
+    best = terrimpi_min(terrimpi_depth_to_edge(p, a, b), terrimpi_depth_to_edge(p, b, c));
+    return terrimpi_min(best, terrimpi_depth_to_edge(p, c, a));
+}
+
+static const float *terrimpi_depth_at(const terrimpi_depth *d, uint32_t vertex)
+{
+    return d->corners[vertex].at;
+}
+
+/* Squared distance from an opaque texel's middle to a triangle of three vertices. */
+static float terrimpi_depth_gap(const terrimpi_depth *d, const terrimpi_depth_point *p,
+                                const uint32_t v[3])
+{
+    float at[3];
+    at[0] = (float)p->x + 0.5f;
+    at[1] = (float)p->y + 0.5f;
+    at[2] = (float)p->k;
+    return terrimpi_depth_to_triangle(at, terrimpi_depth_at(d, v[0]), terrimpi_depth_at(d, v[1]),
+                                      terrimpi_depth_at(d, v[2]));
+}
+
+static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t triangle)
+{
+    d->points[point].next = d->triangles[triangle].points;
+    d->triangles[triangle].points = point;
+}
+
+/* Two triangles for each cell, and the opaque texels that they stand for. */
+static void terrimpi_depth_first_mesh(terrimpi_depth *d)
+{
+    float limit = d->tolerance * d->tolerance;
+    uint32_t i, k, point = 0;
+    for (i = 0; i < d->cell_count; i++)
+        terrimpi_depth_stretch(d, i);
+    memset(d->at, 0xff, d->corner_count * sizeof *d->at);
+    d->triangle_count = 0;
+    for (i = 0; i < d->cell_count; i++) {
+        const terrimpi_depth_cell *c = &d->cells[i];
+        const uint32_t *v = d->vertex_of + 4u * i;
+        uint32_t a = terrimpi_depth_triangle_add(d, v[0], v[1], v[2], c->sheet);
+        uint32_t b = terrimpi_depth_triangle_add(d, v[3], v[2], v[1], c->sheet);
+        uint32_t spine = TERRIMPI_DEPTH_END;
+        for (k = c->k0; k <= c->k1; k++) {
+            terrimpi_depth_point *p = &d->points[point];
+            float to_a, to_b;
+            if (!terrimpi_depth_set(d->desc, d->desc->visible, c->x, c->y, k))
+                continue;
+            p->x = c->x;
+            p->y = c->y;
+            p->k = (uint16_t)k;
+            to_a = terrimpi_depth_gap(d, p, d->triangles[a].corner);
+            to_b = terrimpi_depth_gap(d, p, d->triangles[b].corner);
+            if (terrimpi_min(to_a, to_b) > limit && spine == TERRIMPI_DEPTH_END)
+                spine = terrimpi_depth_spine(d, c);
+            terrimpi_depth_give(d, point++, terrimpi_min(to_a, to_b) > limit ? spine
+                                            : to_a <= to_b                   ? a
+                                                                             : b);
+        }
+    }
+}
+
+/* Deals the cells out to sheets: each is what can be reached from its first cell over shared edges
+   without coming to a texel twice. */
+static void terrimpi_depth_sheets(terrimpi_depth *d)
+{
+    uint32_t i, k, n, end, width = d->desc->width, *slot = d->at;
+    d->sheet_count = 0;
+    for (i = 0; i < d->desc->height * width; i++)
+        slot[i] = TERRIMPI_DEPTH_END;
+    for (i = 0; i < d->cell_count; i++) {
+        if (d->cells[i].sheet != TERRIMPI_DEPTH_END)
+            continue;
+        d->cells[i].sheet = d->sheet_count;
+        slot[d->cells[i].y * width + d->cells[i].x] = d->sheet_count;
+        d->queue[0] = i;
+        for (n = 0, end = 1; n < end; n++)
+            for (k = 0; k < 4u; k++) {
+                uint32_t o = d->beside[4u * d->queue[n] + k], *at;
+                if (o == TERRIMPI_DEPTH_END || d->cells[o].sheet != TERRIMPI_DEPTH_END)
+                    continue;
+                at = &slot[d->cells[o].y * width + d->cells[o].x];
+                if (*at == d->sheet_count)
+                    continue;
+                *at = d->cells[o].sheet = d->sheet_count;
+                d->queue[end++] = o;
+            }
+        d->sheet_count++;
+    }
+}
+
+/* What stands round a vertex. */
+typedef struct terrimpi_depth_star {
+    uint32_t triangles[TERRIMPI_DEPTH_STAR], others[2u * TERRIMPI_DEPTH_STAR];
+    uint32_t count, other_count;
+    uint8_t shared[2u * TERRIMPI_DEPTH_STAR]; /* triangles at the edge to each other vertex */
+    uint8_t open[2u * TERRIMPI_DEPTH_STAR];   /* that edge is border or seam */
+    uint32_t open_count;
+} terrimpi_depth_star;
+
+/* Collects the living triangles at a vertex, and forgets the others; 0 when they are too many. */
+static int terrimpi_depth_collect(terrimpi_depth *d, uint32_t vertex, terrimpi_depth_star *s)
+{
+    uint32_t *at = &d->at[vertex], i, k, n, sheet[2u * TERRIMPI_DEPTH_STAR];
+    s->count = s->other_count = s->open_count = 0;
+    while (*at != TERRIMPI_DEPTH_END) {
+        const terrimpi_depth_triangle *t = &d->triangles[*at / 3u];
+        if (t->corner[0] == TERRIMPI_DEPTH_END) {
+            *at = t->next[*at % 3u];
+            continue;
+        }
+        if (s->count == TERRIMPI_DEPTH_STAR)
+            return 0;
+        s->triangles[s->count++] = *at / 3u;
+        at = &d->triangles[*at / 3u].next[*at % 3u];
+    }
+    for (i = 0; i < s->count; i++)
+        for (k = 0; k < 3u; k++) {
+            const terrimpi_depth_triangle *t = &d->triangles[s->triangles[i]];
+            if (t->corner[k] == vertex)
+                continue;
+            for (n = 0; n < s->other_count && s->others[n] != t->corner[k]; n++) {}
+            if (n == s->other_count) {
+                s->others[s->other_count++] = t->corner[k];
+                s->shared[n] = 0;
+                s->open[n] = 0;
+                sheet[n] = t->sheet;
+            }
+            s->shared[n]++;
+            s->open[n] |= sheet[n] != t->sheet;
+        }
+    for (n = 0; n < s->other_count; n++) {
+        s->open[n] |= s->shared[n] != 2u;
+        s->open_count += s->open[n];
+    }
+    return 1;
+}
+
+/* Whether an opaque texel's middle lies within the tolerance of a point, in each direction. */
+static int terrimpi_depth_near_texel(const terrimpi_depth *d, const float p[3])
+{
+    const terrimp_depth_mesh_desc *s = d->desc;
+    float r = d->tolerance;
+    uint32_t size[3], low[3], high[3], i, x, y, k;
+    size[0] = s->width;
+    size[1] = s->height;
+    size[2] = s->layers;
+    for (i = 0; i < 3u; i++) { /* those at low..high - 1 */
+        float middle = i < 2u ? p[i] - 0.5f : p[i];
+        low[i] = !(middle - r > 0.0f) ? 0u : terrimpi_ceil_u32(middle - r);
+        high[i] = middle + r < 0.0f ? 0u : terrimpi_min_u32((uint32_t)(middle + r) + 1u, size[i]);
+    }
+    for (k = low[2]; k < high[2]; k++)
+        for (y = low[1]; y < high[1]; y++)
+            for (x = low[0]; x < high[0]; x++)
+                if (terrimpi_depth_set(s, s->opaque, x, y, k))
+                    return 1;
+    return 0;
+}
+
+static float terrimpi_depth_length(const terrimpi_depth *d, uint32_t a, uint32_t b)
+{
+    float between[3];
+    terrimpi_sub(terrimpi_depth_at(d, b), terrimpi_depth_at(d, a), between);
+    return terrimpi_length(between);
+}
+
+/* Whether a triangle lies near opaque texels everywhere: looked at in steps of up to one unit. */
+static int terrimpi_depth_on_texels(const terrimpi_depth *d, const uint32_t v[3])
+{
+    const float *a = terrimpi_depth_at(d, v[0]), *b = terrimpi_depth_at(d, v[1]);
+    const float *c = terrimpi_depth_at(d, v[2]);
+    uint32_t rows = 1u + (uint32_t)terrimpi_depth_length(d, v[0], v[2]), i, n, k;
+    float across = terrimpi_depth_length(d, v[0], v[1]);
+    for (n = 0; n <= rows; n++) {
+        float t = (float)n / (float)rows;
+        uint32_t steps = 1u + (uint32_t)((1.0f - t) * across);
+        for (i = 0; i <= steps; i++) {
+            float s = (1.0f - t) * (float)i / (float)steps, p[3];
+            for (k = 0; k < 3u; k++)
+                p[k] = a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]);
+            if (!terrimpi_depth_near_texel(d, p))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* Twice the area of a triangle in the picture; > 0 as long as it shows its front. */
+static float terrimpi_depth_area(const terrimpi_depth *d, const uint32_t v[3])
+{
+    const float *a = terrimpi_depth_at(d, v[0]), *b = terrimpi_depth_at(d, v[1]);
+    const float *c = terrimpi_depth_at(d, v[2]);
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/* The triangles that take the place of a star when its middle moves to another vertex. */
+typedef struct terrimpi_depth_fan {
+    uint32_t triangles[2u * TERRIMPI_DEPTH_STAR], corner[TERRIMPI_DEPTH_STAR][3];
+    uint32_t count, all; /* after them those that stand round that vertex already */
+} terrimpi_depth_fan;
+
+static int terrimpi_depth_fan_of(const terrimpi_depth *d, const terrimpi_depth_star *s,
+                                 uint32_t from, uint32_t to, terrimpi_depth_fan *f)
+{
+    uint32_t i, k;
+    f->count = 0;
+    for (i = 0; i < s->count; i++) {
+        const uint32_t *v = d->triangles[s->triangles[i]].corner;
+        if (v[0] == to || v[1] == to || v[2] == to)
+            continue;
+        for (k = 0; k < 3u; k++)
+            f->corner[f->count][k] = v[k] == from ? to : v[k];
+        if (!(terrimpi_depth_area(d, f->corner[f->count]) > 0.25f))
+            return 0;
+        f->triangles[f->count++] = s->triangles[i];
+    }
+    return 1;
+}
+
+/* Whether all that a star stands for is still met by the fan; if so, that is dealt out anew. */
+static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s,
+                                 const terrimpi_depth_fan *f)
+{
+    float limit = d->tolerance * d->tolerance;
+    uint32_t i, k, p, list = TERRIMPI_DEPTH_END, *queue = d->queue, n = 0;
+    for (i = 0; i < s->count; i++)
+        for (p = d->triangles[s->triangles[i]].points; p != TERRIMPI_DEPTH_END;
+             p = d->points[p].next) {
+            uint32_t first = n ? queue[n - 1u] : 0u; /* neighbours mostly go to the same one */
+            for (k = 0; k < f->all; k++) {
+                uint32_t i_fan = (first + k) % f->all;
+                if (terrimpi_depth_gap(d, &d->points[p],
+                                       i_fan < f->count
+                                           ? f->corner[i_fan]
+                                           : d->triangles[f->triangles[i_fan]].corner) <= limit)
+                    break;
+            }
+            if (k == f->all)
+                return 0;
+            queue[n++] = (first + k) % f->all;
+        }
+    for (i = 0; i < s->count; i++) { /* one list of all, in the order of the queue */
+        terrimpi_depth_triangle *t = &d->triangles[s->triangles[s->count - 1u - i]];
+        uint32_t last = t->points;
+        if (last == TERRIMPI_DEPTH_END)
+            continue;
+        while (d->points[last].next != TERRIMPI_DEPTH_END)
+            last = d->points[last].next;
+        d->points[last].next = list;
+        list = t->points;
+        t->points = TERRIMPI_DEPTH_END;
+    }
+    for (n = 0; list != TERRIMPI_DEPTH_END; n++) {
+        p = list;
+        list = d->points[p].next;
+        terrimpi_depth_give(d, p, f->triangles[queue[n]]);
+    }
+    return 1;
+}
+
+/* Whether an edge of a star may collapse as far as its topology goes: borders and seams stay. */
+static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
+                              uint32_t n, const terrimpi_depth_star *t)
+{
+    uint32_t i, k, common = 0;
+    if (s->open_count && (!s->open[n] || s->open_count != 2u))
+        return 0;
+    for (i = 0; i < s->other_count; i++)
+        for (k = 0; k < t->other_count; k++)
+            common += s->others[i] == t->others[k];
+    if (common != s->shared[n])
+        return 0;
+    for (i = 0; i < s->other_count; i++) /* the border may not be cut short */
+        if (s->open_count && s->open[i] && i != n) {
+            float bound = 0.75f * d->tolerance;
+            if (terrimpi_depth_to_edge(terrimpi_depth_at(d, from),
+                                       terrimpi_depth_at(d, s->others[n]),
+                                       terrimpi_depth_at(d, s->others[i])) > bound * bound)
+                return 0;
+        }
+    return 1;
+}
+
+/* Moves a vertex to its n-th neighbour if the mesh stays as it should; -1: not yet, for edges would
+   become much longer than the longest that now collapse, and thin triangles with them. */
+static int terrimpi_depth_collapse(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
+                                   uint32_t n, float longest)
+{
+    terrimpi_depth_star t;
+    terrimpi_depth_fan f;
+    uint32_t to = s->others[n], i, k;
+    for (i = 0; i < s->other_count; i++)
+        if (terrimpi_depth_length(d, to, s->others[i]) > 2.0f * longest)
+            return -1;
+    if (!terrimpi_depth_fan_of(d, s, from, to, &f) || !terrimpi_depth_collect(d, to, &t) ||
+        !terrimpi_depth_may(d, s, from, n, &t))
+        return 0;
+    for (i = 0, f.all = f.count; i < t.count; i++) {
+        const uint32_t *v = d->triangles[t.triangles[i]].corner;
+        if (v[0] != from && v[1] != from && v[2] != from)
+            f.triangles[f.all++] = t.triangles[i];
+    }
+    for (i = 0; i < f.count; i++)
+        if (!terrimpi_depth_on_texels(d, f.corner[i]))
+            return 0;
+    if (!terrimpi_depth_covers(d, s, &f))
+        return 0;
+    for (i = 0; i < s->count; i++)
+        d->triangles[s->triangles[i]].corner[0] = TERRIMPI_DEPTH_END;
+    for (i = 0; i < f.count; i++) { /* in its old place, so that what it stands for stays with it */
+        uint32_t triangle = f.triangles[i];
+        memcpy(d->triangles[triangle].corner, f.corner[i], sizeof f.corner[i]);
+        for (k = 0; k < 3u; k++)
+            if (f.corner[i][k] == to) {
+                d->triangles[triangle].next[k] = d->at[to];
+                d->at[to] = 3u * triangle + k;
+            }
+    }
+    d->at[from] = TERRIMPI_DEPTH_END;
+    d->stale[to] = 0;
+    for (i = 0; i < s->other_count; i++)
+        d->stale[s->others[i]] = 0;
+    return 1;
+}
+
+/* Collapses edges up to a length, each vertex to the closest neighbour that it may go to. Where
+   nothing has changed only edges are tried that were too long before. */
+static uint32_t terrimpi_depth_pass(terrimpi_depth *d, float before, float longest)
+{
+    terrimpi_depth_star s;
+    uint32_t vertex, i, done = 0;
+    for (vertex = 0; vertex < d->corner_count; vertex++) {
+        float lengths[2u * TERRIMPI_DEPTH_STAR];
+        uint32_t next = 0;
+        int collapsed;
+        if (d->at[vertex] == TERRIMPI_DEPTH_END || !terrimpi_depth_collect(d, vertex, &s))
+            continue;
+        for (i = 0; i < s.other_count; i++) {
+            lengths[i] = terrimpi_depth_length(d, vertex, s.others[i]);
+            if (lengths[i] > longest || (d->stale[vertex] && lengths[i] <= before))
+                lengths[i] = 0.0f; /* not to be tried, or no more */
+        }
+        d->stale[vertex] = 1;
+        while (next != TERRIMPI_DEPTH_END) {
+            next = TERRIMPI_DEPTH_END;
+            for (i = 0; i < s.other_count; i++)
+                if (lengths[i] > 0.0f &&
+                    (next == TERRIMPI_DEPTH_END || lengths[i] < lengths[next]))
+                    next = i;
+            if (next == TERRIMPI_DEPTH_END)
+                break;
+            lengths[next] = 0.0f;
+            collapsed = terrimpi_depth_collapse(d, &s, vertex, next, longest);
+            if (collapsed < 0)
+                d->stale[vertex] = 0;
+            if (collapsed > 0)
+                next = TERRIMPI_DEPTH_END;
+            done += collapsed > 0;
+        }
+    }
+    return done;
+}
+
+static void terrimpi_depth_simplify(terrimpi_depth *d)
+{
+    float end = 2.0f * (float)(d->desc->width + d->desc->height + d->desc->layers);
+    float before = 0.0f, longest;
+    memset(d->stale, 0, d->corner_count);
+    for (longest = 1.5f; before < end; longest *= 1.4f) {
+        while (terrimpi_depth_pass(d, before, longest) > d->corner_count / 1000u) {}
+        before = longest;
+    }
+}
+
+/* Writes the triangles sheet by sheet, the vertices in the order in which they are met. */
+static void terrimpi_depth_write_mesh(terrimpi_depth *d, terrimp_depth_mesh *m)
+{
+    uint32_t i, k, sheet, *first = d->joined; /* [sheets + 1] */
+    uint32_t *name = d->queue;                /* [corners] */
+    memset(first, 0, (d->sheet_count + 1u) * sizeof *first);
+    memset(name, 0xff, d->corner_count * sizeof *name);
+    m->vertex_count = m->index_count = 0;
+    for (i = 0; i < d->triangle_count; i++)
+        if (d->triangles[i].corner[0] != TERRIMPI_DEPTH_END)
+            first[d->triangles[i].sheet + 1u] += 3u;
+    for (sheet = 0; sheet < d->sheet_count; sheet++) {
+        first[sheet + 1u] += first[sheet];
+        if (sheet < m->sheet_capacity) {
+            m->sheets[sheet].first_index = first[sheet];
+            m->sheets[sheet].index_count = first[sheet + 1u] - first[sheet];
+        }
+    }
+    for (i = 0; i < d->triangle_count; i++) {
+        const terrimpi_depth_triangle *t = &d->triangles[i];
+        if (t->corner[0] == TERRIMPI_DEPTH_END)
+            continue;
+        for (k = 0; k < 3u; k++) {
+            uint32_t vertex = t->corner[k], at = first[t->sheet]++;
+            if (name[vertex] == TERRIMPI_DEPTH_END) {
+                name[vertex] = m->vertex_count++;
+                if (name[vertex] < m->vertex_capacity) {
+                    m->vertices[name[vertex]].u = d->corners[vertex].at[0];
+                    m->vertices[name[vertex]].v = d->corners[vertex].at[1];
+                    m->vertices[name[vertex]].layer = d->corners[vertex].at[2];
+                }
+            }
+            if (at < m->index_capacity)
+                m->indices[at] = name[vertex];
+            m->index_count++;
+        }
+    }
+}
+
+/* Rectangles of the sheets, and from which layer their texels have their colours. */
+static void terrimpi_depth_write_sheets(terrimpi_depth *d, terrimp_depth_mesh *m)
+{
+    uint32_t i, sheet;
+    m->sheet_count = d->sheet_count;
+    m->texel_count = 0;
+    if (d->sheet_count > m->sheet_capacity)
+        return;
+    for (i = 0; i < d->sheet_count; i++)
+        m->sheets[i].texels = terrimpi_rect(0, 0, 0, 0);
+    for (i = 0; i < d->cell_count; i++) {
+        terrimp_rect *r = &m->sheets[d->cells[i].sheet].texels;
+        terrimp_rect cell = terrimpi_rect(d->cells[i].x, d->cells[i].y, 1, 1);
+        *r = r->width ? terrimpi_rect_union(r, &cell) : cell;
+    }
+    for (sheet = 0; sheet < d->sheet_count; sheet++) {
+        m->sheets[sheet].first_texel = m->texel_count;
+        m->texel_count += m->sheets[sheet].texels.width * m->sheets[sheet].texels.height;
+    }
+    if (m->texel_count > m->texel_capacity)
+        return;
+    memset(m->texel_layers, 0xff, m->texel_count * sizeof *m->texel_layers);
+    for (i = 0; i < d->cell_count; i++) {
+        const terrimpi_depth_cell *c = &d->cells[i];
+        const terrimp_depth_sheet *s = &m->sheets[c->sheet];
+        m->texel_layers[s->first_texel + (c->y - s->texels.y) * s->texels.width + c->x -
+                        s->texels.x] = (uint16_t)((c->k0 + c->k1) / 2u);
+    }
+}
+
+static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, terrimpi_depth *d)
+{
+    TERRIMPI_REFUSE(!desc || !desc->opaque || !desc->visible, TERRIMP_E_NULL);
+    d->desc = desc;
+    d->tolerance = desc->tolerance;
+    TERRIMPI_DEFAULT(d->tolerance, 1.0f);
+    return terrimpi_within_u32(desc->width, 1, 16384) &&
+                   terrimpi_within_u32(desc->height, 1, 16384) &&
+                   terrimpi_within_u32(desc->layers, 1, 65535) &&
+                   terrimpi_within(d->tolerance, 0.75f, 64.0f)
+               ? TERRIMP_OK
+               : TERRIMP_E_RANGE;
+}
+
+/* Lays out the scratch memory, for cells and texels that have been counted. */
+static size_t terrimpi_depth_layout(terrimpi_depth *d, void *base)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    size_t n = 2u * (size_t)d->cell_count, points = (size_t)d->point_count + d->cell_count;
+    size_t slots = (size_t)d->desc->width * d->desc->height;
+    size_t most = terrimpi_mul(8, n, &arena.ok);
+    size_t queue = most > points ? most : points;
+    arena.ok &= n < 0x10000000u;
+    d->cells = (terrimpi_depth_cell *)terrimpi_take(&arena, n, sizeof *d->cells);
+    d->whole = d->cells ? d->cells + d->cell_count : NULL;
+    d->beside = (uint32_t *)terrimpi_take(&arena, most / 2u, sizeof *d->beside);
+    d->first_cell = (uint32_t *)terrimpi_take(&arena, slots + 1u, sizeof *d->first_cell);
+    d->joined = (uint32_t *)terrimpi_take(&arena, most / 2u + 2u, sizeof *d->joined);
+    d->vertex_of = (uint32_t *)terrimpi_take(&arena, most / 2u, sizeof *d->vertex_of);
+    d->corners = (terrimpi_depth_corner *)terrimpi_take(&arena, most, sizeof *d->corners);
+    d->triangles =
+        (terrimpi_depth_triangle *)terrimpi_take(&arena, most / 2u, sizeof *d->triangles);
+    d->points = (terrimpi_depth_point *)terrimpi_take(&arena, points, sizeof *d->points);
+    d->at = (uint32_t *)terrimpi_take(&arena, most > slots ? most : slots, sizeof *d->at);
+    d->stale = (uint8_t *)terrimpi_take(&arena, most, 1);
+    d->queue = (uint32_t *)terrimpi_take(&arena, queue, sizeof *d->queue);
+    return arena.ok ? arena.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_desc *desc)
+{
+    terrimpi_depth d;
+    if (terrimpi_depth_check(desc, &d) != TERRIMP_OK)
+        return 0;
+    terrimpi_depth_cells(&d, 0);
+    return terrimpi_depth_layout(&d, NULL);
+}
+
+TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc *desc,
+                                                   void *scratch, size_t bytes,
+                                                   terrimp_depth_mesh *mesh)
+{
+    terrimpi_depth d;
+    size_t needed;
+    TERRIMPI_TRY(terrimpi_depth_check(desc, &d));
+    TERRIMPI_REFUSE(!scratch || !mesh || !mesh->vertices || !mesh->indices || !mesh->sheets ||
+                        !mesh->texel_layers,
+                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    terrimpi_depth_cells(&d, 0);
+    needed = terrimpi_depth_layout(&d, scratch);
+    TERRIMPI_REFUSE(!needed || bytes < needed, TERRIMP_E_MEMORY);
+    terrimpi_depth_cells(&d, 1);
+    terrimpi_depth_unfold(&d);
+    terrimpi_depth_match(&d);
+    terrimpi_depth_connect(&d);
+    terrimpi_depth_sheets(&d);
+    terrimpi_depth_first_mesh(&d);
+    mesh->first_triangle_count = d.triangle_count;
+    terrimpi_depth_simplify(&d);
+    terrimpi_depth_write_mesh(&d, mesh);
+    terrimpi_depth_write_sheets(&d, mesh);
+    return mesh->vertex_count > mesh->vertex_capacity ||
+                   mesh->index_count > mesh->index_capacity ||
+                   mesh->sheet_count > mesh->sheet_capacity ||
+                   mesh->texel_count > mesh->texel_capacity
+               ? TERRIMP_E_CAPACITY
+               : TERRIMP_OK;
+}
+
+/* --- layers all round a cell, and for all views of an object --- */
+
+TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
+                                                 const float centre[3], float half,
+                                                 terrimp_layers *layers,
+                                                 terrimp_capture pictures[6])
+{
+    terrimp_layers_desc d;
+    terrimp_layers made;
+    uint32_t side, k;
+    TERRIMPI_REFUSE(!desc || !centre || !layers || !pictures, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(centre) || !terrimpi_finite(half), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(half > 0.0f) || !(desc->distance > 0.0f), TERRIMP_E_RANGE);
+    d = *desc;
+    for (k = 0; k < 2u; k++) { /* at depth t the pyramid is t + half wide to each side */
+        d.cell_size[k] = 2.0f * half;
+        d.cell_tan[k] = 0.0f;
+        d.view_tan[k] = 1.0f + half / desc->distance;
+    }
+    d.cell_depth = 2.0f * half;
+    TERRIMPI_TRY(terrimp_layers_plan(&d, &made));
+    *layers = made;
+    for (side = 0; side < 6u; side++) {
+        terrimp_capture *p = &pictures[side];
+        memset(p, 0, sizeof *p);
+        p->forward[side / 2u] = side & 1u ? -1.0f : 1.0f;
+        p->up[1] = 1.0f;
+        terrimpi_basis(p->forward, p->up, p->right);
+        for (k = 0; k < 3u; k++)
+            p->eye[k] = centre[k] + half * p->forward[k];
+        p->z_near = made.start;
+        p->z_far = made.end;
+        p->tan_right = p->tan_up = d.view_tan[0];
+        p->tan_left = p->tan_down = -d.view_tan[0];
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
+                                                 uint32_t counts[3])
+{
+    float needed[3];
+    int k;
+    TERRIMPI_REFUSE(!box || !counts, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
+                        !terrimpi_finite2(texel, slope),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(texel > 0.0f) || !(slope >= 1.0f), TERRIMP_E_RANGE);
+    for (k = 0; k < 3; k++) {
+        needed[k] = (box->max[k] - box->min[k]) * slope / texel;
+        TERRIMPI_REFUSE(!(needed[k] >= 0.0f) || !(needed[k] < TERRIMPI_LAYERS_MAX),
+                        TERRIMP_E_RANGE);
+    }
+    for (k = 0; k < 3; k++)
+        counts[k] = terrimpi_max_u32(1u, terrimpi_ceil_u32(needed[k]));
+    return TERRIMP_OK;
+}
+
 /* ==== Placement ========================================================== >>impl-placement */
 /* Based on: Jeschke 2004, chapter 5. */
 
 #define TERRIMPI_PLACE_NONE 0xffffffffu
 enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
-#define TERRIMPI_PLACE_WORK 10000000u /* numbers that attempts may go over, some 10 ns each */
+#define TERRIMPI_PLACE_WORK 3000000u /* numbers that attempts may go over, some 10 ns each */
 
 typedef struct terrimpi_placing {
     const terrimp_place_desc *desc;
@@ -15018,6 +16074,325 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     for (i = 0; i < desc->gain_count; i++)
         if (shown[i])
             costs[desc->gains[i].view] -= desc->gains[i].saved;
+    return TERRIMP_OK;
+}
+
+
+/* --- a prepared set for a terrain --- */
+
+typedef struct terrimpi_prepare {
+    terrimp_place_terrain_desc desc; /* resolved */
+    terrimp_place_set *set;
+    uint32_t cells, nodes, squares;  /* along a side; all; of all sizes */
+    float *worth;       /* [nodes] what the node costs as ground in a view */
+    uint8_t *whole;     /* [nodes] ground of the cell draws it, and none of its parts */
+    uint8_t *below;     /* [nodes] of such a node */
+    uint32_t *slots;    /* [squares][nodes] gains of that picture, later where the next one goes;
+                           TERRIMPI_PLACE_NONE: it cannot be prepared */
+} terrimpi_prepare;
+
+static float terrimpi_boxes_distance(const terrimp_box *a, const terrimp_box *b)
+{
+    float gap[3];
+    int k;
+    for (k = 0; k < 3; k++)
+        gap[k] = terrimpi_max(0.0f, terrimpi_max(a->min[k] - b->max[k], b->min[k] - a->max[k]));
+    return terrimpi_length(gap);
+}
+
+/* The box of eyes of a square of 2^level cells. */
+static void terrimpi_prepare_square(const terrimpi_prepare *p, uint32_t level, uint32_t x,
+                                    uint32_t z, terrimp_box *box)
+{
+    float part = (float)(1u << level) / (float)p->cells;
+    float width = (p->desc.eyes.max[0] - p->desc.eyes.min[0]) * part;
+    float depth = (p->desc.eyes.max[2] - p->desc.eyes.min[2]) * part;
+    *box = p->desc.eyes;
+    box->min[0] += width * (float)x;
+    box->max[0] = box->min[0] + width;
+    box->min[2] += depth * (float)z;
+    box->max[2] = box->min[2] + depth;
+}
+
+/* The number of the first square of a level. */
+static uint32_t terrimpi_prepare_first(const terrimpi_prepare *p, uint32_t level)
+{
+    uint32_t first = 0, k;
+    for (k = 0; k < level; k++)
+        first += (p->cells >> k) * (p->cells >> k);
+    return first;
+}
+
+static float terrimpi_half_diagonal(const terrimp_box *box)
+{
+    float size[3];
+    terrimpi_sub(box->max, box->min, size);
+    return 0.5f * terrimpi_length(size);
+}
+
+/* Whether a node's picture from the middle of a square can serve all of its eyes, and its size. A
+   point that lies `error` off its mesh is then seen at most K error r / d^2 pixels off, when eyes
+   are up to r from that middle and at least d from the node: the directions differ by r / d. */
+static int terrimpi_prepare_picture(const terrimpi_prepare *p, const terrimp_box *square,
+                                    uint32_t node, terrimp_place_picture *out)
+{
+    terrimp_box box;
+    terrimp_mesh_info mesh;
+    terrimp_capture capture;
+    uint32_t size[2];
+    float r = terrimpi_half_diagonal(square), d, closer, scale;
+    int k;
+    if (terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0;
+    d = terrimpi_boxes_distance(square, &box);
+    for (k = 0; k < 3; k++)
+        out->eye[k] = 0.5f * (square->min[k] + square->max[k]);
+    if (!(r <= p->desc.max_angle_rad * d) ||
+        p->desc.pixel_factor * mesh.error * r > p->desc.tolerance_px * d * d ||
+        terrimp_capture_fit(&box, out->eye, &capture) != TERRIMP_OK)
+        return 0;
+    closer = terrimp_box_distance(&box, out->eye) / d;
+    if (terrimp_impostor_size(&capture, p->desc.pixel_factor, p->desc.texels_per_px * closer, 1,
+                              8192, size, &scale) != TERRIMP_OK || scale < 1.0f)
+        return 0;
+    out->width = size[0];
+    out->height = size[1];
+    return 1;
+}
+
+/* What ground draws for a cell, node by node: whole where that keeps the tolerance from its closest
+   eye. */
+static void terrimpi_prepare_ground(const terrimpi_prepare *p, const terrimp_box *cell)
+{
+    const terrimp_quadtree *tree = &p->desc.terrain->tree;
+    uint32_t i;
+    for (i = p->nodes; i-- > 0;) {
+        terrimp_node n = terrimpi_tree_node(tree, i), parent;
+        terrimp_box box;
+        terrimpi_mip_error_box(tree, &n, &box);
+        p->whole[i] = n.level == 0 ||
+                      tree->nodes[i].error * p->desc.pixel_factor <=
+                          p->desc.tolerance_px * terrimpi_boxes_distance(cell, &box);
+        p->below[i] = 0;
+        if (i + 1u == p->nodes)
+            continue;
+        parent = terrimpi_tree_parent(tree, &n);
+        p->below[i] = p->whole[parent.number] || p->below[parent.number];
+    }
+}
+
+/* Whether some eye of a cell may see a box when it looks into the k-th part of the circle: as if
+   cell and box were round. */
+static int terrimpi_prepare_sees(const terrimpi_prepare *p, const terrimp_box *cell,
+                                 const terrimp_box *box, uint32_t k)
+{
+    const float circle = 6.2831853f;
+    float middle = circle * ((float)k + 0.5f) / (float)p->desc.directions;
+    float x = 0.5f * (box->min[0] + box->max[0] - cell->min[0] - cell->max[0]);
+    float z = 0.5f * (box->min[2] + box->max[2] - cell->min[2] - cell->max[2]);
+    float far_off = terrimpi_hypot(x, z), angle, spread;
+    float round = 0.5f * (terrimpi_hypot(box->max[0] - box->min[0], box->max[2] - box->min[2]) +
+                          terrimpi_hypot(cell->max[0] - cell->min[0],
+                                         cell->max[2] - cell->min[2]));
+    if (!(far_off > round))
+        return 1;
+    spread = 0.5f * (p->desc.fov_rad + circle / (float)p->desc.directions) +
+             TERRIMP_ASINF(round / far_off) + 1e-4f;
+    angle = (x * TERRIMP_COSF(middle) + z * TERRIMP_COSF(middle - 0.25f * circle)) / far_off;
+    return spread >= 3.1415927f || angle >= TERRIMP_COSF(spread);
+}
+
+/* What each node costs as ground in a view. */
+static void terrimpi_prepare_worth(const terrimpi_prepare *p, const terrimp_box *cell, uint32_t k)
+{
+    const terrimp_quadtree *tree = &p->desc.terrain->tree;
+    float quads = (float)tree->chunk_quads;
+    float own = p->desc.draw_cost + 2.0f * quads * quads * p->desc.triangle_cost;
+    uint32_t i;
+    for (i = 0; i < p->nodes; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i), children[4];
+        terrimp_box box;
+        uint32_t count;
+        p->worth[i] = 0.0f;
+        terrimp_terrain_get_box(p->desc.terrain, i, &box);
+        if (!terrimpi_prepare_sees(p, cell, &box, k))
+            continue;
+        if (p->whole[i]) {
+            p->worth[i] = own;
+            continue;
+        }
+        count = terrimpi_tree_children(tree, &n, cell->min, children);
+        while (count-- > 0)
+            p->worth[i] += p->worth[children[count].number];
+    }
+}
+
+/* What a node's picture saves in the view at hand. */
+static float terrimpi_prepare_saved(const terrimpi_prepare *p, uint32_t node)
+{
+    terrimp_mesh_info mesh;
+    if (p->below[node] || !(p->worth[node] > 0.0f) ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0.0f;
+    return p->worth[node] - p->desc.draw_cost -
+           p->desc.triangle_cost * (float)(mesh.index_count / 3u);
+}
+
+/* Counts the gains of all pictures, or writes them. */
+static void terrimpi_prepare_gains(terrimpi_prepare *p, int write)
+{
+    uint32_t cell_x, cell_z, k, i, level, view = 0;
+    for (cell_z = 0; cell_z < p->cells; cell_z++)
+        for (cell_x = 0; cell_x < p->cells; cell_x++) {
+            terrimp_box cell;
+            terrimpi_prepare_square(p, 0, cell_x, cell_z, &cell);
+            terrimpi_prepare_ground(p, &cell);
+            for (k = 0; k < p->desc.directions; k++, view++) {
+                terrimpi_prepare_worth(p, &cell, k);
+                if (write)
+                    p->set->costs[view] = p->worth[p->nodes - 1u];
+                for (i = 0; i < p->nodes; i++) {
+                    float saved = terrimpi_prepare_saved(p, i);
+                    for (level = 0; saved > 0.0f && level <= p->desc.cell_levels; level++) {
+                        uint32_t square = terrimpi_prepare_first(p, level) +
+                                          (cell_z >> level) * (p->cells >> level) +
+                                          (cell_x >> level);
+                        uint32_t *slot = &p->slots[(size_t)square * p->nodes + i];
+                        if (*slot == TERRIMPI_PLACE_NONE)
+                            continue;
+                        if (write) {
+                            p->set->gains[*slot].view = view;
+                            p->set->gains[*slot].saved = saved;
+                        }
+                        ++*slot;
+                    }
+                }
+            }
+        }
+}
+
+/* Goes through all pictures: first marks those that can be prepared, then, when their gains have
+   been counted, gives those that have any a place. */
+static void terrimpi_prepare_pictures(terrimpi_prepare *p, int list)
+{
+    uint32_t level, x, z, i, square = 0;
+    p->set->candidate_count = p->set->gain_count = 0;
+    for (level = 0; level <= p->desc.cell_levels; level++)
+        for (z = 0; z < p->cells >> level; z++)
+            for (x = 0; x < p->cells >> level; x++, square++) {
+                terrimp_box box;
+                terrimpi_prepare_square(p, level, x, z, &box);
+                for (i = 0; i < p->nodes; i++) {
+                    uint32_t *slot = &p->slots[(size_t)square * p->nodes + i], count = *slot;
+                    terrimp_place_picture made;
+                    uint32_t at = p->set->candidate_count;
+                    if (!list)
+                        *slot = terrimpi_prepare_picture(p, &box, i, &made) ? 0u
+                                                                            : TERRIMPI_PLACE_NONE;
+                    if (!list || count == TERRIMPI_PLACE_NONE || count == 0)
+                        continue;
+                    if (at < p->set->candidate_capacity) {
+                        terrimpi_prepare_picture(p, &box, i, &made);
+                        made.node = i;
+                        made.level = level;
+                        made.x = x;
+                        made.z = z;
+                        p->set->pictures[at] = made;
+                        p->set->candidates[at].cluster = i;
+                        p->set->candidates[at].first_gain = p->set->gain_count;
+                        p->set->candidates[at].gain_count = count;
+                        p->set->candidates[at].memory = (float)made.width * (float)made.height;
+                    }
+                    *slot = p->set->gain_count;
+                    p->set->gain_count += count;
+                    p->set->candidate_count++;
+                }
+            }
+}
+
+/* Checks a descriptor, fills in its defaults and lays out the scratch memory. */
+static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *desc, void *base,
+                                             terrimpi_prepare *p, size_t *bytes)
+{
+    terrimpi_arena arena = terrimpi_arena_at(base);
+    terrimp_terrain_info info;
+    terrimp_place_terrain_desc *d = &p->desc;
+    int k;
+    TERRIMPI_REFUSE(!desc || !desc->terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimp_terrain_get_info(desc->terrain, &info));
+    *d = *desc;
+    TERRIMPI_DEFAULT(d->directions, 8u);
+    TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
+                        !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
+                        !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
+                        !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
+                        !terrimpi_finite(d->texels_per_px),
+                    TERRIMP_E_NOT_FINITE);
+    for (k = 0; k < 3; k++)
+        TERRIMPI_REFUSE(d->eyes.min[k] > d->eyes.max[k], TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(d->cell_levels > 6u || d->directions > 64u ||
+                        !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
+                        d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f ||
+                        d->texels_per_px < 0.0f || d->draw_cost < 0.0f || d->triangle_cost < 0.0f,
+                    TERRIMP_E_RANGE);
+    d->tolerance_px = d->tolerance_px > 0.0f ? d->tolerance_px : 1.0f;
+    d->max_angle_rad = d->max_angle_rad > 0.0f ? d->max_angle_rad : 0.1f;
+    d->texels_per_px = d->texels_per_px > 0.0f ? d->texels_per_px : 1.0f;
+    if (!(d->draw_cost > 0.0f) && !(d->triangle_cost > 0.0f)) {
+        d->draw_cost = 40.0f;
+        d->triangle_cost = 1.0f;
+    }
+    p->cells = 1u << d->cell_levels;
+    p->nodes = info.node_count;
+    p->squares = terrimpi_prepare_first(p, d->cell_levels + 1u);
+    p->worth = (float *)terrimpi_take(&arena, p->nodes, sizeof *p->worth);
+    p->whole = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->below = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->slots = (uint32_t *)terrimpi_take(&arena, terrimpi_mul(p->squares, p->nodes, &arena.ok),
+                                         sizeof *p->slots);
+    *bytes = arena.bytes;
+    return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
+}
+
+TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terrain_desc *desc)
+{
+    terrimpi_prepare p;
+    size_t bytes;
+    return terrimpi_prepare_begin(desc, NULL, &p, &bytes) == TERRIMP_OK ? bytes : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
+                                                 void *scratch, size_t bytes,
+                                                 terrimp_place_set *set)
+{
+    terrimpi_prepare p;
+    size_t needed;
+    uint32_t i;
+    TERRIMPI_REFUSE(!scratch || !set || !set->candidates || !set->pictures || !set->gains ||
+                        !set->parents || !set->costs,
+                    TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
+    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
+    p.set = set;
+    set->cluster_count = p.nodes;
+    set->view_count = p.cells * p.cells * p.desc.directions;
+    terrimpi_prepare_pictures(&p, 0);
+    terrimpi_prepare_gains(&p, 0);
+    terrimpi_prepare_pictures(&p, 1);
+    TERRIMPI_REFUSE(set->candidate_count > set->candidate_capacity ||
+                        set->gain_count > set->gain_capacity ||
+                        set->cluster_count > set->cluster_capacity ||
+                        set->view_count > set->view_capacity,
+                    TERRIMP_E_CAPACITY);
+    terrimpi_prepare_gains(&p, 1);
+    for (i = 0; i < p.nodes; i++) {
+        terrimp_node n = terrimpi_tree_node(&p.desc.terrain->tree, i);
+        set->parents[i] = i + 1u == p.nodes
+                              ? i
+                              : terrimpi_tree_parent(&p.desc.terrain->tree, &n).number;
+    }
     return TERRIMP_OK;
 }
 

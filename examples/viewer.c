@@ -64,7 +64,7 @@ typedef struct viewer {
     float divider, sun_degrees, tolerance;
     int mode;
     int lines, levels, atlas, split, paused, with_sea, with_houses, with_trees, figures, help;
-    int shots, unsupported;
+    int shots, broken;              /* broken: nothing can be drawn but what is written */
 } viewer;
 
 static void say(viewer *v, const char *text)
@@ -201,7 +201,7 @@ static float go_on_building(viewer *v)
         if (trouble) {
             say(v, trouble);
             v->scene.view = NULL;
-            v->unsupported = 1;
+            v->broken = 1;
         }
     } else if (stage == JOB_FAILED) {
         say(v, v->building->error);
@@ -560,7 +560,7 @@ static void draw_frame(viewer *v)
         return; /* minimised */
     context_bind(&v->frame);
     glDisable(GL_SCISSOR_TEST);
-    if (v->scene.view && !v->unsupported) {
+    if (v->scene.view && !v->broken) {
         move(v);
         draw_scene(v);
     } else {
@@ -578,7 +578,9 @@ static const char *open_window(viewer *v)
     if (!glfwInit())
         return "there is no display";
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
-#ifndef __EMSCRIPTEN__
+#ifdef __EMSCRIPTEN__
+    glfwWindowHint(GLFW_ALPHA_BITS, 0); /* or the page would show through */
+#else
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, 1);
@@ -636,15 +638,7 @@ static void close_viewer(viewer *v)
 static viewer the_viewer; /* all zero; a page goes on when main has returned */
 
 #ifdef __EMSCRIPTEN__
-static void draw_page(void) { draw_frame(&the_viewer); }
-
-/* What the page's buttons, touches and files call. */
-EMSCRIPTEN_KEEPALIVE void viewer_key(int key, int down)
-{
-    on_key(the_viewer.window, key, 0, down ? GLFW_PRESS : GLFW_RELEASE, 0);
-}
-EMSCRIPTEN_KEEPALIVE void viewer_turn(float x, float y) { walker_turn(&the_viewer.walker, x, y); }
-EMSCRIPTEN_KEEPALIVE void viewer_open(const char *path) { start_building(&the_viewer, path); }
+#include "viewer_web.h"
 #endif
 
 int main(int argc, char **argv)
@@ -657,7 +651,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "viewer: %s\n", trouble);
     } else {
 #ifdef __EMSCRIPTEN__
-        emscripten_set_main_loop(draw_page, 0, 0);
+        emscripten_set_main_loop(viewer_frame, 0, 0);
         return 0;
 #endif
         while (!glfwWindowShouldClose(v->window)) {

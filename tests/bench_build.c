@@ -30,8 +30,8 @@ static double standing_out(const terrimp_terrain *t, uint32_t node, float slack)
     mesh.surface_index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
     for (i = 0; i < terrimpi_mesh_vertices(&t->meshes[node]); i++) {
         terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
-        build.vertices[i].x = point.x;
-        build.vertices[i].z = point.z;
+        build.vertices[i].x = (uint16_t)point.x;
+        build.vertices[i].z = (uint16_t)point.z;
         build.vertices[i].height = point.height;
     }
     for (i = 0; i < mesh.surface_index_count; i++)

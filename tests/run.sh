@@ -193,6 +193,7 @@ else
     skip "threads, ThreadSanitizer: no compiler here has one that runs"
 fi
 suite "the viewer" "sh tests/viewer.sh"
+suite "the viewer's page" "sh tests/web.sh"
 suite "documentation" "sh tests/docs.sh"
 suite "hygiene" "sh tests/hygiene.sh"
 suite "examples" "sh tests/examples.sh"

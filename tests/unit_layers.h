@@ -2,6 +2,7 @@
 #ifndef UNIT_LAYERS_H
 #define UNIT_LAYERS_H
 
+#include "cover_greedy.h"
 #include "unit_bad_input.h"
 
 /* ---- where layers stand ---- */
@@ -458,8 +459,8 @@ static void covers_hold_all_that_is_opaque_and_cost_less_than_greedy_ones(void)
         scratch = malloc(bytes);
         CHECK(bytes && scratch);
         for (k = 0; k < 8; k++) {
-            CHECK(terrimp_cover_grow(&d, 1u << k, 0.8f, scratch, bytes, cover_rects, COVER_QUADS,
-                                     &count) == TERRIMP_OK);
+            count = cover_greedily(&d, 1u << k, 0.8f, cover_rects, COVER_QUADS);
+            CHECK(count <= COVER_QUADS);
             greedy = fmin(greedy, cover_judge(&d, count, 0));
         }
         memset(cover_rects, UNTOUCHED, sizeof cover_rects);
@@ -882,7 +883,463 @@ static void corners_between_two_layers_are_closed(void)
     CHECK(closed > 100);
 }
 
+/* ---- depth meshes ---- */
+
+enum { DEPTH_VERTICES = 40000, DEPTH_SHEETS = 4000, DEPTH_TEXELS = 400000 };
+
+static terrimp_depth_vertex depth_vertices[DEPTH_VERTICES];
+static uint32_t depth_indices[6 * DEPTH_VERTICES];
+static terrimp_depth_sheet depth_sheets[DEPTH_SHEETS];
+static uint16_t depth_texels[DEPTH_TEXELS];
+static float depth_xyz[3 * DEPTH_VERTICES];
+static uint32_t scene_opaque[SCENE_LAYERS][SCENE_SIDE * SCENE_WORDS];
+
+/* The mesh of the scene, whose masks are culled then. */
+static void scene_mesh(terrimp_depth_mesh_desc *d, terrimp_depth_mesh *m)
+{
+    size_t bytes;
+    void *scratch;
+    memcpy(scene_opaque, scene.masks, sizeof scene_opaque);
+    scene_cull();
+    d->opaque = scene_opaque[0];
+    d->visible = scene.masks[0];
+    d->width = d->height = SCENE_SIDE;
+    d->layers = scene.layers.count;
+    memset(m, 0, sizeof *m);
+    m->vertices = depth_vertices;
+    m->indices = depth_indices;
+    m->sheets = depth_sheets;
+    m->texel_layers = depth_texels;
+    m->vertex_capacity = DEPTH_VERTICES;
+    m->index_capacity = 6 * DEPTH_VERTICES;
+    m->sheet_capacity = DEPTH_SHEETS;
+    m->texel_capacity = DEPTH_TEXELS;
+    bytes = terrimp_depth_mesh_scratch_bytes(d);
+    scratch = malloc(bytes + 8);
+    CHECK(bytes > 0 && scratch);
+    memset((char *)scratch + bytes, UNTOUCHED, 8);
+    CHECK(terrimp_depth_mesh_make(d, scratch, bytes, m) == TERRIMP_OK);
+    CHECK(is_untouched((char *)scratch + bytes, 8));
+    free(scratch);
+}
+
+static void depth_corner(const terrimp_depth_mesh *m, uint32_t index, double out[3])
+{
+    const terrimp_depth_vertex *v = &m->vertices[m->indices[index]];
+    out[0] = (double)v->u;
+    out[1] = (double)v->v;
+    out[2] = (double)v->layer;
+}
+
+static double clamp01(double x) { return x < 0.0 ? 0.0 : x > 1.0 ? 1.0 : x; }
+
+/* Distance from a point to a triangle: to its plane where the point is above it, else to a side. */
+static double oracle_to_triangle(const double p[3], double t[3][3])
+{
+    double normal[3], along[3][3], to[3][3], side[3], best = 1e30;
+    int i, k, above = 1;
+    for (i = 0; i < 3; i++) {
+        oracle_between(t[i], t[(i + 1) % 3], along[i]);
+        oracle_between(t[i], p, to[i]);
+    }
+    oracle_cross(along[0], along[1], normal);
+    for (i = 0; i < 3; i++) {
+        double part = clamp01(oracle_dot(to[i], along[i]) / oracle_dot(along[i], along[i])), off[3];
+        for (k = 0; k < 3; k++)
+            off[k] = to[i][k] - part * along[i][k];
+        best = fmin(best, oracle_length(off));
+        oracle_cross(along[i], to[i], side);
+        above &= oracle_dot(side, normal) >= 0.0;
+    }
+    return above ? fabs(oracle_dot(to[0], normal)) / oracle_length(normal) : best;
+}
+
+/* Both ways: each texel that can be seen has the mesh close by, and all of the mesh has texels
+   close by. One texel in 29 and ten points of every triangle are looked at. */
+static void check_depth_mesh(const terrimp_depth_mesh_desc *d, const terrimp_depth_mesh *m)
+{
+    double tolerance = d->tolerance > 0.0f ? (double)d->tolerance : 1.0;
+    uint32_t i, x, y, k, n;
+    long texels = 0;
+    for (k = 0; k < d->layers; k++)
+        for (y = 0; y < d->height; y++)
+            for (x = 0; x < d->width; x++) {
+                double p[3], least = 1e30;
+                if (!mask_at(scene.masks[k], d->width, (int)x, (int)y) || texels++ % 29)
+                    continue;
+                p[0] = x + 0.5;
+                p[1] = y + 0.5;
+                p[2] = k;
+                for (i = 0; i < m->index_count && least > tolerance; i += 3) {
+                    double t[3][3], low = 1e30, high = -1e30;
+                    int c;
+                    for (c = 0; c < 3; c++) {
+                        depth_corner(m, i + (uint32_t)c, t[c]);
+                        low = fmin(low, fabs(t[c][0] - p[0]) + fabs(t[c][1] - p[1]));
+                        high = fmax(high, t[c][0]);
+                    }
+                    if (high < p[0] - 2.0)
+                        continue;
+                    least = fmin(least, oracle_to_triangle(p, t));
+                }
+                CHECK(least <= tolerance * 1.0001);
+            }
+    for (i = 0; i < m->index_count; i += 3) {
+        double t[3][3], area;
+        for (k = 0; k < 3; k++)
+            depth_corner(m, i + k, t[k]);
+        area = (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]);
+        CHECK(area - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]) > -1e-6);
+        for (n = 0; n < 10; n++) {
+            double a = sqrt((double)random_float(0, 1)), b = (double)random_float(0, 1);
+            double at[3];
+            int found = 0, u, v, w;
+            for (k = 0; k < 3; k++)
+                at[k] = t[0][k] * (1 - a) + t[1][k] * a * (1 - b) + t[2][k] * a * b;
+            for (w = 0; w < (int)d->layers && !found; w++) {
+                if (fabs(at[2] - w) > tolerance + 0.75)
+                    continue;
+                for (v = (int)at[1] - 4; v <= (int)at[1] + 4; v++)
+                    for (u = (int)at[0] - 4; u <= (int)at[0] + 4; u++)
+                        found |= fabs(at[0] - u - 0.5) <= tolerance + 0.75 &&
+                                 fabs(at[1] - v - 0.5) <= tolerance + 0.75 && u >= 0 && v >= 0 &&
+                                 u < SCENE_SIDE && v < SCENE_SIDE &&
+                                 mask_at(scene_opaque[w], SCENE_SIDE, u, v);
+            }
+            CHECK(found);
+        }
+    }
+}
+
+/* A sheet's triangles lie in its rectangle, and its texels have the colours of opaque ones. */
+static void check_depth_sheets(const terrimp_depth_mesh *m)
+{
+    uint32_t s, i, x, y, indices = 0;
+    for (s = 0; s < m->sheet_count; s++) {
+        const terrimp_depth_sheet *sheet = &m->sheets[s];
+        const terrimp_rect *r = &sheet->texels;
+        CHECK(rect_within(r, SCENE_SIDE, SCENE_SIDE) && sheet->first_index == indices);
+        CHECK(sheet->first_texel + r->width * r->height <= m->texel_count);
+        indices += sheet->index_count;
+        for (i = sheet->first_index; i < indices; i++) {
+            const terrimp_depth_vertex *v = &m->vertices[m->indices[i]];
+            CHECK(m->indices[i] < m->vertex_count);
+            CHECK(v->u >= (float)r->x && v->v >= (float)r->y && v->u <= (float)(r->x + r->width) &&
+                  v->v <= (float)(r->y + r->height));
+        }
+        for (y = 0; y < r->height; y++)
+            for (x = 0; x < r->width; x++) {
+                uint16_t layer = m->texel_layers[sheet->first_texel + y * r->width + x];
+                CHECK(layer == TERRIMP_DEPTH_NONE ||
+                      (layer < scene.layers.count &&
+                       mask_at(scene_opaque[layer], SCENE_SIDE, (int)(r->x + x), (int)(r->y + y))));
+            }
+    }
+    CHECK(indices == m->index_count);
+}
+
+/* How many lines of sight of many eyes that meet a layer miss the mesh in the world. */
+static long depth_mesh_gaps(const terrimp_depth_mesh *m, int rays, long *met)
+{
+    long gaps = 0;
+    int r;
+    uint32_t i;
+    CHECK(terrimp_depth_points(&scene.layers, &scene.picture, m->vertices, m->vertex_count,
+                               depth_xyz) == TERRIMP_OK);
+    for (r = 0; r < rays; r++) {
+        double eye[3], point[3], to[3];
+        int hit = 0, k;
+        random_layers_eye(&scene.desc, eye);
+        random_layers_point(&scene.desc, 130.0, point);
+        for (k = 0; k < 2; k++)
+            point[k] *= 0.9; /* the border of the picture is the mesh's border */
+        if (scene_ray(eye, point) != 1)
+            continue;
+        eye[0] = -eye[0]; /* right is -x */
+        point[0] = -point[0];
+        oracle_between(eye, point, to);
+        for (i = 0; i < m->index_count && !hit; i += 3) {
+            double c[3][3], n[3], side[3];
+            for (k = 0; k < 3; k++) {
+                double corner[3];
+                oracle_widen(depth_xyz + 3 * m->indices[i + (uint32_t)k], corner);
+                oracle_between(eye, corner, c[k]);
+            }
+            for (k = 0; k < 3; k++) {
+                oracle_cross(c[k], c[(k + 1) % 3], n);
+                side[k] = oracle_dot(n, to);
+            }
+            hit = (side[0] >= -1e-6 && side[1] >= -1e-6 && side[2] >= -1e-6) ||
+                  (side[0] <= 1e-6 && side[1] <= 1e-6 && side[2] <= 1e-6);
+        }
+        gaps += !hit;
+        (*met)++;
+    }
+    return gaps;
+}
+
+static void depth_meshes_keep_to_their_layers_and_these_to_them(void)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        terrimp_depth_mesh_desc d;
+        terrimp_depth_mesh m;
+        long met = 0, gaps;
+        scene_begin(i == 1 ? 60 : 20);
+        scene.desc.even = 1;
+        CHECK(terrimp_layers_plan(&scene.desc, &scene.layers) == TERRIMP_OK);
+        if (i == 1)
+            scene_sheet(1, depth_of_slope);
+        else
+            scene_sheet(i == 0 ? 40 : 7, i == 0 ? depth_of_waves : depth_of_wall);
+        if (i == 2)
+            scene_boxes();
+        memset(&d, 0, sizeof d);
+        d.tolerance = i == 0 ? 2.0f : i == 1 ? 0.0f : 0.75f;
+        scene_mesh(&d, &m);
+        check_depth_mesh(&d, &m);
+        check_depth_sheets(&m);
+        CHECK(m.index_count / 3 < m.first_triangle_count / (i == 1 ? 500 : 4));
+        gaps = depth_mesh_gaps(&m, 600, &met);
+        CHECK(met > 300 && gaps <= (i == 1 ? 0 : met / 200));
+    }
+}
+
+/* On layers vertices stand where layers do; between them what is straight in the world is straight
+   in the grid, when the layers are even. */
+static void vertices_of_depth_meshes_stand_on_their_layers(void)
+{
+    int i, k;
+    scene_begin(30);
+    scene.desc.even = 1;
+    CHECK(terrimp_layers_plan(&scene.desc, &scene.layers) == TERRIMP_OK);
+    for (i = 0; i < 300; i++) {
+        terrimp_depth_vertex v[3];
+        float xyz[9];
+        double a[3], b[3], off[3];
+        for (k = 0; k < 2; k++) {
+            v[k].u = random_float(0.0f, SCENE_SIDE);
+            v[k].v = random_float(0.0f, SCENE_SIDE);
+            v[k].layer = (float)random_range(0, scene.layers.count - 1);
+        }
+        v[2].u = 0.5f * (v[0].u + v[1].u);
+        v[2].v = 0.5f * (v[0].v + v[1].v);
+        v[2].layer = 0.5f * (v[0].layer + v[1].layer);
+        CHECK(terrimp_depth_points(&scene.layers, &scene.picture, v, 3, xyz) == TERRIMP_OK);
+        CHECK(fabsf(xyz[2] / terrimp_layer_depth(&scene.layers, (uint32_t)v[0].layer) - 1) < 1e-5f);
+        for (k = 0; k < 3; k++) {
+            a[k] = (double)xyz[3 + k] - (double)xyz[k];
+            b[k] = (double)xyz[6 + k] - (double)xyz[k];
+        }
+        oracle_cross(a, b, off);
+        CHECK(oracle_length(off) <= 1e-3 * oracle_length(a));
+    }
+}
+
+/* ---- all round a cell, and round an object ---- */
+
+/* Every point beyond the distance is in the picture of the side that faces it; no eye of the cube
+   sees behind a texel. */
+static void layers_all_round_hold_the_world_beyond(void)
+{
+    int i, n;
+    for (i = 0; i < 300; i++) {
+        terrimp_layers_desc d;
+        terrimp_layers l;
+        terrimp_capture pictures[6];
+        float centre[3], half = log_random(1.0f, 50.0f);
+        memset(&d, 0, sizeof d);
+        d.distance = half * log_random(2.0f, 30.0f);
+        d.depth = d.distance * log_random(0.1f, 9.0f);
+        d.texel = log_random(1e-3f, 5e-3f);
+        for (n = 0; n < 3; n++)
+            centre[n] = random_float(-100.0f, 100.0f);
+        CHECK(terrimp_layers_around(&d, centre, half, &l, pictures) == TERRIMP_OK);
+        for (n = 0; n < 30; n++) {
+            double way[3], eye[3], seen[2][3], at[2], depth = 0, texels[2][2];
+            uint32_t side = 0, layer = l.count > 1 ? random_range(0, l.count - 2) : 0, k, j;
+            const terrimp_capture *p;
+            float far_depth = terrimp_layer_depth(&l, l.count > 1 ? layer + 1 : 0);
+            for (k = 0; k < 3; k++) {
+                way[k] = (double)random_float(-1.0f, 1.0f);
+                eye[k] = (double)centre[k] + (double)half * (double)random_float(-1.0f, 1.0f);
+            }
+            for (k = 0; k < 3; k++)
+                if (fabs(way[k]) > fabs(way[side / 2]) || k == 0)
+                    side = 2 * k + (way[k] < 0.0);
+            p = &pictures[side];
+            for (k = 0; k < 3; k++) /* a point of the layer's cube, in the picture of its side */
+                seen[0][k] = (double)centre[k] + way[k] / fabs(way[side / 2]) *
+                                                     ((double)far_depth + (double)half);
+            for (j = 0; j < 2; j++) {
+                double offset[3], right[3], up[3], forward[3];
+                oracle_widen(p->eye, offset);
+                oracle_between(offset, seen[j], offset);
+                oracle_widen(p->right, right);
+                oracle_widen(p->up, up);
+                oracle_widen(p->forward, forward);
+                depth = oracle_dot(offset, forward);
+                at[0] = oracle_dot(offset, right) / depth;
+                at[1] = oracle_dot(offset, up) / depth;
+                for (k = 0; k < 2; k++) {
+                    if (j == 0)
+                        CHECK(fabs(at[k]) <= (double)p->tan_right * 1.0001);
+                    texels[j][k] = at[k] / (double)d.texel;
+                }
+                if (j == 0) { /* where its line of sight passes the layer before */
+                    double to[3], wanted = (double)terrimp_layer_depth(&l, layer), part;
+                    oracle_between(eye, seen[0], to);
+                    part = (depth - wanted) / oracle_dot(to, forward);
+                    for (k = 0; k < 3; k++)
+                        seen[1][k] = seen[0][k] - part * to[k];
+                }
+            }
+            CHECK(fabs(depth / (double)terrimp_layer_depth(&l, layer) - 1.0) < 1e-4);
+            for (k = 0; k < 2; k++)
+                CHECK(fabs(at[k]) > (double)p->tan_right ||
+                      fabs(texels[0][k] - texels[1][k]) <= 1.001 + 1e-6 * l.count);
+        }
+    }
+}
+
+static void layers_of_objects_pass_each_other_by_a_texel(void)
+{
+    int i, k;
+    for (i = 0; i < 500; i++) {
+        terrimp_box box;
+        uint32_t counts[3];
+        float texel = log_random(0.01f, 1.0f), slope = random_float(1.0f, 2.0f);
+        for (k = 0; k < 3; k++) {
+            box.min[k] = random_float(-50.0f, 50.0f);
+            box.max[k] = box.min[k] + (random_range(0, 5) ? log_random(0.1f, 50.0f) : 0.0f);
+        }
+        CHECK(terrimp_layers_object(&box, texel, slope, counts) == TERRIMP_OK);
+        for (k = 0; k < 3; k++) {
+            double extent = (double)box.max[k] - (double)box.min[k];
+            CHECK(counts[k] >= 1);
+            CHECK(extent / counts[k] * (double)slope <= (double)texel * 1.00001);
+            CHECK(counts[k] == 1 ||
+                  extent / (counts[k] - 1.0) * (double)slope > (double)texel * 0.99999);
+        }
+    }
+}
+
+static void layers_all_round_refuse(void)
+{
+    terrimp_layers_desc d;
+    terrimp_layers l;
+    terrimp_capture pictures[6];
+    terrimp_box box = {{0, 0, 0}, {1, 2, 3}}, bad = {{0, 0, 0}, {1, -2, 3}};
+    float centre[3] = {0, 0, 0}, wrong[3] = {0, 0, 0};
+    uint32_t counts[3];
+    memset(&d, 0, sizeof d);
+    d.distance = 100;
+    d.depth = 50;
+    d.texel = 0.002f;
+    wrong[1] = not_finite(0);
+    REFUSES(TERRIMP_E_NULL, l, terrimp_layers_around(NULL, centre, 5, &l, pictures));
+    REFUSES(TERRIMP_E_NULL, l, terrimp_layers_around(&d, NULL, 5, &l, pictures));
+    GIVES(TERRIMP_E_NULL, terrimp_layers_around(&d, centre, 5, NULL, pictures));
+    REFUSES(TERRIMP_E_NULL, l, terrimp_layers_around(&d, centre, 5, &l, NULL));
+    REFUSES(TERRIMP_E_NOT_FINITE, l, terrimp_layers_around(&d, wrong, 5, &l, pictures));
+    REFUSES(TERRIMP_E_NOT_FINITE, l,
+            terrimp_layers_around(&d, centre, not_finite(1), &l, pictures));
+    REFUSES(TERRIMP_E_RANGE, pictures, terrimp_layers_around(&d, centre, 0, &l, pictures));
+    d.texel = 0;
+    REFUSES(TERRIMP_E_RANGE, pictures, terrimp_layers_around(&d, centre, 5, &l, pictures));
+    d.distance = 0;
+    REFUSES(TERRIMP_E_RANGE, l, terrimp_layers_around(&d, centre, 5, &l, pictures));
+    REFUSES(TERRIMP_E_NULL, counts, terrimp_layers_object(NULL, 1, 1, counts));
+    GIVES(TERRIMP_E_NULL, terrimp_layers_object(&box, 1, 1, NULL));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&box, 0, 1, counts));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&box, 1, 0.5f, counts));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&bad, 1, 1, counts));
+    REFUSES(TERRIMP_E_RANGE, counts, terrimp_layers_object(&box, 1e-6f, 1, counts));
+    REFUSES(TERRIMP_E_NOT_FINITE, counts, terrimp_layers_object(&box, not_finite(2), 1, counts));
+    box.max[0] = not_finite(1);
+    REFUSES(TERRIMP_E_NOT_FINITE, counts, terrimp_layers_object(&box, 1, 1, counts));
+}
+
 /* ---- bad input ---- */
+
+static void depth_meshes_refuse(void)
+{
+    static uint64_t scratch[4000];
+    terrimp_depth_mesh_desc good, bad;
+    terrimp_depth_mesh m, full;
+    terrimp_depth_vertex v = {0, 0, 0};
+    terrimp_layers none;
+    uint32_t mask[8] = {7, 3, 0, 0, 6, 7, 0, 1}, i;
+    float xyz[3];
+    size_t bytes;
+    memset(&good, 0, sizeof good);
+    good.opaque = good.visible = mask;
+    good.width = 3;
+    good.height = 4;
+    good.layers = 2;
+    memset(&full, 0, sizeof full);
+    full.vertices = depth_vertices;
+    full.indices = depth_indices;
+    full.sheets = depth_sheets;
+    full.texel_layers = depth_texels;
+    full.vertex_capacity = full.index_capacity = full.sheet_capacity = full.texel_capacity = 100;
+    bytes = terrimp_depth_mesh_scratch_bytes(&good);
+    CHECK(bytes > 0 && bytes <= sizeof scratch);
+    CHECK(terrimp_depth_mesh_scratch_bytes(NULL) == 0);
+    GIVES(TERRIMP_OK, terrimp_depth_mesh_make(&good, scratch, bytes, &full));
+    GIVES(TERRIMP_E_NULL, terrimp_depth_mesh_make(NULL, scratch, bytes, &full));
+    GIVES(TERRIMP_E_NULL, terrimp_depth_mesh_make(&good, NULL, bytes, &full));
+    GIVES(TERRIMP_E_NULL, terrimp_depth_mesh_make(&good, scratch, bytes, NULL));
+    GIVES(TERRIMP_E_ALIGN, terrimp_depth_mesh_make(&good, (char *)scratch + 4, bytes, &full));
+    GIVES(TERRIMP_E_MEMORY, terrimp_depth_mesh_make(&good, scratch, bytes - 8, &full));
+    for (i = 0; i < 4; i++) {
+        m = full;
+        if (i == 0)
+            m.vertices = NULL;
+        else if (i == 1)
+            m.indices = NULL;
+        else if (i == 2)
+            m.sheets = NULL;
+        else
+            m.texel_layers = NULL;
+        GIVES(TERRIMP_E_NULL, terrimp_depth_mesh_make(&good, scratch, bytes, &m));
+        m = full;
+        *(i == 0   ? &m.vertex_capacity
+          : i == 1 ? &m.index_capacity
+          : i == 2 ? &m.sheet_capacity
+                   : &m.texel_capacity) = 0;
+        GIVES(TERRIMP_E_CAPACITY, terrimp_depth_mesh_make(&good, scratch, bytes, &m));
+        CHECK(m.vertex_count == full.vertex_count && m.index_count == full.index_count &&
+              m.sheet_count == full.sheet_count);
+    }
+    for (i = 0; i < 8; i++) {
+        bad = good;
+        switch (i) {
+        case 0: bad.opaque = NULL; break;
+        case 1: bad.visible = NULL; break;
+        case 2: bad.width = 0; break;
+        case 3: bad.height = 16385; break;
+        case 4: bad.layers = 0; break;
+        case 5: bad.layers = 65536; break;
+        case 6: bad.tolerance = 0.5f; break;
+        default: bad.tolerance = not_finite((int)i); break;
+        }
+        CHECK(terrimp_depth_mesh_scratch_bytes(&bad) == 0);
+        GIVES(i < 2 ? TERRIMP_E_NULL : TERRIMP_E_RANGE,
+              terrimp_depth_mesh_make(&bad, scratch, bytes, &full));
+    }
+    memset(mask, 0, sizeof mask); /* nothing to be seen: no mesh */
+    GIVES(TERRIMP_OK, terrimp_depth_mesh_make(&good, scratch, sizeof scratch, &full));
+    CHECK(full.index_count == 0 && full.sheet_count == 0);
+    scene_begin(5);
+    none = scene.layers;
+    none.count = 0;
+    REFUSES(TERRIMP_E_NULL, xyz, terrimp_depth_points(NULL, &scene.picture, &v, 1, xyz));
+    REFUSES(TERRIMP_E_NULL, xyz, terrimp_depth_points(&scene.layers, NULL, &v, 1, xyz));
+    REFUSES(TERRIMP_E_NULL, xyz, terrimp_depth_points(&scene.layers, &scene.picture, NULL, 1, xyz));
+    GIVES(TERRIMP_E_NULL, terrimp_depth_points(&scene.layers, &scene.picture, &v, 1, NULL));
+    REFUSES(TERRIMP_E_RANGE, xyz, terrimp_depth_points(&none, &scene.picture, &v, 1, xyz));
+}
 
 static void recording_refuses(void)
 {
@@ -1011,12 +1468,6 @@ static void layer_masks_refuse(void)
             terrimp_cover(&d, (char *)scratch + 4, bytes, rects, 4, &count));
     REFUSES(TERRIMP_E_MEMORY, count, terrimp_cover(&d, scratch, bytes - 1, rects, 4, &count));
     REFUSES(TERRIMP_E_RANGE, count, terrimp_cover(&d, scratch, bytes, rects, 0, &count));
-    REFUSES(TERRIMP_E_RANGE, count,
-            terrimp_cover_grow(&d, 0, 0.8f, scratch, bytes, rects, 4, &count));
-    REFUSES(TERRIMP_E_RANGE, count,
-            terrimp_cover_grow(&d, 1, not_finite(0), scratch, bytes, rects, 4, &count));
-    REFUSES(TERRIMP_E_CAPACITY, count,
-            terrimp_cover_grow(&d, 1, 1.0f, scratch, bytes, rects, 4, &count));
     d.quad_cost = 1;
     REFUSES(TERRIMP_E_CAPACITY, count, terrimp_cover(&d, scratch, bytes, rects, 4, &count));
     for (i = 0; i < 4; i++) {
@@ -1084,7 +1535,13 @@ static void layers_tests(void)
     RUN(layers_show_no_gap_to_any_eye_of_the_cell);
     RUN(layers_of_pictures_with_depth_show_no_gap);
     RUN(corners_between_two_layers_are_closed);
+    RUN(depth_meshes_keep_to_their_layers_and_these_to_them);
+    RUN(vertices_of_depth_meshes_stand_on_their_layers);
+    RUN(layers_all_round_hold_the_world_beyond);
+    RUN(layers_of_objects_pass_each_other_by_a_texel);
+    RUN(layers_all_round_refuse);
     RUN(recording_refuses);
+    RUN(depth_meshes_refuse);
     RUN(layers_refuse);
     RUN(layer_masks_refuse);
     RUN(layer_quads_refuse);

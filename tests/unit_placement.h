@@ -218,11 +218,287 @@ static void placement_refuses(void)
     CHECK(run_placing(p, &out) == TERRIMP_OK && out.chosen == 0 && out.unsolved == out.problems);
 }
 
+/* ---- a prepared set for a terrain ---- */
+
+enum { PREPARE_CANDIDATES = 100000, PREPARE_GAINS = 2000000, PREPARE_VIEWS = 4096,
+       PREPARE_NODES = 400 };
+
+static terrimp_place_candidate prepare_candidates[PREPARE_CANDIDATES];
+static terrimp_place_picture prepare_pictures[PREPARE_CANDIDATES];
+static terrimp_place_gain prepare_gains[PREPARE_GAINS];
+static uint32_t prepare_parents[PREPARE_NODES];
+static float prepare_costs[PREPARE_VIEWS], prepare_left[PREPARE_VIEWS];
+static uint8_t prepare_shown[PREPARE_GAINS];
+
+/* Hills of 16 x 16 chunks, and eyes over the middle of them. */
+static void prepare_begin(land *l, terrimp_place_terrain_desc *d, terrimp_place_set *s)
+{
+    land_prepare(l, 257, 257, TERRIMP_FORMAT_F32, LAND_HILLS);
+    l->desc.chunk_quads = 16;
+    l->desc.field.spacing_x = l->desc.field.spacing_z = 20.0f;
+    land_build(l);
+    memset(d, 0, sizeof *d);
+    d->terrain = l->terrain;
+    d->eyes.min[0] = d->eyes.min[2] = 2400.0f;
+    d->eyes.max[0] = d->eyes.max[2] = 2720.0f;
+    d->eyes.min[1] = 250.0f;
+    d->eyes.max[1] = 260.0f;
+    d->cell_levels = 3;
+    d->directions = 12;
+    d->fov_rad = 1.0f;
+    d->pixel_factor = 300.0f;
+    d->max_angle_rad = 0.2f;
+    d->tolerance_px = 2.0f;
+    memset(s, 0, sizeof *s);
+    s->candidates = prepare_candidates;
+    s->pictures = prepare_pictures;
+    s->gains = prepare_gains;
+    s->parents = prepare_parents;
+    s->costs = prepare_costs;
+    s->candidate_capacity = PREPARE_CANDIDATES;
+    s->gain_capacity = PREPARE_GAINS;
+    s->cluster_capacity = PREPARE_NODES;
+    s->view_capacity = PREPARE_VIEWS;
+}
+
+static void prepare_run(const terrimp_place_terrain_desc *d, terrimp_place_set *s)
+{
+    size_t bytes = terrimp_place_terrain_scratch_bytes(d);
+    void *scratch = malloc(bytes);
+    CHECK(bytes > 0 && scratch);
+    CHECK(terrimp_place_terrain(d, scratch, bytes, s) == TERRIMP_OK);
+    free(scratch);
+}
+
+static void prepare_place(const terrimp_place_set *s, float budget, terrimp_placement *out)
+{
+    terrimp_place_desc p;
+    size_t bytes;
+    void *scratch;
+    memset(&p, 0, sizeof p);
+    p.candidates = s->candidates;
+    p.candidate_count = s->candidate_count;
+    p.gains = s->gains;
+    p.gain_count = s->gain_count;
+    p.parents = s->parents;
+    p.cluster_count = s->cluster_count;
+    p.costs = s->costs;
+    p.view_count = s->view_count;
+    p.budget = budget;
+    bytes = terrimp_place_scratch_bytes(&p);
+    scratch = malloc(bytes);
+    CHECK(scratch != NULL);
+    CHECK(terrimp_place(&p, scratch, bytes, prepare_shown, prepare_left, out) == TERRIMP_OK);
+    free(scratch);
+}
+
+/* Whether an eye sees one of 8 x 8 points of a box that is as wide as a direction's view allows. */
+static int prepare_eye_sees(const float eye[3], float direction, float fov, const terrimp_box *box)
+{
+    int i;
+    for (i = 0; i < 64; i++) {
+        float x = box->min[0] + (box->max[0] - box->min[0]) * (float)(i % 8) / 7.0f - eye[0];
+        float z = box->min[2] + (box->max[2] - box->min[2]) * (float)(i / 8) / 7.0f - eye[2];
+        if (fabsf(remainderf(atan2f(z, x) - direction, 6.2831853f)) <= 0.5f * fov)
+            return 1;
+    }
+    return 0;
+}
+
+/* What a frame costs: pictures that are shown in the view, ground as its cell draws it. */
+static float prepare_frame(const terrimp_place_terrain_desc *d, const uint8_t *shown,
+                           const uint8_t *whole, uint32_t node, const float eye[3], float direction)
+{
+    const terrimp_quadtree *tree = &d->terrain->tree;
+    terrimp_node n = terrimpi_tree_node(tree, node), children[4];
+    terrimp_mesh_info mesh;
+    terrimp_box box;
+    float cost = 0.0f;
+    uint32_t count;
+    CHECK(terrimp_terrain_get_box(d->terrain, node, &box) == TERRIMP_OK);
+    CHECK(terrimp_terrain_get_mesh(d->terrain, node, &mesh) == TERRIMP_OK);
+    if (!prepare_eye_sees(eye, direction, d->fov_rad, &box))
+        return 0.0f;
+    if (shown[node])
+        return 40.0f + (float)(mesh.index_count / 3);
+    if (whole[node])
+        return 40.0f + 2.0f * 16.0f * 16.0f;
+    for (count = terrimpi_tree_children(tree, &n, eye, children); count > 0; count--)
+        cost += prepare_frame(d, shown, whole, children[count - 1].number, eye, direction);
+    return cost;
+}
+
+/* Pictures serve their squares: what they show turns by no more than allowed. */
+static void check_prepared(const terrimp_place_terrain_desc *d, const terrimp_place_set *s)
+{
+    uint32_t i, k;
+    float size = (d->eyes.max[0] - d->eyes.min[0]) / 8.0f;
+    CHECK(s->view_count == 64 * 12 && s->cluster_count == 341);
+    for (i = 0; i < s->candidate_count; i += 7) {
+        const terrimp_place_picture *p = &s->pictures[i];
+        const terrimp_place_candidate *c = &s->candidates[i];
+        uint32_t side = 1u << p->level;
+        terrimp_box box;
+        CHECK(c->cluster == p->node && same_float(c->memory, (float)p->width * (float)p->height));
+        CHECK(terrimp_terrain_get_box(d->terrain, p->node, &box) == TERRIMP_OK);
+        for (k = 0; k < c->gain_count; k++) {
+            const terrimp_place_gain *g = &s->gains[c->first_gain + k];
+            uint32_t cell = g->view / 12;
+            CHECK(g->saved > 0.0f && g->view < s->view_count);
+            CHECK(cell % 8 / side == p->x && cell / 8 / side == p->z);
+        }
+        for (k = 0; k < 8; k++) {
+            float eye[3], angle;
+            int axis;
+            for (axis = 0; axis < 3; axis++)
+                eye[axis] = random_float(d->eyes.min[axis], d->eyes.max[axis]);
+            eye[0] = d->eyes.min[0] + size * (float)side * ((float)p->x + (float)(k & 1));
+            eye[2] = d->eyes.min[2] + size * (float)side * ((float)p->z + (float)(k >> 1 & 1));
+            CHECK(terrimp_view_angle(&box, p->eye, eye, &angle) == TERRIMP_OK);
+            CHECK(angle <= 0.2014f);
+        }
+    }
+}
+
+static void prepared_views_keep_within_their_budget(void)
+{
+    land l;
+    terrimp_place_terrain_desc d;
+    terrimp_place_set s;
+    terrimp_placement shared, single;
+    terrimpi_prepare p;
+    static uint8_t whole[PREPARE_NODES], below[PREPARE_NODES], shown[PREPARE_NODES];
+    float highest = 0.0f, budget;
+    uint32_t i, n, solved = 0, drawn = 0;
+    prepare_begin(&l, &d, &s);
+    prepare_run(&d, &s);
+    check_prepared(&d, &s);
+    for (i = 0; i < s.view_count; i++)
+        highest = fmaxf(highest, s.costs[i]);
+    budget = 0.6f * highest;
+    prepare_place(&s, budget, &shared);
+    CHECK(shared.problems > 100 && shared.unsolved < shared.problems / 10 && shared.chosen > 10);
+    memset(&p, 0, sizeof p);
+    p.desc = d;
+    p.cells = 8;
+    p.nodes = s.cluster_count;
+    p.whole = whole;
+    p.below = below;
+    for (n = 0; n < 1000; n++) {
+        float eye[3], direction = random_float(0.0f, 6.2831f), cost;
+        uint32_t x, z, view;
+        terrimp_box cell;
+        for (i = 0; i < 3; i++)
+            eye[i] = random_float(d.eyes.min[i], d.eyes.max[i]);
+        x = (uint32_t)((eye[0] - 2400.0f) / 40.0f);
+        z = (uint32_t)((eye[2] - 2400.0f) / 40.0f);
+        view = (z * 8 + x) * 12 + (uint32_t)(direction / 6.2831853f * 12.0f);
+        memset(shown, 0, sizeof shown);
+        for (i = 0; i < s.candidate_count; i++) {
+            const terrimp_place_candidate *c = &s.candidates[i];
+            const uint8_t *at = prepare_shown + c->first_gain;
+            uint32_t k;
+            for (k = 0; k < c->gain_count; k++)
+                if (at[k] && s.gains[c->first_gain + k].view == view)
+                    shown[c->cluster] = 1;
+        }
+        terrimpi_prepare_square(&p, 0, x, z, &cell);
+        terrimpi_prepare_ground(&p, &cell);
+        cost = prepare_frame(&d, shown, whole, s.cluster_count - 1, eye, direction);
+        CHECK(cost <= prepare_left[view] + 1.0f);
+        CHECK(cost <= budget + 1.0f || prepare_left[view] > budget);
+        solved += prepare_left[view] <= budget * 1.0001f;
+        drawn += cost > 0.5f * prepare_left[view];
+    }
+    CHECK(solved > 900 && drawn > 500);
+    for (i = 0, n = 0; i < s.candidate_count; i++) /* a set for each cell needs more */
+        if (s.pictures[i].level == 0)
+            s.candidates[n++] = s.candidates[i];
+    s.candidate_count = n;
+    prepare_place(&s, budget, &single);
+    CHECK(shared.memory < 0.5f * single.memory);
+    land_free(&l);
+}
+
+static void prepared_sets_refuse(void)
+{
+    land l;
+    terrimp_place_terrain_desc good, bad;
+    terrimp_place_set s, full;
+    size_t bytes;
+    void *scratch;
+    int i;
+    prepare_begin(&l, &good, &full);
+    good.cell_levels = 1;
+    bytes = terrimp_place_terrain_scratch_bytes(&good);
+    scratch = malloc(bytes);
+    CHECK(bytes > 0 && scratch);
+    CHECK(terrimp_place_terrain_scratch_bytes(NULL) == 0);
+    GIVES(TERRIMP_E_NULL, terrimp_place_terrain(NULL, scratch, bytes, &full));
+    GIVES(TERRIMP_E_NULL, terrimp_place_terrain(&good, NULL, bytes, &full));
+    GIVES(TERRIMP_E_NULL, terrimp_place_terrain(&good, scratch, bytes, NULL));
+    GIVES(TERRIMP_E_MEMORY, terrimp_place_terrain(&good, scratch, bytes - 1, &full));
+    GIVES(TERRIMP_E_ALIGN, terrimp_place_terrain(&good, (char *)scratch + 4, bytes, &full));
+    GIVES(TERRIMP_OK, terrimp_place_terrain(&good, scratch, bytes, &full));
+    for (i = 0; i < 5; i++) {
+        s = full;
+        if (i == 0)
+            s.candidates = NULL;
+        else if (i == 1)
+            s.pictures = NULL;
+        else if (i == 2)
+            s.gains = NULL;
+        else if (i == 3)
+            s.parents = NULL;
+        else
+            s.costs = NULL;
+        GIVES(TERRIMP_E_NULL, terrimp_place_terrain(&good, scratch, bytes, &s));
+    }
+    for (i = 0; i < 4; i++) {
+        s = full;
+        *(i == 0   ? &s.candidate_capacity
+          : i == 1 ? &s.gain_capacity
+          : i == 2 ? &s.cluster_capacity
+                   : &s.view_capacity) = 1;
+        GIVES(TERRIMP_E_CAPACITY, terrimp_place_terrain(&good, scratch, bytes, &s));
+        CHECK(s.candidate_count == full.candidate_count && s.gain_count == full.gain_count);
+    }
+    for (i = 0; i < 15; i++) {
+        terrimp_result wanted = i == 0 ? TERRIMP_E_NULL
+                                : i < 7 ? TERRIMP_E_NOT_FINITE
+                                        : TERRIMP_E_RANGE;
+        bad = good;
+        switch (i) {
+        case 0: bad.terrain = NULL; break;
+        case 1: bad.eyes.min[1] = not_finite(0); break;
+        case 2: bad.fov_rad = not_finite(1); break;
+        case 3: bad.pixel_factor = not_finite(0); break;
+        case 4: bad.tolerance_px = not_finite(0); break;
+        case 5: bad.texels_per_px = not_finite(2); break;
+        case 6: bad.draw_cost = not_finite(0); break;
+        case 7: bad.eyes.min[0] = bad.eyes.max[0] + 1.0f; break;
+        case 8: bad.cell_levels = 7; break;
+        case 9: bad.directions = 65; break;
+        case 10: bad.fov_rad = 0.0f; break;
+        case 11: bad.pixel_factor = 0.0f; break;
+        case 12: bad.tolerance_px = -1.0f; break;
+        case 13: bad.max_angle_rad = -1.0f; break;
+        default: bad.triangle_cost = -1.0f; break;
+        }
+        CHECK(terrimp_place_terrain_scratch_bytes(&bad) == 0);
+        GIVES(wanted, terrimp_place_terrain(&bad, scratch, bytes, &full));
+    }
+    free(scratch);
+    land_free(&l);
+}
+
 static void placement_tests(void)
 {
     RUN(placements_are_what_they_say);
     RUN(placements_take_little_more_memory_than_the_exact_answer);
     RUN(placement_refuses);
+    RUN(prepared_views_keep_within_their_budget);
+    RUN(prepared_sets_refuse);
 }
 
 #endif

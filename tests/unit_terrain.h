@@ -1111,6 +1111,55 @@ static void parts_of_buffers_are_those_of_the_whole(void)
     land_free(&l);
 }
 
+/* Whether a node has a sample, its border included. */
+static int node_has(const land *l, uint32_t node, uint32_t x, uint32_t z)
+{
+    uint32_t first[2], last[2];
+    land_span(l, node, first, last);
+    return x >= first[0] && x <= last[0] && z >= first[1] && z <= last[1];
+}
+
+/* One sample of an extreme value, such as a void that nobody marked, spoils the meshes of the nodes
+   that hold it and no other: these are as good as without it, but for the steps of borders, and for
+   what neighbours draw beside it. */
+static void one_wild_sample_spoils_only_its_own_nodes(void)
+{
+    static const float wild[] = {-999999.0f, -32768.0f, 1e6f};
+    int i;
+    for (i = 0; i < 3; i++) {
+        land tame, spoilt;
+        uint32_t node, others = 0, x = random_range(1, 95), z = random_range(1, 79), seed;
+        float step = 3.0f * (fabsf(wild[i]) + 250.0f) / 4194303.0f;
+        seed = check_state;
+        land_prepare(&tame, 97, 81, TERRIMP_FORMAT_F32, LAND_HILLS);
+        check_state = seed;
+        land_prepare(&spoilt, 97, 81, TERRIMP_FORMAT_F32, LAND_HILLS);
+        tame.desc.chunk_quads = spoilt.desc.chunk_quads = 8;
+        spoilt.samples[z * 97u + x] = wild[i];
+        if (land_build(&tame) && land_build(&spoilt))
+            for (node = 0; node < tame.info.node_count; node++) {
+                terrimp_mesh_info a, b;
+                uint32_t first[2], last[2], reach;
+                land_span(&tame, node, first, last);
+                reach = 8u * (last[0] - first[0]); /* borders stand over coarser ground beside */
+                if (node_has(&tame, node, x, z) ||
+                    (x + reach >= first[0] && x <= last[0] + reach &&
+                     (z == first[1] || z == last[1])) ||
+                    (z + reach >= first[1] && z <= last[1] + reach &&
+                     (x == first[0] || x == last[0])))
+                    continue;
+                CHECK(terrimp_terrain_get_mesh(tame.terrain, node, &a) == TERRIMP_OK);
+                CHECK(terrimp_terrain_get_mesh(spoilt.terrain, node, &b) == TERRIMP_OK);
+                CHECK(b.error <= a.error + 2.0f * step + 1e-3f);
+                CHECK(b.error_rms <= a.error_rms + 2.0f * step + 1e-3f);
+                others++;
+            }
+        CHECK(others > 100);
+        land_free(&tame);
+        land_free(&spoilt);
+    }
+}
+
 static void terrain_tests(void)
 {
     RUN(parts_of_buffers_are_those_of_the_whole);
@@ -1126,6 +1175,7 @@ static void terrain_tests(void)
     RUN(patterns_are_those_of_the_geomipmap);
     RUN(strips_cover_exactly_their_quads);
     RUN(parallax_bound_holds_for_every_sample_of_a_mesh);
+    RUN(one_wild_sample_spoils_only_its_own_nodes);
 }
 
 #endif

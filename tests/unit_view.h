@@ -1236,7 +1236,7 @@ static void flights_with_the_band_inside_boxes_keep_every_law(void)
 static void flights_with_random_settings_keep_every_law(void)
 {
     uint32_t pieces = 0, high = 0, waiting = 0, run;
-    for (run = 0; run < check_rounds(16, 96); run++) {
+    for (run = 0; run < check_rounds(32, 96); run++) {
         terrimp_view_desc d;
         land l;
         random_land(&l);
@@ -1640,11 +1640,14 @@ static void dear_captures_leave_only_ground(void)
 }
 
 /* With its default costs AUTO is not much dearer than the cheaper one of ground alone and
-   impostors alone, by its own currency, over flights that rest now and then. */
-static double flight_cost(const land *l, int mode, flight *f)
+   impostors alone, by its own currency, over flights that rest now and then. The eye moves by
+   `step`, or with a step below 0 jumps; after each `lose` frames all pictures are lost. What is
+   learnt at the start, in the first `begin` frames, does not count. */
+static double flight_cost(const land *l, int mode, float step, int lose, int begin, flight *f)
 {
     terrimp_view_desc d;
     terrimp_camera camera = camera_beside(l);
+    float side = l->info.box.max[0] - l->info.box.min[0], start = camera.eye[0];
     double cost = 0.0;
     int i;
     memset(&d, 0, sizeof d);
@@ -1652,10 +1655,16 @@ static double flight_cost(const land *l, int mode, flight *f)
     d.ground_tolerance_px = 0.3f;
     if (!flight_open(f, l, &d))
         return 0.0;
-    for (i = 0; i < 120; i++) {
-        camera.eye[0] += 0.05f;
+    check_state = 77u;
+    for (i = 0; i < 120 + begin; i++) {
+        camera.eye[0] = step < 0.0f ? start + random_float(0.0f, side)
+                                    : start + fmodf((float)(i + 1) * step, side);
+        if (lose && i % lose == 0)
+            CHECK(terrimp_view_invalidate(f->view) == TERRIMP_OK);
         flight_update(f, &camera);
         flight_render(f);
+        if (i < begin)
+            continue;
         cost += (double)f->stats.draws * 40.0 + (double)f->stats.triangles;
         cost += (double)f->stats.captures * 1400.0 + (double)f->stats.captured_triangles +
                 0.25 * (double)f->stats.captured_texels;
@@ -1669,13 +1678,59 @@ static void auto_is_not_dearer_than_ground_or_impostors_alone(void)
     land l;
     make_hills(&l);
     if (land_build(&l)) {
-        double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, &flight_room);
-        double impostors = flight_cost(&l, TERRIMP_MODE_IMPOSTOR, &flight_room);
-        double both = flight_cost(&l, TERRIMP_MODE_AUTO, &flight_room);
+        double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, 0.05f, 0, 0, &flight_room);
+        double impostors = flight_cost(&l, TERRIMP_MODE_IMPOSTOR, 0.05f, 0, 0, &flight_room);
+        double both = flight_cost(&l, TERRIMP_MODE_AUTO, 0.05f, 0, 0, &flight_room);
         CHECK(both < 1.1 * fmin(ground, impostors));
         CHECK(flight_room.total_impostors > 100);
     }
     land_free(&l);
+}
+
+/* Nor is it when pictures do not last: at any speed, with jumps, and however often all are lost. */
+static void auto_is_not_dearer_than_ground_where_pictures_do_not_last(void)
+{
+    static const float steps[] = {0.0f, 0.5f, 3.0f, 9.0f, 17.0f, 30.0f, -1.0f};
+    static const int losses[] = {0, 1, 3, 20};
+    uint32_t i, k;
+    land l;
+    make_hills(&l);
+    if (land_build(&l))
+        for (i = 0; i < sizeof steps / sizeof *steps; i++)
+            for (k = 0; k < 4u; k++) {
+                double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, steps[i], losses[k], 80,
+                                            &flight_room);
+                double both = flight_cost(&l, TERRIMP_MODE_AUTO, steps[i], losses[k], 80,
+                                          &flight_room);
+                CHECK(both <= 1.1 * ground);
+            }
+    land_free(&l);
+}
+
+/* Speed counts over the way that a picture lasts for. An eye that only moves to and fro within that
+   way lets it last; a steady one has its own speed; a jump is none. */
+static void an_eye_that_bobs_is_not_fast(void)
+{
+    uint32_t run, i;
+    for (run = 0; run < 200u; run++) {
+        float reach = random_magnitude(0.1f, 100.0f), swing = reach * random_float(0.01f, 0.45f);
+        float often = random_float(0.1f, 1.5f), steady = reach * random_magnitude(0.002f, 0.5f);
+        float at = 0.0f, step[3] = {0.0f, 0.0f, 0.0f};
+        terrimpi_motion bob, cruise;
+        terrimpi_motion_begin(&bob);
+        terrimpi_motion_begin(&cruise);
+        for (i = 0; i < 1500u; i++) {
+            float next = swing * sinf((float)i * often);
+            step[0] = next - at;
+            terrimpi_motion_step(&bob, step, 1e3f * reach);
+            CHECK(i < 300u || terrimpi_motion_speed(&bob, reach) * 100.0f < reach);
+            at = next;
+            step[0] = i == 200u ? 2e3f * reach : steady;
+            terrimpi_motion_step(&cruise, step, 1e3f * reach);
+            CHECK(i < 1u || (i >= 200u && i < 1400u) ||
+                  fabsf(terrimpi_motion_speed(&cruise, reach) - steady) < 0.02f * steady);
+        }
+    }
 }
 
 /* ---- the ground ---- */
@@ -2080,6 +2135,8 @@ static void view_tests(void)
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);
     RUN(dear_captures_leave_only_ground);
     RUN(auto_is_not_dearer_than_ground_or_impostors_alone);
+    RUN(auto_is_not_dearer_than_ground_where_pictures_do_not_last);
+    RUN(an_eye_that_bobs_is_not_fast);
     RUN(geomip_draws_the_selection);
     RUN(scarce_ground_is_coarser_ground);
     RUN(the_frame_before_stays_when_there_are_too_many_chunks);

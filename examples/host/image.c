@@ -1,9 +1,25 @@
 #include "image.h"
 
 #include <math.h>
-#include <png.h>
 #include <stdlib.h>
 #include <string.h>
+
+#ifdef HOST_NO_PNG
+
+const char *image_write_png(const char *path, const uint8_t *rgb, int width, int height)
+{
+    (void)path, (void)rgb, (void)width, (void)height;
+    return "PNG files cannot be written here";
+}
+
+const char *image_read_png(const char *path, uint8_t **rgb, int *width, int *height)
+{
+    (void)path, (void)rgb, (void)width, (void)height;
+    return "PNG files cannot be read here";
+}
+
+#else
+#include <png.h>
 
 /* libpng's message dies with its png_image, so the last one is kept here. */
 static char png_trouble[64 + 8];
@@ -29,19 +45,6 @@ const char *image_write_png(const char *path, const uint8_t *rgb, int width, int
     return NULL;
 }
 
-const char *image_write_beside(const char *program, const char *name, const uint8_t *rgb,
-                               int width, int height)
-{
-    char path[1024];
-    const char *slash = strrchr(program, '/');
-    size_t length = slash ? (size_t)(slash - program) + 1 : 0;
-    if (length + strlen(name) >= sizeof path)
-        return "the program's path is too long";
-    memcpy(path, program, length);
-    strcpy(path + length, name);
-    return image_write_png(path, rgb, width, height);
-}
-
 const char *image_read_png(const char *path, uint8_t **rgb, int *width, int *height)
 {
     png_image png;
@@ -64,6 +67,21 @@ const char *image_read_png(const char *path, uint8_t **rgb, int *width, int *hei
     *width = (int)png.width;
     *height = (int)png.height;
     return NULL;
+}
+
+#endif
+
+const char *image_write_beside(const char *program, const char *name, const uint8_t *rgb,
+                               int width, int height)
+{
+    char path[1024];
+    const char *slash = strrchr(program, '/');
+    size_t length = slash ? (size_t)(slash - program) + 1 : 0;
+    if (length + strlen(name) >= sizeof path)
+        return "the program's path is too long";
+    memcpy(path, program, length);
+    strcpy(path + length, name);
+    return image_write_png(path, rgb, width, height);
 }
 
 static int is_colour(const uint8_t *pixel, const uint8_t *colour)
