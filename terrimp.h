@@ -383,15 +383,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 /* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
 typedef struct terrimp_camera {
-    float eye[3];           /* [wu] */
+    float eye[3];           /* [wu] [Limits: -1e18..1e18] */
     float forward[3];       /* (required) viewing direction, any length > 0 */
     float up[3];            /* [Default 0,0,0 -> 0,1,0]; along forward: another one is chosen */
     float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
     uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
     uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
     float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near].
-                               What is drawn may need more: see terrimp_stats.z_far */
+    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
+                               ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
 } terrimp_camera;
 
@@ -458,8 +458,8 @@ typedef struct terrimp_capture {
    box's eight corners, as tightly as the axis allows.
 
    box        any extents >= 0, flat ones too
-   Errors     E_RANGE when a minimum exceeds its maximum; E_INSIDE when the eye is in the box;
-              E_BEHIND when a corner is not in front of the eye
+   Errors     E_RANGE when a minimum exceeds its maximum, or for 1e18 and more; E_INSIDE when the
+              eye is in the box; E_BEHIND when a corner is not in front of the eye
    Source     Hess 2010, section 3.2. Straight above or below a box, where his up vector (the y
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -712,8 +712,9 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
 TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const uint32_t slot[2],
                                                uint32_t margin);
 
-/* The matrix that takes a world position (x, y, z, 1) to (s, t, r, q): the capture's picture lies
-   in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth in 0..1.
+/* The matrix that takes (x, y, z, 1), a position relative to the capture's eye, to (s, t, r, q):
+   the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
+   in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
@@ -726,9 +727,10 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* Applies a texture matrix on the CPU, for hosts without shaders or texture matrices: from
-   xyz [count][3], world positions, to stq [count][3], which may not overlap it. */
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq);
+   xyz [count][3], world positions, and the capture's eye, to stq [count][3], which may not overlap
+   xyz. */
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
@@ -1264,10 +1266,10 @@ typedef struct terrimp_capture_command {
 } terrimp_capture_command;
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
-   texture matrix times (x, y, z, 1), the colour is that of the atlas at (s / q, t / q), bilinear,
-   divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in
-   two parts both are drawn, each only where r / q is within 0..1: by a discard, or by the clip
-   planes r >= 0 and q - r >= 0, which are rows of the matrix. */
+   texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
+   bilinear, divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a
+   picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
+   the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
     uint32_t node;
     uint32_t level;
@@ -1278,6 +1280,7 @@ typedef struct terrimp_impostor_command {
     uint32_t index_count;
     float alpha;          /* 1; or, in the fade band, the share of the pixels that it is drawn on,
                              by a dither pattern: its ground shows on the others */
+    float eye[3];         /* that the picture was made from: positions are relative to it */
     float texture_matrix[16];
 } terrimp_impostor_command;
 
@@ -1349,6 +1352,14 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view);
+
+/* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
+
+   desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
+              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0
+   Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
+              changes */
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
 
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
@@ -1516,6 +1527,7 @@ typedef struct terrimp_sorted {
     } stack[TERRIMP_SORTED_LEVELS + 1];
     int32_t at[2];               /* the present square */
     uint32_t level;
+    terrimp_sorted_int away;     /* squared, of its closest point */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1546,7 +1558,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 
    squares    [capacity] out
    Returns    how many; less than capacity, or 0, at the end of the frame
-   Cost       less than 100 cycles a triangle, whatever came before
+   Cost       110 to 150 cycles a triangle of a processor of 2020, whatever came before
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
@@ -2424,11 +2436,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-static int terrimpi_finite(float value)
+/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
+   since compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value)
 {
-    float rounded = terrimpi_float(value);
-    return rounded - rounded == 0.0f;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x7fffffffu;
 }
+
+static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
 {
@@ -2751,7 +2769,7 @@ static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t
 
 static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
 {
-    return field->has_no_data && (raw == field->no_data || raw != raw);
+    return field->has_no_data && (raw == field->no_data || terrimpi_bits(raw) > TERRIMPI_INFINITE);
 }
 
 static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
@@ -3343,6 +3361,16 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
+#define TERRIMPI_FARTHEST 1e18f /* of coordinates: products of two distances stay finite */
+
+/* Whether two vectors are of unit length and at a right angle, but for rounding. */
+static int terrimpi_orthonormal(const float a[3], const float b[3])
+{
+    return terrimpi_abs(terrimpi_dot(a, a) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(b, b) - 1.0f) < 4e-6f &&
+           terrimpi_abs(terrimpi_dot(a, b)) < 2e-6f;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
 {
     terrimp_camera c;
@@ -3358,8 +3386,12 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
                     !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || !terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
-    terrimpi_basis(c.forward, c.up, right);
+                    c.z_far <= c.z_near || c.z_far > TERRIMPI_FARTHEST ||
+                    terrimpi_largest(c.eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
+    if (!terrimpi_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
+        TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
+        terrimpi_basis(c.forward, c.up, right);
+    }
     *out = c;
     return TERRIMP_OK;
 }
@@ -3557,7 +3589,8 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
-                    box->min[2] > box->max[2], TERRIMP_E_RANGE);
+                    box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_FARTHEST ||
+                    terrimp_box_farthest(box, eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
@@ -4679,6 +4712,7 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     float scale[3], offset[3]; /* clip space to atlas */
     int row, column;
     terrimp_capture_matrices(capture, 0, view, projection);
+    view[12] = view[13] = view[14] = 0.0f; /* relative to the eye */
     scale[0] = 0.5f * (float)slot->width / (float)atlas_width;
     scale[1] = 0.5f * (float)slot->height / (float)atlas_height;
     scale[2] = 0.5f;
@@ -4712,18 +4746,21 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float *xyz,
-                                                       size_t count, float *stq)
+TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
+                                                       const float *xyz, size_t count, float *stq)
 {
     static const int rows[3] = {0, 1, 3};
     size_t i;
     int k;
-    TERRIMPI_REFUSE(!matrix || (count && (!xyz || !stq)), TERRIMP_E_NULL);
-    for (i = 0; i < count; i++, xyz += 3, stq += 3)
+    TERRIMPI_REFUSE(!matrix || !eye || (count && (!xyz || !stq)), TERRIMP_E_NULL);
+    for (i = 0; i < count; i++, xyz += 3, stq += 3) {
+        float to[3];
+        terrimpi_sub(xyz, eye, to);
         for (k = 0; k < 3; k++) {
             const float *m = matrix + rows[k];
-            stq[k] = m[0] * xyz[0] + m[4] * xyz[1] + m[8] * xyz[2] + m[12];
+            stq[k] = m[0] * to[0] + m[4] * to[1] + m[8] * to[2] + m[12];
         }
+    }
     return TERRIMP_OK;
 }
 
@@ -7559,6 +7596,7 @@ typedef struct terrimpi_frame {
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
     terrimp_camera camera;         /* resolved */
+    int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
     float pixel_factor;
     terrimpi_motion motion;
@@ -7676,6 +7714,7 @@ typedef struct terrimpi_picture {
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
     uint32_t draw;            /* ... and its place on the list of that frame */
+    uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
     uint32_t layer_count;     /* 0: not made yet */
     uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
@@ -7695,6 +7734,7 @@ typedef struct terrimpi_cache {
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
     uint32_t frame;              /* what is seen in it is not given up */
+    uint32_t freed;              /* the last frame that gave room back */
     uint32_t failures, evictions; /* so far */
 } terrimpi_cache;
 
@@ -7717,6 +7757,8 @@ static terrimpi_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t n
 static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, uint32_t count)
 {
     uint32_t i;
+    if (count > 0)
+        c->freed = c->frame;
     for (i = 0; i < count; i++)
         terrimp_live_atlas_free(&c->atlases[slots[i].atlas], slots[i].slot);
 }
@@ -7793,12 +7835,23 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2], terrim
 static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slots,
                                 uint32_t count)
 {
-    uint32_t i;
+    uint32_t i, freed = c->freed;
     for (i = 0; i < count; i++)
         if (!terrimpi_cache_slot(c, size, &slots[i])) {
             terrimpi_cache_free(c, slots, i);
+            c->freed = freed; /* there is no more room than before */
             return 0;
         }
+    return 1;
+}
+
+/* Whether there is no room for a picture since there was none a frame before, and nothing has
+   changed. */
+static int terrimpi_cache_refuses(const terrimpi_cache *c, int still, terrimpi_picture *picture)
+{
+    if (!still || picture->refused + 1u != c->frame || c->freed >= picture->refused)
+        return 0;
+    picture->refused = c->frame;
     return 1;
 }
 
@@ -8027,7 +8080,8 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
 
 static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 {
-    return f->pixel_factor * f->desc->texels_per_px / terrimpi_max(closest, 1e-6f);
+    return f->pixel_factor * f->desc->texels_per_px /
+           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
@@ -8261,6 +8315,14 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     return terrimpi_view_layout(&v, NULL);
 }
 
+static void terrimpi_view_set_ground(const terrimp_view_desc *d, terrimp_geomip_view *ground)
+{
+    ground->rule = d->ground_rule;
+    ground->morph_ratio = d->morph_ratio;
+    ground->tolerance_px = d->ground_tolerance_px;
+    ground->hysteresis = TERRIMPI_VIEW_HYSTERESIS;
+}
+
 TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              const terrimp_view_desc *desc, void *memory,
                                              size_t bytes, terrimp_view **view)
@@ -8276,17 +8338,35 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_view_layout(&v, (unsigned char *)memory);
-    v.ground.rule = v.desc.ground_rule;
-    v.ground.morph_ratio = v.desc.morph_ratio;
-    v.ground.tolerance_px = v.desc.ground_tolerance_px;
-    v.ground.hysteresis = TERRIMPI_VIEW_HYSTERESIS;
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
+    terrimpi_view_set_ground(&v.desc, &v.ground);
     v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
+}
+
+TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc)
+{
+    terrimp_view_desc d;
+    const terrimp_view_desc *has;
+    TERRIMPI_REFUSE(!view || !desc, TERRIMP_E_NULL);
+    has = &view->desc;
+    d = *desc;
+    TERRIMPI_DEFAULT(d.atlas_size, has->atlas_size);
+    TERRIMPI_DEFAULT(d.atlas_count, has->atlas_count);
+    TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
+    TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
+    TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
+    TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
+                    d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
+                    d.max_captures != has->max_captures, TERRIMP_E_RANGE);
+    view->desc = d;
+    terrimpi_view_set_ground(&view->desc, &view->ground);
+    return TERRIMP_OK;
 }
 
 /* ---- captures that are not made ---- */
@@ -8685,6 +8765,7 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
+    memcpy(command.eye, picture->eye, sizeof command.eye);
     picture->drawn_count++;
     for (layer = 0; layer < picture->layer_count; layer++) {
         command.part = layer;
@@ -8818,6 +8899,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
     terrimp_mesh_info mesh;
     memset(job, 0, sizeof *job);
+    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
+    if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
+        return 0;
     plan->node = c->node;
     plan->layer_count = 1;
     terrimpi_node_box(f->terrain, &c->node, &plan->box);
@@ -8828,7 +8912,6 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
         return 0;
-    job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
@@ -8842,8 +8925,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
-    if (!terrimpi_job_slots(&v->cache, size, job))
+    if (!terrimpi_job_slots(&v->cache, size, job)) {
+        job->picture->refused = f->number;
         return 0;
+    }
     size[0] = terrimpi_cache_rect(&v->cache, &job->slots[0]).width;
     size[1] = terrimpi_cache_rect(&v->cache, &job->slots[0]).height;
     terrimpi_capture_spread(f->terrain, plan, size, texels);
@@ -9141,6 +9226,7 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     float step[3];
     uint32_t i;
     f.number++;
+    f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
@@ -9650,13 +9736,15 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
-/* Which sides of a square are split, for its neighbours are: bits as in the patterns of nodes. */
-static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s, const int32_t at[2],
-                                        uint32_t level)
+/* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
+   nodes. None is when even the neighbour that is closest, by a side, is not. */
+static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
+    const int32_t *at = s->at;
+    uint32_t level = s->level;
     int32_t size = 1 << level;
     terrimp_sorted_int x, z, split = s->split[level] - s->rise;
-    if (level == 0)
+    if (level == 0 || s->away > s->whole[level])
         return 0;
     x = terrimpi_sorted_away(s, 0, at[0], size);
     z = terrimpi_sorted_away(s, 1, at[1], size);
@@ -9696,8 +9784,9 @@ static int terrimpi_sorted_visit(terrimp_sorted *s, const int32_t at[2], uint32_
     s->at[0] = at[0];
     s->at[1] = at[1];
     s->level = level;
-    if (!(terrimpi_sorted_away(s, 0, at[0], 1 << level) +
-          terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise < s->split[level]))
+    s->away = terrimpi_sorted_away(s, 0, at[0], 1 << level) +
+              terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise;
+    if (s->away >= s->split[level])
         return 1;
     s->depth++;
     s->stack[s->depth].at[0] = at[0];
@@ -9998,13 +10087,12 @@ static terrimp_sorted_height terrimpi_sorted_blend(const terrimp_sorted *s, int3
 #endif
 }
 
-/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. */
+/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. away:
+   the square of its distance. */
 static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *out, int32_t x,
-                                int32_t z, uint32_t level)
+                                int32_t z, uint32_t level, terrimp_sorted_int away)
 {
     terrimp_sorted_vertex *v = &out->vertices[out->vertex_count++];
-    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0] + x, 0) +
-                              terrimpi_sorted_away(s, 1, s->corner[1] + z, 0) + s->rise;
     terrimp_sorted_height height;
     v->x = s->page.x * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 0, x);
     v->z = s->page.z * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 1, z);
@@ -10104,22 +10192,31 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
 /* Writes the present square. */
 static void terrimpi_sorted_emit(const terrimp_sorted *s, terrimp_sorted_square *out)
 {
-    uint32_t pattern = terrimpi_sorted_pattern(s, s->at, s->level);
+    uint32_t pattern = terrimpi_sorted_pattern(s);
     int32_t x = s->at[0] - s->corner[0], z = s->at[1] - s->corner[1], size = 1 << s->level;
     int32_t half = size / 2;
+    terrimp_sorted_int away_x[2], away_z[2];
     int i, middle[4] = { 0, 0, 0, 0 };
     out->page_x = s->page.x;
     out->page_z = s->page.z;
     out->level = (uint8_t)s->level;
     out->texture_level = (uint8_t)s->page.texture_level;
     out->vertex_count = 0;
+    for (i = 0; i < 2; i++) {
+        away_x[i] = terrimpi_sorted_away(s, 0, s->at[0] + i * size, 0);
+        away_z[i] = terrimpi_sorted_away(s, 1, s->at[1] + i * size, 0) + s->rise;
+    }
     for (i = 0; i < 4; i++)
-        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level);
+        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level,
+                            away_x[i & 1] + away_z[i >> 1]);
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
+            int32_t along_x = i < 2 ? half : (i & 1) * size;
+            int32_t along_z = i < 2 ? (i & 1) * size : half;
             middle[i] = out->vertex_count;
-            terrimpi_sorted_put(s, out, x + (i < 2 ? half : (i & 1) * size),
-                                z + (i < 2 ? (i & 1) * size : half), s->level - 1u);
+            terrimpi_sorted_put(s, out, x + along_x, z + along_z, s->level - 1u,
+                                terrimpi_sorted_away(s, 0, s->at[0] + along_x, 0) + s->rise +
+                                terrimpi_sorted_away(s, 1, s->at[1] + along_z, 0));
         }
     terrimpi_sorted_triangles(s, out, middle);
 }
@@ -10207,7 +10304,7 @@ static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
     terrimpi_sorted_set_scale(s, scale);
     terrimpi_sorted_restart(s);
     while (terrimpi_sorted_step(s, 1))
-        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s, s->at, s->level));
+        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
     terrimpi_sorted_restart(s);
     return count;
 }

@@ -114,14 +114,15 @@ Frame record(terrimp_view *view, const terrimp_camera &camera)
    texture matrix. Pictures hold colours times alpha, hence the division; of a picture in two parts
    each shows only what lies within its own depth. What fades in shows on the pixels whose
    threshold lies below its alpha. */
+const float world_origin[3] = {};
 const char vertex_source[] =
     "#version 330 core\n"
     "in vec3 position;\n"
     "uniform mat4 view, projection, texture_matrix;\n"
-    "uniform vec3 eye;\n"
+    "uniform vec3 eye, picture_eye;\n"
     "out vec4 strq;\n"
     "void main() {\n"
-    "    strq = texture_matrix * vec4(position, 1.0);\n"
+    "    strq = texture_matrix * vec4(position - picture_eye, 1.0);\n"
     "    gl_Position = projection * vec4(mat3(view) * (position - eye), 1.0);\n"
     "}\n";
 const char fragment_source[] =
@@ -169,7 +170,8 @@ private:
     void turn_to_screen(const terrimp_camera &camera, float z_far);
     void begin_capture(const terrimp_capture_command &c);
     void draw_range(GLuint array, uint32_t base_vertex, uint32_t first_index, uint32_t index_count,
-                    GLuint texture, const float *texture_matrix, float alpha);
+                    GLuint texture, const float *texture_matrix, const float *picture_eye,
+                    float alpha);
     GLint uniform(const char *name) const { return glGetUniformLocation(program_, name); }
 
     const terrimp_terrain *terrain_;
@@ -289,11 +291,12 @@ void Renderer::turn_to_screen(const terrimp_camera &camera, float z_far)
 
 void Renderer::draw_range(GLuint array, uint32_t base_vertex, uint32_t first_index,
                           uint32_t index_count, GLuint texture, const float *texture_matrix,
-                          float alpha)
+                          const float *picture_eye, float alpha)
 {
     glBindVertexArray(array);
     glBindTexture(GL_TEXTURE_2D, texture);
     glUniformMatrix4fv(uniform("texture_matrix"), 1, GL_FALSE, texture_matrix);
+    glUniform3fv(uniform("picture_eye"), 1, picture_eye);
     glUniform1f(uniform("alpha"), alpha);
     glDrawElementsBaseVertex(GL_TRIANGLES, GLsizei(index_count), GL_UNSIGNED_SHORT,
                              reinterpret_cast<const void *>(size_t(first_index) * 2),
@@ -317,13 +320,13 @@ std::vector<uint8_t> Renderer::draw(const Frame &frame)
         glUniform1i(uniform("part"), c.kind == Command::impostor && c.mesh.part_count > 1);
         if (c.kind == Command::impostor)
             draw_range(meshes_, c.mesh.base_vertex, c.mesh.first_index, c.mesh.index_count,
-                       atlas_, c.mesh.texture_matrix, c.mesh.alpha);
+                       atlas_, c.mesh.texture_matrix, c.mesh.eye, c.mesh.alpha);
         else if (c.kind == Command::floor)
             draw_range(meshes_, c.below.base_vertex, c.below.first_index, c.below.index_count,
-                       lightmap_, lightmap_matrix_, 1.0f);
+                       lightmap_, lightmap_matrix_, world_origin, 1.0f);
         else
             draw_range(vertices_of(c.node.node), 0, c.node.first_index, c.node.index_count,
-                       lightmap_, lightmap_matrix_, 1.0f);
+                       lightmap_, lightmap_matrix_, world_origin, 1.0f);
     }
     turn_to_screen(frame.camera, frame.stats.z_far); // also when there is nothing to draw
     context_read(&context_, rgb.data());

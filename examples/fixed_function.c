@@ -127,14 +127,17 @@ static void push_world(const host *h)
     glTranslatef(-h->eye[0], -h->eye[1], -h->eye[2]);
 }
 
+static const float origin[3];
+
 /* For machines without a texture matrix. */
-static void make_texture_coordinates(host *h, const float matrix[16], const float *xyz,
-                                     const uint16_t *indices, uint32_t index_count)
+static void make_texture_coordinates(host *h, const float matrix[16], const float eye[3],
+                                     const float *xyz, const uint16_t *indices,
+                                     uint32_t index_count)
 {
     uint32_t i, count = 0;
     for (i = 0; i < index_count; i++)
         count = indices[i] >= count ? indices[i] + 1u : count;
-    terrimp_texture_coordinates(matrix, xyz, count, h->stq);
+    terrimp_texture_coordinates(matrix, eye, xyz, count, h->stq);
     for (i = 0; i < count; i++) {
         h->strq[i * 4] = h->stq[i * 3];
         h->strq[i * 4 + 1] = h->stq[i * 3 + 1];
@@ -143,8 +146,9 @@ static void make_texture_coordinates(host *h, const float matrix[16], const floa
     glTexCoordPointer(4, GL_FLOAT, 0, h->strq);
 }
 
-static void draw(host *h, GLuint texture, const float matrix[16], const float *xyz,
-                 const uint16_t *indices, uint32_t index_count)
+/* The texture matrix takes positions relative to an eye; that of the lightmap, to the origin. */
+static void draw(host *h, GLuint texture, const float matrix[16], const float eye[3],
+                 const float *xyz, const uint16_t *indices, uint32_t index_count)
 {
     turn_to_screen(h);
     glBindTexture(GL_TEXTURE_2D, texture);
@@ -152,18 +156,19 @@ static void draw(host *h, GLuint texture, const float matrix[16], const float *x
     glTexCoordPointer(3, GL_FLOAT, 0, xyz);
     glMatrixMode(GL_TEXTURE);
     glLoadMatrixf(matrix);
+    glTranslatef(-eye[0], -eye[1], -eye[2]);
     if (h->without_texture_matrix) {
         glLoadIdentity();
-        make_texture_coordinates(h, matrix, xyz, indices, index_count);
+        make_texture_coordinates(h, matrix, eye, xyz, indices, index_count);
     }
     push_world(h);
     glDrawElements(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_SHORT, indices);
     glPopMatrix();
 }
 
-/* Keeps to r / q within 0..1: r >= 0 and q - r >= 0 are planes in the world. OpenGL takes them
-   through the modelview matrix of that moment. */
-static void clip_to_picture(const host *h, const float m[16])
+/* Keeps to r / q within 0..1: r >= 0 and q - r >= 0 are planes, relative to the picture's eye.
+   OpenGL takes them through the modelview matrix of that moment. */
+static void clip_to_picture(const host *h, const float m[16], const float eye[3])
 {
     GLdouble planes[2][4];
     int i;
@@ -172,6 +177,7 @@ static void clip_to_picture(const host *h, const float m[16])
         planes[1][i] = (GLdouble)m[i * 4 + 3] - (GLdouble)m[i * 4 + 2];
     }
     push_world(h);
+    glTranslatef(eye[0], eye[1], eye[2]);
     for (i = 0; i < 2; i++) {
         glClipPlane(GL_CLIP_PLANE0 + (GLenum)i, planes[i]);
         glEnable(GL_CLIP_PLANE0 + (GLenum)i);
@@ -200,10 +206,10 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     host *h = (host *)user;
     turn_to_screen(h);
     if (c->part_count > 1)
-        clip_to_picture(h, c->texture_matrix);
+        clip_to_picture(h, c->texture_matrix, c->eye);
     glEnable(GL_ALPHA_TEST);
     begin_share(c->alpha);
-    draw(h, h->atlas, c->texture_matrix, h->mesh_xyz + (size_t)c->base_vertex * 3,
+    draw(h, h->atlas, c->texture_matrix, c->eye, h->mesh_xyz + (size_t)c->base_vertex * 3,
          h->mesh_indices + c->first_index, c->index_count);
     glDisable(GL_POLYGON_STIPPLE);
     glDisable(GL_ALPHA_TEST);
@@ -214,7 +220,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
 static void draw_floor(void *user, const terrimp_floor_command *c)
 {
     host *h = (host *)user;
-    draw(h, h->lightmap, h->lightmap_matrix, h->mesh_xyz + (size_t)c->base_vertex * 3,
+    draw(h, h->lightmap, h->lightmap_matrix, origin, h->mesh_xyz + (size_t)c->base_vertex * 3,
          h->mesh_indices + c->first_index, c->index_count);
 }
 
@@ -223,7 +229,7 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
 {
     host *h = (host *)user;
     terrimp_terrain_fill_ground(h->terrain, c->node, h->ground_xyz, GRID * 3);
-    draw(h, h->lightmap, h->lightmap_matrix, h->ground_xyz, h->indices + c->first_index,
+    draw(h, h->lightmap, h->lightmap_matrix, origin, h->ground_xyz, h->indices + c->first_index,
          c->index_count);
 }
 

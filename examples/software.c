@@ -83,6 +83,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     raster_style style = { 0 };
     style.texture = &h->atlas_texture;
     style.texture_matrix = c->texture_matrix;
+    memcpy(style.picture_eye, c->eye, sizeof style.picture_eye);
     style.share = (int)(c->alpha * RASTER_ALL + 0.5f);
     style.within_depth = c->part_count > 1;
     draw_mesh(h, c->node, &style, c->index_count);

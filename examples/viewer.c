@@ -64,7 +64,8 @@ typedef struct viewer {
     float divider, sun_degrees, tolerance;
     int mode;
     int lines, levels, atlas, split, paused, with_sea, with_houses, with_trees, figures, help;
-    int shots, broken;              /* broken: nothing can be drawn but what is written */
+    int shots, exit_code;
+    int broken;                     /* nothing can be drawn but what is written */
 } viewer;
 
 static void say(viewer *v, const char *text)
@@ -163,6 +164,8 @@ static const char *show_built(viewer *v)
     s->view = make_view(v, s, v->mode, &s->desc);
     trouble = s->view ? open_graphics(v, s) : v->message;
     v->sun_degrees = -39.0f; /* that of the first lightmap */
+    if (t->dem.remark)
+        say(v, t->dem.remark);
     return trouble;
 }
 
@@ -198,18 +201,19 @@ static float go_on_building(viewer *v)
     job_stage stage = v->building ? job_poll(v->building, &done) : JOB_NONE;
     if (stage == JOB_DONE) {
         const char *trouble = show_built(v);
-        if (trouble) {
+        v->broken = trouble != NULL;
+        if (trouble)
             say(v, trouble);
-            v->scene.view = NULL;
-            v->broken = 1;
-        }
     } else if (stage == JOB_FAILED) {
         say(v, v->building->error);
+        if (!v->scene.job) { /* the first one, which the command line asked for */
+            fprintf(stderr, "viewer: %s\n", v->building->error);
+            v->exit_code = 2;
+            glfwSetWindowShouldClose(v->window, 1);
+        }
         job_close(v->building);
         free(v->building);
         v->building = NULL;
-        if (!v->scene.job) /* something is better than nothing */
-            start_building(v, NULL);
     }
     return done;
 }
@@ -664,7 +668,7 @@ int main(int argc, char **argv)
         }
     }
     close_viewer(v);
-    return trouble ? 2 : 0;
+    return trouble ? 2 : v->exit_code;
 }
 
 #endif

@@ -308,6 +308,7 @@ static void hess_draw_impostor(const hess *h, uint32_t chunk, const terrimp_call
     /* Hess 4.4 blends ground over it; here it fades in over the ground. */
     command.alpha = fminf(1.0f, (h->chunks[chunk].closest - h->fade_start)
                                     / (h->fade_end - h->fade_start));
+    memcpy(command.eye, h->chunks[chunk].eye, sizeof command.eye);
     memcpy(command.texture_matrix, h->chunks[chunk].texture_matrix, sizeof command.texture_matrix);
     callbacks->draw_impostor(callbacks->user, &command);
 }

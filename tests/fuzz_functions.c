@@ -212,7 +212,7 @@ static void use_capture(void)
     atlas[0] = fuzz_size(2000);
     atlas[1] = fuzz_size(2000);
     if (terrimp_texture_matrix(&capture, &slot, atlas[0], atlas[1], matrix) == TERRIMP_OK)
-        (void)terrimp_texture_coordinates(matrix, xyz[0], 2, stq[0]);
+        (void)terrimp_texture_coordinates(matrix, capture.eye, xyz[0], 2, stq[0]);
 }
 
 static void judge_picture(void)

@@ -28,6 +28,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_terrain.h"
 #include "unit_visibility.h"
 #include "unit_view.h"
+#include "unit_numbers.h"
 #include "unit_sorted.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
@@ -50,6 +51,7 @@ int main(int argc, char **argv)
     impostor_tests();
     atlas_tests();
     terrain_tests();
+    numbers_tests();
     bake_tests();
     visibility_tests();
     view_tests();

@@ -544,10 +544,11 @@ static void impostor_functions_refuse(void)
     REFUSES(TERRIMP_E_RANGE, matrix, terrimp_texture_matrix(&capture, &rect, 64, 64, matrix));
     rect.x = rect.width = 0;
     REFUSES(TERRIMP_E_RANGE, matrix, terrimp_texture_matrix(&capture, &rect, 64, 64, matrix));
-    REFUSES(TERRIMP_E_NULL, stq, terrimp_texture_coordinates(NULL, xyz, 1, stq));
-    REFUSES(TERRIMP_E_NULL, stq, terrimp_texture_coordinates(matrix, NULL, 1, stq));
-    GIVES(TERRIMP_E_NULL, terrimp_texture_coordinates(matrix, xyz, 1, NULL));
-    GIVES(TERRIMP_OK, terrimp_texture_coordinates(matrix, NULL, 0, NULL));
+    REFUSES(TERRIMP_E_NULL, stq, terrimp_texture_coordinates(NULL, capture.eye, xyz, 1, stq));
+    REFUSES(TERRIMP_E_NULL, stq, terrimp_texture_coordinates(matrix, NULL, xyz, 1, stq));
+    REFUSES(TERRIMP_E_NULL, stq, terrimp_texture_coordinates(matrix, capture.eye, NULL, 1, stq));
+    GIVES(TERRIMP_E_NULL, terrimp_texture_coordinates(matrix, capture.eye, xyz, 1, NULL));
+    GIVES(TERRIMP_OK, terrimp_texture_coordinates(matrix, capture.eye, NULL, 0, NULL));
 
     REFUSES(TERRIMP_E_NULL, out, terrimp_view_angle(NULL, eye, other, &out));
     REFUSES(TERRIMP_E_NULL, out, terrimp_view_angle(&box, NULL, other, &out));
@@ -1046,19 +1047,24 @@ static void check_missing_callbacks(terrimp_view *view, const terrimp_callbacks 
     CHECK(*(int *)all->user == 0);
 }
 
-/* Cameras at the ends of what a float holds. */
+/* Cameras at the ends of what is allowed, and beyond. */
 static void check_huge_cameras(terrimp_view *view, const terrimp_callbacks *all,
                                const terrimp_camera *camera)
 {
     int i;
     for (i = 0; i < 12; i++) {
         terrimp_camera bad = *camera;
-        bad.eye[i % 3] = i % 2 ? 3e38f : -3e38f;
+        bad.eye[i % 3] = i % 2 ? 1e18f : -1e18f;
         bad.forward[0] = i % 2 ? -1e-38f : 3e38f;
         bad.z_near = i % 4 ? 1e-30f : 1.0f;
-        bad.z_far = 3e38f;
+        bad.z_far = 1e18f;
         GIVES(TERRIMP_OK, terrimp_view_update(view, &bad));
         GIVES(TERRIMP_OK, terrimp_view_render(view, all));
+        bad.eye[i % 3] *= 1.001f;
+        GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
+        bad = *camera;
+        bad.z_far = 1.001e18f;
+        GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
     }
 }
 

@@ -63,7 +63,7 @@ static void camera_axes_are_orthonormal(void)
 {
     int i, k;
     for (i = 0; i < 2000; i++) {
-        terrimp_camera camera, out;
+        terrimp_camera camera, out, again;
         double wanted[3], forward[3], up[3];
         random_camera(1.0f, &camera);
         for (k = 0; k < 3; k++)
@@ -76,6 +76,8 @@ static void camera_axes_are_orthonormal(void)
             camera.up[0] = camera.up[1] = camera.up[2] = 0.0f;
         }
         CHECK(terrimp_camera_resolve(&camera, &out) == TERRIMP_OK);
+        CHECK(terrimp_camera_resolve(&out, &again) == TERRIMP_OK); /* resolved stays resolved */
+        CHECK(memcmp(&again, &out, sizeof out) == 0);
         oracle_widen(camera.forward, wanted);
         oracle_widen(out.forward, forward);
         oracle_widen(out.up, up);
@@ -172,7 +174,7 @@ static void camera_pixel_factor_is_pixels_at_distance_one(void)
     int i;
     for (i = 0; i < 1000; i++) {
         terrimp_camera camera;
-        float factor;
+        float factor = 0.0f;
         double wanted;
         random_camera(1.0f, &camera);
         CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);

@@ -22,7 +22,7 @@ static void impostor_size_is_that_of_hess(void)
         terrimp_capture c;
         terrimp_camera camera;
         uint32_t size[2];
-        float factor, scale = 0.0f, texels = random_float(0.2f, 4.0f);
+        float factor = 0.0f, scale = 0.0f, texels = random_float(0.2f, 4.0f);
         double tan_y, tan_x, wide, high;
         if (!random_capture(i % 7, &box, &c))
             continue;
@@ -119,6 +119,13 @@ static void random_slot(uint32_t atlas[2], terrimp_rect *slot)
     slot->y = random_range(0, atlas[1] - slot->height);
 }
 
+static void relative_to_eye(const terrimp_capture *c, double p[3])
+{
+    int k;
+    for (k = 0; k < 3; k++)
+        p[k] -= (double)c->eye[k];
+}
+
 /* (s / q, t / q) of a point in the box is where the point's picture lies in the slot. */
 static void texture_matrix_leads_to_the_projected_point(void)
 {
@@ -140,14 +147,14 @@ static void texture_matrix_leads_to_the_projected_point(void)
             else
                 oracle_point_in(&box, p);
             capture_coordinates(&c, p, at);
+            relative_to_eye(&c, p);
             oracle_transform(matrix, p, out);
             s = (at[0] - (double)c.tan_left) / ((double)c.tan_right - (double)c.tan_left);
             t = (at[1] - (double)c.tan_down) / ((double)c.tan_up - (double)c.tan_down);
             s = ((double)slot.x + s * (double)slot.width) / (double)atlas[0];
             t = ((double)slot.y + t * (double)slot.height) / (double)atlas[1];
-            /* What the floats of a world matrix resolve: the farther the box against the size of
-               its picture and the nearer the point, the less. */
-            reach = (double)c.z_far / at[2] * (1.0 + fabs(at[0]) + fabs(at[1]));
+            /* What floats resolve: the smaller the picture against its slant, the less. */
+            reach = 1.0 + fabs(at[0]) + fabs(at[1]);
             slack = 1e-6 + 2e-6 * reach *
                                (1.0 / (double)(c.tan_right - c.tan_left) +
                                 1.0 / (double)(c.tan_up - c.tan_down));
@@ -182,6 +189,7 @@ static void texture_matrix_keeps_the_box_in_its_slot(void)
         for (n = 0; n < 8; n++) {
             double p[3], out[4], x, y;
             oracle_corner(&box, n, p);
+            relative_to_eye(&c, p);
             oracle_transform(matrix, p, out);
             x = out[0] / out[3] * (double)atlas[0] - (double)slot.x;
             y = out[1] / out[3] * (double)atlas[1] - (double)slot.y;
@@ -192,20 +200,62 @@ static void texture_matrix_keeps_the_box_in_its_slot(void)
     }
 }
 
+/* However distant the world's origin is: in floats, as a shader multiplies, points that lie on the
+   grid of floats there come out within a twentieth of a texel. */
+static void pictures_stay_in_place_far_from_the_origin(void)
+{
+    int i, n, k;
+    for (i = 0; i < 500; i++) {
+        float far_x = (float)((i * 16777) % 8388608), unit = far_x > 4194304.0f ? 0.5f : 0.25f;
+        terrimp_box box;
+        terrimp_capture c;
+        terrimp_rect slot;
+        uint32_t size[2];
+        float eye[3], matrix[16], p[3], stq[3];
+        far_x = random_range(0, 1) ? far_x : -far_x;
+        for (k = 0; k < 3; k++) {
+            box.min[k] = (k == 1 ? 0.0f : far_x) + unit * (float)random_range(0, 64);
+            box.max[k] = box.min[k] + unit * (float)random_range(64, 512);
+            eye[k] = box.min[k] - unit * (float)random_range(400, 2000);
+        }
+        CHECK(terrimp_capture_fit(&box, eye, &c) == TERRIMP_OK);
+        CHECK(terrimp_impostor_size(&c, 1000.0f, 2.0f, 8, 2044, size, NULL) == TERRIMP_OK);
+        slot.x = slot.y = 100;
+        slot.width = size[0];
+        slot.height = size[1];
+        CHECK(terrimp_texture_matrix(&c, &slot, 4096, 4096, matrix) == TERRIMP_OK);
+        for (n = 0; n < 20; n++) {
+            double wide[3], at[3], x, y;
+            for (k = 0; k < 3; k++)
+                p[k] = box.min[k] + unit * (float)random_range(0, 64);
+            CHECK(terrimp_texture_coordinates(matrix, c.eye, p, 1, stq) == TERRIMP_OK);
+            oracle_widen(p, wide);
+            capture_coordinates(&c, wide, at);
+            x = (at[0] - (double)c.tan_left) / ((double)c.tan_right - (double)c.tan_left);
+            y = (at[1] - (double)c.tan_down) / ((double)c.tan_up - (double)c.tan_down);
+            CHECK(fabs((double)(stq[0] / stq[2]) * 4096.0 - 100.0 - x * slot.width) < 0.05);
+            CHECK(fabs((double)(stq[1] / stq[2]) * 4096.0 - 100.0 - y * slot.height) < 0.05);
+        }
+    }
+}
+
 static void texture_coordinates_agree_with_the_matrix(void)
 {
     int i, n;
     for (i = 0; i < 300; i++) {
-        float matrix[16], xyz[20][3], stq[21][3];
+        float matrix[16], eye[3], xyz[20][3], stq[21][3];
         for (n = 0; n < 16; n++)
             matrix[n] = random_float(-2.0f, 2.0f);
         for (n = 0; n < 20; n++)
             random_vector(0.0f, 100.0f, xyz[n]);
         memset(stq, UNTOUCHED, sizeof stq);
-        CHECK(terrimp_texture_coordinates(matrix, xyz[0], 20, stq[0]) == TERRIMP_OK);
+        random_vector(0.0f, 100.0f, eye);
+        CHECK(terrimp_texture_coordinates(matrix, eye, xyz[0], 20, stq[0]) == TERRIMP_OK);
         for (n = 0; n < 20; n++) {
             double p[3], out[4];
-            oracle_widen(xyz[n], p);
+            int k;
+            for (k = 0; k < 3; k++)
+                p[k] = (double)xyz[n][k] - (double)eye[k];
             oracle_transform(matrix, p, out);
             CHECK(fabs((double)stq[n][0] - out[0]) < 1e-4);
             CHECK(fabs((double)stq[n][1] - out[1]) < 1e-4);
@@ -249,7 +299,7 @@ static void view_angle_is_the_worst_of_the_corners(void)
     int i, small = 0;
     for (i = 0; i < 20000; i++) {
         terrimp_box box;
-        float eye[3], other[3], angle;
+        float eye[3], other[3], angle = 0.0f;
         double wanted;
         random_sight(i % 6, &box, eye);
         moved_eye(&box, eye, other);
@@ -487,6 +537,7 @@ static void impostor_tests(void)
     RUN(capture_pad_adds_whole_texels_around_the_picture);
     RUN(texture_matrix_leads_to_the_projected_point);
     RUN(texture_matrix_keeps_the_box_in_its_slot);
+    RUN(pictures_stay_in_place_far_from_the_origin);
     RUN(texture_coordinates_agree_with_the_matrix);
     RUN(view_angle_is_the_worst_of_the_corners);
     RUN(view_angle_is_zero_for_an_eye_that_rests);

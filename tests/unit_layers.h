@@ -260,7 +260,7 @@ static void quads_stand_where_their_texels_were_seen(void)
         quad.x = random_range(0, 400);
         quad.y = random_range(0, 200);
         CHECK(terrimp_layer_corners(&l, &picture, &quad, atlas, xyz, st) == TERRIMP_OK);
-        CHECK(terrimp_texture_coordinates(matrix, xyz, 4, stq) == TERRIMP_OK);
+        CHECK(terrimp_texture_coordinates(matrix, eye, xyz, 4, stq) == TERRIMP_OK);
         for (k = 0; k < 4; k++) {
             uint32_t dx = k == 1 || k == 2 ? quad.texels.width : 0;
             uint32_t dy = k >= 2 ? quad.texels.height : 0;

@@ -214,6 +214,66 @@ static void sorted_needs_no_depth_buffer(void)
     CHECK(seen > 1000 * ORDER_WIDE * ORDER_HIGH / 10);
 }
 
+/* The same over real elevation, where that is at hand: 16-bit samples, rows of any length. */
+static void sorted_needs_no_depth_buffer_over_tile(const char *name)
+{
+    enum { TILE = 1201 };
+    static uint8_t bytes[TILE * TILE * 2];
+    static int16_t samples[TILE * TILE];
+    const char *folder = getenv("TERRIMP_DATA");
+    terrimp_sorted_desc desc;
+    terrimp_sorted s;
+    char path[512];
+    FILE *file;
+    size_t i, got;
+    int faults = 0, seen = 0, k;
+    snprintf(path, sizeof path, "%s/%s", folder ? folder : "../shared/data", name);
+    file = fopen(path, "rb");
+    if (!file) {
+        SKIP(path);
+        return;
+    }
+    got = fread(bytes, 1, sizeof bytes, file);
+    fclose(file);
+    CHECK(got == sizeof bytes);
+    for (i = 0; i < TILE * TILE; i++) {
+        int value = bytes[2 * i] << 8 | bytes[2 * i + 1];
+        value = value > 32767 ? value - 65536 : value;
+        samples[i] = (int16_t)(value == -32768 && i ? samples[i - 1] : value);
+    }
+    memset(&desc, 0, sizeof desc);
+    desc.field.samples = samples;
+    desc.field.width = desc.field.depth = TILE;
+    desc.field.format = TERRIMP_FORMAT_S16;
+    desc.field.spacing_x = 68.3f, desc.field.spacing_z = 92.6f;
+    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+    for (i = 0; i < 500; i++) {
+        terrimp_camera camera = sorted_camera(&s.desc);
+        float ground = 0.0f;
+        (void)terrimp_heightfield_height(&desc.field, camera.eye[0], camera.eye[2], &ground);
+        camera.eye[1] = ground + random_float(2.0f, 400.0f);
+        camera.z_near = 1.0f, camera.z_far = 30000.0f;
+        s.desc.scale = random_float(2.0f, 8.0f);
+        s.desc.front_to_back = (int)(i & 1u);
+        sorted_frame(&s, &camera);
+        faults += order_faults(&s, &camera);
+        for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
+            seen += order_shown[k] > 0.0;
+    }
+    CHECK(faults == 0);
+    CHECK(seen > 500 * ORDER_WIDE * ORDER_HIGH / 10);
+}
+
+static void sorted_needs_no_depth_buffer_over_mountains(void)
+{
+    sorted_needs_no_depth_buffer_over_tile("N42E001.hgt");
+}
+
+static void sorted_needs_no_depth_buffer_over_hills(void)
+{
+    sorted_needs_no_depth_buffer_over_tile("N49E011.hgt");
+}
+
 /* ---- cracks ---- */
 
 /* An edge of a triangle in plan, and the heights of its ends; key: its place whatever its way. */
@@ -767,7 +827,7 @@ static void sorted_texture_levels_fit_the_screen(void)
     CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
     for (i = 0; i < 60; i++) {
         terrimp_camera camera = sorted_camera(&s.desc);
-        float factor, x = camera.eye[0];
+        float factor = 0.0f, x = camera.eye[0];
         uint8_t first[64 * 64];
         camera.z_far = 900.0f;
         CHECK(terrimp_camera_pixel_factor(&camera, &factor) == TERRIMP_OK);
@@ -1058,7 +1118,7 @@ static void sorted_bears_odd_cameras(void)
         case 2: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = -1.0f; break;
         case 3: camera.forward[0] = camera.forward[2] = 0.0f, camera.forward[1] = 1.0f;
                 camera.eye[1] = 100.0f; break;
-        case 4: camera.eye[1] = 3e30f; break;
+        case 4: camera.eye[1] = 1e18f; break;
         default: camera.eye[1] = -1e9f, camera.z_far = 1e7f;
         }
         sorted_frame(&s, &camera);
@@ -1069,6 +1129,8 @@ static void sorted_bears_odd_cameras(void)
 static void sorted_tests(void)
 {
     RUN(sorted_needs_no_depth_buffer);
+    RUN(sorted_needs_no_depth_buffer_over_mountains);
+    RUN(sorted_needs_no_depth_buffer_over_hills);
     RUN(sorted_squares_meet_without_cracks);
     RUN(sorted_patterns_are_ordered);
     RUN(sorted_draws_all_that_is_seen);

@@ -1042,7 +1042,7 @@ static void parallax_bound_holds_for_every_sample_of_a_mesh(void)
         CHECK(terrimp_terrain_get_box(l.terrain, node, &box) == TERRIMP_OK);
         land_span(&l, node, first, last);
         for (i = 0; i < 12; i++) {
-            float from[3], to[3], move[3], predicted;
+            float from[3], to[3], move[3], predicted = 0.0f;
             double a[3], b[3];
             random_vector(100.0f, 600.0f, from);
             for (k = 0; k < 3; k++)

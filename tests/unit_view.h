@@ -477,20 +477,24 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     const flight_picture *parts = &f->latest[command->node * FLIGHT_PARTS];
     const terrimp_capture_command *capture = &parts[command->part].capture;
     double size = (double)f->desc.atlas_size;
+    float view[16]; /* of positions relative to the eye */
     terrimp_mesh_info mesh;
     uint32_t i, step, part;
+    memcpy(view, capture->view, sizeof view);
+    view[12] = view[13] = view[14] = 0.0f;
+    CHECK(memcmp(command->eye, capture->eye, sizeof command->eye) == 0);
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     step = mesh.vertex_count / 5u + 1u;
     for (i = 0; i < mesh.vertex_count; i += step) {
         double p[3], seen[4], clip[4], out[4], x, y;
         double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height), rim_y;
-        int shown = 0;
+        int shown = 0, k;
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
-        oracle_transform(capture->view, p, seen);
+        for (k = 0; k < 3; k++)
+            p[k] -= (double)command->eye[k];
+        oracle_transform(view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
         oracle_transform(command->texture_matrix, p, out);
-        /* close to the capture's eye floats of the world's size are coarse */
-        rim += 2e-6 * fabs(p[1]) * (double)(capture->slot.width + capture->slot.height) / clip[3];
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
         rim_y = rim + texture_rounding(command->texture_matrix, p, 1, size);
@@ -500,7 +504,6 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         CHECK(x > -rim && x < (double)capture->slot.width + rim);
         CHECK(y > -rim_y && y < (double)capture->slot.height + rim_y);
         for (part = 0; part < command->part_count; part++) {
-            oracle_transform(parts[part].capture.view, p, seen);
             oracle_transform4(parts[part].capture.projection, seen, clip);
             shown |= clip[2] < clip[3] &&
                      clip[2] > (f->camera.depth_zero_to_one ? 0.0 : -clip[3]);
@@ -1492,6 +1495,47 @@ static void touch_forgets_what_shows_the_samples_and_little_else(void)
     land_free(&l);
 }
 
+/* New settings are those of the next frame; pictures that are good by them stay. */
+static void settings_change_without_a_loss(void)
+{
+    flight *f = &flight_room;
+    terrimp_view_desc d, wrong;
+    terrimp_camera camera;
+    uint32_t i;
+    land l;
+    make_hills(&l);
+    memset(&d, 0, sizeof d);
+    d.texels_per_px = 2.0f;
+    d.fade_start = 16.0f;
+    if (land_build(&l) && flight_open(f, &l, &d)) {
+        camera = camera_beside(&l);
+        CHECK(rest(f, &camera) < REST_FRAMES && f->impostor_count > 0);
+        d.tolerance_px = 1.5f; /* all pictures do for a larger one */
+        CHECK(terrimp_view_set(f->view, &d) == TERRIMP_OK);
+        for (i = 0; i < 3u; i++) {
+            CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+            CHECK(f->stats.captures == 0 && f->stats.impostors > 0);
+        }
+        d.mode = TERRIMP_MODE_GEOMIP;
+        CHECK(terrimp_view_set(f->view, &d) == TERRIMP_OK);
+        wrong = d;
+        wrong.atlas_size = 512;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        wrong = d;
+        wrong.mode = TERRIMP_MODE_IMPOSTOR;
+        wrong.tolerance_px = -1.0f;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        CHECK(terrimp_view_set(f->view, NULL) == TERRIMP_E_NULL);
+        CHECK(terrimp_view_set(NULL, &d) == TERRIMP_E_NULL);
+        CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
+        CHECK(f->stats.impostors == 0 && f->stats.ground > 0);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
 static void invalidate_forgets_every_picture(void)
 {
     flight *f = &flight_room;
@@ -2130,6 +2174,7 @@ static void view_tests(void)
     RUN(a_resting_eye_captures_nothing);
     RUN(nothing_waits_after_some_frames_of_rest);
     RUN(touch_forgets_what_shows_the_samples_and_little_else);
+    RUN(settings_change_without_a_loss);
     RUN(invalidate_forgets_every_picture);
     RUN(what_was_forgotten_since_the_update_is_not_drawn);
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);

@@ -34,6 +34,13 @@ runs()
     return $code
 }
 
+# One line that says why, and code 2.
+refuses_a_bad_file()
+{
+    LIBGL_ALWAYS_SOFTWARE=1 xvfb-run -a build/viewer $work/start.path > $work/out.txt 2>&1
+    [ $? -eq 2 ] && [ "$(grep -c start.path $work/out.txt)" -eq 1 ]
+}
+
 if ! has_glfw; then
     skip "viewer: GLFW or Xvfb is not here; make deps-viewer installs them"
     check_report
@@ -43,4 +50,5 @@ fi
 check "the viewer builds" make -s viewer test_viewer flyover
 check "flyover draws what the viewer begins with" makes_the_yardstick
 check "the viewer does what its keys say" runs
+check "the viewer refuses a file that is none" refuses_a_bad_file
 check_report

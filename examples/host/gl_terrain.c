@@ -71,14 +71,14 @@ const char gl_ground_fragment[] = FRAGMENT_HEAD LIGHTMAP_ALONE GROUND_MAIN;
 
 static const char impostor_vertex[] = VERTEX_HEAD
     "uniform mat4 matrix, texture_matrix;\n"
-    "uniform vec3 eye;\n"
+    "uniform vec3 eye, picture_eye;\n"
     "out vec2 uv;\n"
     "out vec3 place;\n"
     "out vec4 strq;\n"
     "void main() {\n"
     "    uv = vec2(0.0);\n"
     "    place = position;\n"
-    "    strq = texture_matrix * vec4(position, 1.0);\n"
+    "    strq = texture_matrix * vec4(position - picture_eye, 1.0);\n"
     "    gl_Position = matrix * vec4(position - eye, 1.0);\n"
     "}\n";
 
@@ -142,6 +142,7 @@ static gl_program make_program(const char *vertex_source, const char *const *par
     p.side = glGetUniformLocation(p.id, "side");
     p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
+    p.picture_eye = glGetUniformLocation(p.id, "picture_eye");
     p.tint = glGetUniformLocation(p.id, "tint");
     p.on_screen = glGetUniformLocation(p.id, "on_screen");
     return p;
@@ -720,6 +721,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     glUseProgram(p->id);
     glUniform1f(p->alpha, c->alpha);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
+    glUniform3fv(p->picture_eye, 1, c->eye);
     draw_mesh(g, g->atlas[c->atlas], slot, c->index_count);
 }
 

@@ -12,7 +12,7 @@ typedef struct gl_program {
     GLint field;                     /* ground: world x, z to lightmap coordinates */
     GLint alpha;                     /* impostors: the share of the pixels */
     GLint morph, side, side_coarse;  /* morphing ground */
-    GLint texture_matrix;            /* impostors */
+    GLint texture_matrix, picture_eye; /* impostors */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
     GLint on_screen;                 /* terrain: 0 in a capture, 1 on the screen */
 } gl_program;

@@ -311,18 +311,19 @@ static void fill_clipped_triangle(const raster *r, const raster_style *style,
         fill_triangle(r, style, &fan[0], &fan[i - 1], &fan[i]);
 }
 
-static raster_point transform(const raster *r, const float m[16], const float p[3])
+static raster_point transform(const raster *r, const raster_style *style, const float p[3])
 {
     float x = p[0] - r->eye[0], y = p[1] - r->eye[1], z = p[2] - r->eye[2];
-    const float *c = r->matrix;
+    const float *c = r->matrix, *m = style->texture_matrix, *eye = style->picture_eye;
     raster_point out;
     out.x = c[0] * x + c[4] * y + c[8] * z + c[12];
     out.y = c[1] * x + c[5] * y + c[9] * z + c[13];
     out.w = c[3] * x + c[7] * y + c[11] * z + c[15];
-    out.s = m[0] * p[0] + m[4] * p[1] + m[8] * p[2] + m[12];
-    out.t = m[1] * p[0] + m[5] * p[1] + m[9] * p[2] + m[13];
-    out.r = m[2] * p[0] + m[6] * p[1] + m[10] * p[2] + m[14];
-    out.q = m[3] * p[0] + m[7] * p[1] + m[11] * p[2] + m[15];
+    x = p[0] - eye[0], y = p[1] - eye[1], z = p[2] - eye[2];
+    out.s = m[0] * x + m[4] * y + m[8] * z + m[12];
+    out.t = m[1] * x + m[5] * y + m[9] * z + m[13];
+    out.r = m[2] * x + m[6] * y + m[10] * z + m[14];
+    out.q = m[3] * x + m[7] * y + m[11] * z + m[15];
     return out;
 }
 
@@ -343,7 +344,7 @@ void raster_draw(raster *r, const raster_style *style, const float *xyz, const u
         if (indices[i] >= vertex_count)
             vertex_count = indices[i] + 1u;
     for (i = 0; i < vertex_count; i++) {
-        r->points[i] = transform(r, style->texture_matrix, xyz + i * 3);
+        r->points[i] = transform(r, style, xyz + i * 3);
         r->sides[i] = (uint8_t)find_sides(r, style, &r->points[i]);
         if (!r->sides[i])
             r->corners[i] = project(r, &r->points[i]);

@@ -50,8 +50,9 @@ typedef struct raster {
 /* What a draw looks like. */
 typedef struct raster_style {
     const raster_texture *texture;
-    const float *texture_matrix; /* [16] world (x, y, z, 1) to (s, t, r, q): the texel at
+    const float *texture_matrix; /* [16] (position - picture_eye, 1) to (s, t, r, q): the texel at
                                     (s / q, t / q) in 0..1 */
+    float picture_eye[3];
     int share;                   /* of RASTER_ALL: only pixels whose threshold of a dither pattern
                                     lies below it */
     int within_depth;            /* nonzero: only what lies where r / q is within 0..1 */

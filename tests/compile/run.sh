@@ -84,6 +84,13 @@ compilers() # C compiler, C++ compiler
 compilers gcc g++
 compilers clang clang++
 
+for compiler in gcc clang; do
+    if command -v $compiler > /dev/null; then
+        check "$compiler -ffast-math: NaN and infinity are found" \
+            builds_and_runs "$compiler -O2 -ffast-math" fast_math.c
+    fi
+done
+
 if command -v tcc > /dev/null; then
     check "tcc" builds_and_runs "tcc -Wall -Werror" plain.c
     check "tcc: in two files" builds_and_runs "tcc -Wall -Werror" unit_a.c unit_b.c
