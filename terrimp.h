@@ -1273,7 +1273,7 @@ typedef struct terrimp_capture_command {
     uint32_t node;
     uint32_t level;
     uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
-                                       matrices clip what belongs to the other one */
+                                       matrices clip what lies before it */
     uint32_t atlas;                 /* < atlas_count */
     terrimp_rect slot;              /* y = 0 is row 0 of the texture */
     int clear;                      /* nonzero: the first piece of a picture. Pieces come back to
@@ -5621,7 +5621,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
 
 #define TERRIMPI_DIRECTIONS 8u           /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
-#define TERRIMPI_WALL_POINTS 2u          /* of the walls round it, for each of these */
+#define TERRIMPI_WALL_POINTS 4u          /* of the walls round it, for each of these */
 #define TERRIMPI_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
 #define TERRIMPI_INNER_STEPS 0xffffu     /* of those of inner vertices */
 
@@ -7426,13 +7426,21 @@ static void terrimpi_capture_divide(const terrimp_terrain *t, terrimpi_capture_p
     plan->z_far[0] = terrimpi_min(plan->z_far[0], distance + overlap);
 }
 
-/* The camera of a layer. */
+/* The camera of a layer: what of the mesh wears it. */
 static terrimp_capture terrimpi_capture_layer(const terrimpi_capture_plan *plan, uint32_t layer)
 {
     terrimp_capture camera = plan->camera;
     camera.z_near = plan->z_near[layer];
     camera.z_far = plan->z_far[layer];
     return camera;
+}
+
+/* Where the picture of a layer ends. That of the front one has all of the terrain, though only the
+   front of the mesh wears it: a mesh that is proud of a ridge shows what lies behind it there, as
+   in a picture of one layer, and not the sky. */
+static float terrimpi_capture_end(const terrimpi_capture_plan *plan, uint32_t layer)
+{
+    return layer == 0 ? plan->camera.z_far : plan->z_far[layer];
 }
 
 /* Whether a ground node reaches into a layer. */
@@ -7452,7 +7460,7 @@ static int terrimpi_capture_in_layer(const terrimp_terrain *t, const terrimpi_ca
         first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - eye[i]);
         last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - eye[i]);
     }
-    return first < plan->z_far[layer] && last > plan->z_near[layer];
+    return first < terrimpi_capture_end(plan, layer) && last > plan->z_near[layer];
 }
 
 /* ---- its draws ---- */
@@ -7543,6 +7551,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
+    camera.z_far = terrimpi_capture_end(plan, layer);
     command->node = plan->node.number;
     command->level = plan->node.level;
     command->part = layer;
@@ -13314,18 +13323,8 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
     return TERRIMP_OK;
 }
 
-/* The coarsest level of ground that is looked at beside a node: three above its own, as far as the
-   node's corners are samples of it. */
-static uint32_t terrimpi_tops_level(const terrimp_terrain *t, const terrimpi_patch *p)
-{
-    uint32_t level = 0;
-    while (level < 3u && t->desc.chunk_quads % (16u << level) == 0)
-        level++;
-    return p->level + level;
-}
-
-/* The highest that ground can be drawn at each sample of a border: of some levels the lines between
-   every 2^level-th sample. */
+/* The highest that ground can be drawn at each sample of a border: of levels up to one the lines
+   between every 2^level-th sample. */
 static void terrimpi_ground_tops(const terrimpi_build *build, uint32_t span, uint32_t top_level)
 {
     const float *line = build->row;
@@ -13347,7 +13346,9 @@ static void terrimpi_ground_tops(const terrimpi_build *build, uint32_t span, uin
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_skirt_foot): there is no gap to see the sky through. Neighbours of a level
+   samples (see terrimpi_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
+   that is coarser than by one level could leave one, of less than its tolerance; to lift borders
+   over all of it would double the errors of meshes where ridges are steep. Neighbours of a level
    still share what lies between the corners. */
 static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch *p,
                                  terrimp_mesh *mesh, const terrimpi_build *build)
@@ -13363,7 +13364,7 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t span = terrimpi_read_border(t, p, side, build->row);
-        terrimpi_ground_tops(build, span, terrimpi_tops_level(t, p));
+        terrimpi_ground_tops(build, span, p->level + 1u);
         terrimpi_take_border(p, mesh, side, build->tops);
         for (i = 0; i < mesh->border_vertex_count; i++) {
             if (!terrimpi_segment_of(p, mesh, side, i, &s))

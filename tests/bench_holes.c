@@ -111,6 +111,7 @@ int main(int argc, char **argv)
     unsigned scenes = 20, seed = 1, i;
     int path;
     wanted w = { 0, NULL };
+    (void)check_only; /* of the tests */
     if (argc > 1 && sscanf(argv[1], "%u.%d.%d", &seed, &path, &w.pose) == 3) {
         say_open("holes_frame", 0);
         holes_open(&s, seed);
