@@ -1,4 +1,4 @@
-/* terrimp.h - v0.4.1 - draws large heightfield terrain with terrain impostors - MIT licence
+/* terrimp.h - v0.5.0 - draws large heightfield terrain with terrain impostors - MIT licence
 
    Distant terrain is drawn as pictures of itself: a node of a quadtree is rendered in full detail
    into a slot of a texture atlas, and for many frames after that a coarse mesh of under a hundred
@@ -49,7 +49,7 @@
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
        >>visibility   the horizon: which nodes are hidden behind others
-       >>capture      a picture to be made, and what is drawn for it
+       >>capture      a picture to be made, and the ground that is drawn for it
        >>view         the per-frame decision, the schedule, the draw commands
        >>sorted       terrain in exact painter's order, for machines without a depth buffer
        >>layers       pictures one behind the other, of what stands on terrain
@@ -57,7 +57,8 @@
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
        >>visible-sets what a horizon is made of
-       >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest
+       >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest;
+                        depth meshes
        >>placement    which pictures to prepare so that no view costs too much
    The implementation has the same sections in the same order, tagged impl-. Each uses only
    those above it, and each works alone: a packer or a simplifier is all that some hosts want.
@@ -98,9 +99,9 @@
        houses and shadows meet it there.
 
                picture in the atlas             coarse mesh, a little proud of the terrain
-              +--------------------+                 .--'`--.__         upper skirt
-              |  sky: transparent  |               .'  terrain `-._    |
-              |   __/\__    _      | projected    /________________\___|
+              +--------------------+                 .--'`--.__
+              |  sky: transparent  |               .'  terrain `-._
+              |   __/\__    _      | projected    /________________\
               |__/      \__/ \_____| ---------->  |                |
               |  + a border of the |              |  lower skirt   |
               |  next nodes        |
@@ -187,9 +188,9 @@
 #include <stdint.h>
 
 #define TERRIMP_VERSION_MAJOR 0
-#define TERRIMP_VERSION_MINOR 4
-#define TERRIMP_VERSION_PATCH 1
-#define TERRIMP_VERSION "0.4.1"
+#define TERRIMP_VERSION_MINOR 5
+#define TERRIMP_VERSION_PATCH 0
+#define TERRIMP_VERSION "0.5.0"
 
 /* Linkage of every public function. TERRIMP_STATIC makes them private to one file, where those
    that are not called are no fault. */
@@ -1178,7 +1179,36 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
                                                 terrimp_geomip_view *view);
 /* ==== Capture ============================================================ >>capture */
 
-/* (No functions of its own: a view calls back with what it makes.) */
+/* Draw a ground node. */
+typedef struct terrimp_ground_command {
+    uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
+    uint32_t level;
+    uint32_t first_index; /* pattern: a range of the shared index buffer */
+    uint32_t index_count;
+    float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
+    float side[TERRIMP_SIDE_COUNT];
+    float side_coarse[TERRIMP_SIDE_COUNT];
+} terrimp_ground_command;
+
+/* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
+   it to the farthest depth (for exact_depth only when `clear` is set, and the depth is kept) and,
+   when `clear` is set, to transparent black. The ground commands up
+   to end_capture are drawn with these matrices. */
+typedef struct terrimp_capture_command {
+    uint32_t node;
+    uint32_t level;
+    uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
+                                       matrices clip what lies before it */
+    uint32_t atlas;                 /* < atlas_count */
+    terrimp_rect slot;              /* y = 0 is row 0 of the texture */
+    int clear;                      /* nonzero: the first piece of a picture. Pieces come back to
+                                       front, each over those before */
+    int complete;                   /* nonzero: the last piece */
+    float view[16], projection[16];
+    float eye[3];
+    float clip_min[2], clip_max[2]; /* world (x, z): what belongs to the picture. The ground
+                                       commands keep to it; cut a host's own models to it. */
+} terrimp_capture_command;
 
 /* ==== View =============================================================== >>view */
 
@@ -1254,36 +1284,6 @@ typedef struct terrimp_view_desc {
                                takes 28 KiB more [Default NULL -> nothing is hidden so] */
     terrimp_costs costs;
 } terrimp_view_desc;
-
-/* Draw a ground node. */
-typedef struct terrimp_ground_command {
-    uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
-    uint32_t level;
-    uint32_t first_index; /* pattern: a range of the shared index buffer */
-    uint32_t index_count;
-    float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
-    float side[TERRIMP_SIDE_COUNT];
-    float side_coarse[TERRIMP_SIDE_COUNT];
-} terrimp_ground_command;
-
-/* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
-   it to the farthest depth and, when `clear` is set, to transparent black. The ground commands up
-   to end_capture are drawn with these matrices. */
-typedef struct terrimp_capture_command {
-    uint32_t node;
-    uint32_t level;
-    uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
-                                       matrices clip what lies before it */
-    uint32_t atlas;                 /* < atlas_count */
-    terrimp_rect slot;              /* y = 0 is row 0 of the texture */
-    int clear;                      /* nonzero: the first piece of a picture. Pieces come back to
-                                       front, each over those before */
-    int complete;                   /* nonzero: the last piece */
-    float view[16], projection[16];
-    float eye[3];
-    float clip_min[2], clip_max[2]; /* world (x, z): what belongs to the picture. The ground
-                                       commands keep to it; cut a host's own models to it. */
-} terrimp_capture_command;
 
 /* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
    texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
@@ -1618,8 +1618,6 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
                                          const terrimp_sorted_vertex *vertex, float position[3]);
 
-/* ==== stop here if you only draw what has been built ====================== */
-
 /* ==== Layers ============================================================= >>layers */
 
 /* A piece of scenery, for instance a wood or a village, as pictures that stand one behind the
@@ -1690,6 +1688,8 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
                                                 const terrimp_capture *picture,
                                                 const terrimp_depth_vertex *vertices,
                                                 uint32_t count, float *xyz);
+
+/* ==== stop here if you only draw what has been built ====================== */
 
 #ifndef TERRIMP_NO_BUILD
 
@@ -10578,8 +10578,6 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     return TERRIMP_OK;
 }
 
-/* ==== stop here if you only draw what has been built ====================== */
-
 /* ==== Layers ============================================================= >>impl-layers */
 /* Based on: Jeschke 2004, chapter 3. With the reference point on the cell's near side each of his
    spacings is an affine step of 1 / depth, so that the n-th layer needs no sum over those before
@@ -10693,6 +10691,8 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
     }
     return TERRIMP_OK;
 }
+
+/* ==== stop here if you only draw what has been built ====================== */
 
 #ifndef TERRIMP_NO_BUILD
 
@@ -16655,6 +16655,14 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 #endif /* TERRIMP_IMPLEMENTATION */
 
 /* VERSION HISTORY
+   0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
+          have an alpha, the share of the pixels in the fade band; texture matrices and
+          terrimp_texture_coordinates take positions relative to the eye of the picture;
+          exact_depth; terrimp_view_set; walls, which hide what lies behind ridges; first what
+          draws, then what builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement.
+          Gone: the pair of atlases (a benchmark has it), evict, query, rect and reset of the live
+          atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
+          terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any
    0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of
