@@ -1381,7 +1381,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0
+              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0;
+              walls and exact_depth only if the view was made with them
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -8505,7 +8506,8 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
-                    d.max_captures != has->max_captures, TERRIMP_E_RANGE);
+                    d.max_captures != has->max_captures || (d.walls && !view->cull.horizon) ||
+                    (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
     return TERRIMP_OK;

@@ -91,18 +91,23 @@ static void close_scene(scene *s)
     memset(s, 0, sizeof *s);
 }
 
-/* Makes a view with the present settings; null, and that is said, when it cannot be made. */
-static terrimp_view *make_view(viewer *v, scene *s, int mode, terrimp_view_desc *resolved)
+static terrimp_view_desc settings_of(const viewer *v, int mode)
 {
     terrimp_view_desc desc;
-    terrimp_view *view = NULL;
-    terrimp_result result;
     memset(&desc, 0, sizeof desc);
     desc.mode = mode;
     desc.tolerance_px = v->tolerance;
     desc.atlas_size = v->options.atlas;
     desc.texels_per_px = v->options.texels;
-    result = terrimp_view_desc_resolve(s->job->terrain, &desc, resolved);
+    return desc;
+}
+
+/* Makes a view with the present settings; null, and that is said, when it cannot be made. */
+static terrimp_view *make_view(viewer *v, scene *s, int mode, terrimp_view_desc *resolved)
+{
+    terrimp_view_desc desc = settings_of(v, mode);
+    terrimp_view *view = NULL;
+    terrimp_result result = terrimp_view_desc_resolve(s->job->terrain, &desc, resolved);
     if (result == TERRIMP_OK)
         result = terrimp_view_create(s->job->terrain, &desc, NULL, &view);
     if (result != TERRIMP_OK)
@@ -110,10 +115,16 @@ static terrimp_view *make_view(viewer *v, scene *s, int mode, terrimp_view_desc 
     return view;
 }
 
+/* Gives the view the present settings: it keeps the pictures that are good enough by them. A mode
+   that wants more ground nodes than it has room for makes it anew. */
 static void renew_view(viewer *v)
 {
     scene *s = &v->scene;
-    terrimp_view *view = s->job ? make_view(v, s, v->mode, &s->desc) : NULL;
+    terrimp_view_desc desc = settings_of(v, v->mode);
+    terrimp_view *view;
+    if (!s->job || terrimp_view_set(s->view, &desc) == TERRIMP_OK)
+        return;
+    view = make_view(v, s, v->mode, &s->desc);
     if (!view)
         return;
     terrimp_view_destroy(s->view);

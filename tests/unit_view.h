@@ -1536,6 +1536,12 @@ static void settings_change_without_a_loss(void)
         wrong.mode = TERRIMP_MODE_IMPOSTOR;
         wrong.tolerance_px = -1.0f;
         CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        wrong = d; /* what the view has no memory for */
+        wrong.exact_depth = 1;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
+        wrong = d;
+        wrong.walls = &wrong;
+        CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
         CHECK(terrimp_view_set(f->view, NULL) == TERRIMP_E_NULL);
         CHECK(terrimp_view_set(NULL, &d) == TERRIMP_E_NULL);
         CHECK(terrimp_view_update(f->view, &camera) == TERRIMP_OK);
