@@ -1607,6 +1607,7 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
     scene_close(&s);
 }
 
+#include "render_hidden.h"
 #include "render_scene.h"
 
 int main(void)
@@ -1619,6 +1620,7 @@ int main(void)
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);
     RUN(houses_and_seas_meet_the_terrain);
+    RUN(what_ridges_hide_shows_no_pixel);
     RUN(pictures_in_two_parts_show_what_ridges_hide);
     RUN(pictures_in_pieces_are_like_whole_ones);
     RUN(frames_change_no_more_than_those_of_the_full_mesh);

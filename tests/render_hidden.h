@@ -1,0 +1,86 @@
+/* What lies behind ridges and is not drawn would not have shown: ground at full resolution and
+   mipmapped ground give the same pixels with a horizon and without. */
+#ifndef RENDER_HIDDEN_H
+#define RENDER_HIDDEN_H
+
+enum { HIDDEN_FRAMES = 14 };
+
+typedef struct hidden_count {
+    uint32_t hidden;    /* nodes left out, in all */
+    size_t different;   /* pixels */
+    double likeness[2]; /* to the full mesh, without a horizon and with one, mean dB */
+} hidden_count;
+
+/* Low flights across the terrain, each frame somewhere else but the second of two. */
+static flight_pose hidden_pose(const scene *s, int frame)
+{
+    float t = (float)(frame / 2), along = (float)(frame % 2) / (float)(s->field.width - 1u);
+    float up = s->height_range * (frame % 6 < 2 ? 0.01f : frame % 6 < 4 ? 0.05f : 0.2f);
+    return pose_at(s, 0.5f + 0.35f * cosf(1.7f * t) + along, 0.5f + 0.35f * sinf(2.3f * t), up,
+                   77.0f * t, 4.0f);
+}
+
+static hidden_count count_hidden(scene *s, int mode, const void *walls)
+{
+    terrimp_view_desc settings = settings_of(mode), horizon = settings;
+    terrimp_view *views[2], *full = open_full_view(s);
+    uint8_t *plain = open_picture(s), *culled = open_picture(s), *truth = open_picture(s);
+    hidden_count c = { 0, 0, { 0.0, 0.0 } };
+    int i;
+    horizon.walls = walls;
+    views[0] = open_view(s, &settings);
+    views[1] = open_view(s, &horizon);
+    for (i = 0; i < HIDDEN_FRAMES; i++) {
+        flight_pose pose = hidden_pose(s, i);
+        draw_pose(s, views[0], &pose, light_blue, plain);
+        c.hidden += draw_pose(s, views[1], &pose, light_blue, culled).hidden;
+        c.different += count_different(plain, culled, s->pixels);
+        draw_pose(s, full, &pose, light_blue, truth);
+        c.likeness[0] += psnr(s, plain, truth) / HIDDEN_FRAMES;
+        c.likeness[1] += psnr(s, culled, truth) / HIDDEN_FRAMES;
+    }
+    free(plain);
+    free(culled);
+    free(truth);
+    for (i = 0; i < 2; i++)
+        terrimp_view_destroy(views[i]);
+    terrimp_view_destroy(full);
+    return c;
+}
+
+static void check_hidden(scene *s)
+{
+    static const int modes[3] = { TERRIMP_MODE_FULL, TERRIMP_MODE_GEOMIP, TERRIMP_MODE_AUTO };
+    const terrimp_quadtree *tree = terrimp_terrain_tree(s->terrain);
+    void *walls = allocate(terrimp_walls_bytes(tree));
+    int i;
+    need_ok(terrimp_walls_build(tree, NULL, walls));
+    for (i = 0; i < 3; i++) {
+        hidden_count c = count_hidden(s, modes[i], walls);
+        printf("  %s, mode %d: %u nodes hidden, %u pixels differ; %.2f dB without, %.2f with\n",
+               s->name, modes[i], (unsigned)c.hidden, (unsigned)c.different, c.likeness[0],
+               c.likeness[1]);
+        CHECK(c.hidden > 20);
+        CHECK(modes[i] == TERRIMP_MODE_AUTO ? c.likeness[1] > c.likeness[0] - 1.0
+                                            : c.different == 0);
+    }
+    free(walls);
+}
+
+static void what_ridges_hide_shows_no_pixel(void)
+{
+    static const dem_desc whole = { 0 };
+    scene s;
+    open_hills(&s, 480, 384, 60.0f);
+    check_hidden(&s);
+    scene_close(&s);
+    if (!open_tile(&s, "N42E001.hgt", &whole)) {
+        SKIP("there is no N42E001.hgt");
+        return;
+    }
+    scene_show(&s, 480, 384, 60.0f, ATLAS);
+    check_hidden(&s);
+    scene_close(&s);
+}
+
+#endif
