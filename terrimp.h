@@ -160,6 +160,7 @@
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
+         TERRIMP_NO_HORIZON    views take no walls: E_RANGE
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 27 KB of code at -Os on
@@ -7683,6 +7684,12 @@ typedef struct terrimpi_frame {
     terrimpi_motion motion;
 } terrimpi_frame;
 
+#ifndef TERRIMP_NO_HORIZON
+#define TERRIMPI_CULL_HAS_HORIZON 1
+#else
+#define TERRIMPI_CULL_HAS_HORIZON 0
+#endif
+
 /* ---- settings ---- */
 
 /* Impostors of a mode. */
@@ -7779,6 +7786,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8003,7 +8011,8 @@ static int terrimpi_cull_hides(terrimpi_cull *cull, int behind, const terrimpi_f
         *planes = terrimp_frustum_test(&f->frustum, box, *planes);
     if (*planes == TERRIMP_PLANES_OUTSIDE)
         return 1;
-    if (!behind || !terrimpi_horizon_hides_node(cull->horizon, node, cull->horizon->low))
+    if (!TERRIMPI_CULL_HAS_HORIZON || !behind ||
+        !terrimpi_horizon_hides_node(cull->horizon, node, cull->horizon->low))
         return 0;
     cull->hidden_count++;
     return 1;
@@ -8159,7 +8168,7 @@ static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimp
 static int terrimpi_cull_list(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
-    if (!cull->horizon)
+    if (!TERRIMPI_CULL_HAS_HORIZON || !cull->horizon)
         return terrimpi_cull_walk(cull, f, cache, mip, 0);
     if (mip && !terrimpi_cull_walk(cull, f, cache, mip, 0))
         return 0;

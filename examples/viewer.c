@@ -122,8 +122,12 @@ static void renew_view(viewer *v)
     scene *s = &v->scene;
     terrimp_view_desc desc = settings_of(v, v->mode);
     terrimp_view *view;
-    if (!s->job || terrimp_view_set(s->view, &desc) == TERRIMP_OK)
+    if (!s->job)
         return;
+    if (terrimp_view_set(s->view, &desc) == TERRIMP_OK) {
+        terrimp_view_desc_resolve(s->job->terrain, &desc, &s->desc);
+        return;
+    }
     view = make_view(v, s, v->mode, &s->desc);
     if (!view)
         return;
