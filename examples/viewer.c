@@ -99,6 +99,7 @@ static terrimp_view_desc settings_of(const viewer *v, int mode)
     desc.tolerance_px = v->tolerance;
     desc.atlas_size = v->options.atlas;
     desc.texels_per_px = v->options.texels;
+    desc.walls = v->scene.job ? v->scene.job->walls : NULL;
     return desc;
 }
 
@@ -517,8 +518,9 @@ static void write_figures(viewer *v)
              modes[v->mode - TERRIMP_MODE_FULL + 1], (double)v->tolerance, v->ms,
              v->walker.walking ? "WALKING" : "FLYING", v->paused ? ", HELD" : "");
     hud_text(&v->hud, 8.0f, 6.0f, 2.0f, 0xffffffffu, line);
-    snprintf(line, sizeof line, "%u DRAWS  %uK TRIANGLES  %u IMPOSTORS  %u CAPTURES  %.1f MB",
-             now->draws, now->triangles / 1000, now->impostors, now->captures,
+    snprintf(line, sizeof line,
+             "%u DRAWS  %uK TRIANGLES  %u IMPOSTORS  %u CAPTURES  %u HIDDEN  %.1f MB", now->draws,
+             now->triangles / 1000, now->impostors, now->captures, now->hidden,
              (double)bytes / 1e6);
     hud_text(&v->hud, 8.0f, 22.0f, 2.0f, 0xffffffffu, line);
 }

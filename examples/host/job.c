@@ -87,6 +87,16 @@ static void *build_nodes(void *shared)
     return NULL;
 }
 
+/* Finds what ridges hide. */
+static job_stage build_walls(job *j)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(j->terrain);
+    j->walls = malloc(terrimp_walls_bytes(tree));
+    if (!j->walls)
+        return fail(j, "no memory for what ridges hide");
+    return check(j, terrimp_walls_build(tree, NULL, j->walls), JOB_LIGHT);
+}
+
 /* Does what a stage is for, but for its nodes; returns the next. */
 static job_stage step(job *j)
 {
@@ -94,7 +104,8 @@ static job_stage step(job *j)
     case JOB_LOAD: return tour_load(&j->tour, &j->what) ? JOB_BEGIN : fail(j, j->tour.error);
     case JOB_BEGIN: return begin(j);
     case JOB_NODES: return j->error[0] ? JOB_FAILED : JOB_FINISH;
-    case JOB_FINISH: return check(j, terrimp_terrain_build_finish(j->terrain), JOB_LIGHT);
+    case JOB_FINISH: return check(j, terrimp_terrain_build_finish(j->terrain), JOB_WALLS);
+    case JOB_WALLS: return build_walls(j);
     case JOB_LIGHT:
         j->lightmap = lightmap_bake(&j->tour.field);
         return j->lightmap ? JOB_DONE : fail(j, "no memory for the lightmap");
@@ -211,6 +222,7 @@ void job_close(job *j)
     stop(j);
     tour_close(&j->tour);
     free(j->memory);
+    free(j->walls);
     free(j->lightmap);
     memset(j, 0, sizeof *j);
 }

@@ -10,8 +10,8 @@
 #endif
 
 enum { JOB_THREADS = 64 };
-typedef enum job_stage { JOB_NONE, JOB_LOAD, JOB_BEGIN, JOB_NODES, JOB_FINISH, JOB_LIGHT, JOB_DONE,
-                         JOB_FAILED } job_stage;
+typedef enum job_stage { JOB_NONE, JOB_LOAD, JOB_BEGIN, JOB_NODES, JOB_FINISH, JOB_WALLS, JOB_LIGHT,
+                         JOB_DONE, JOB_FAILED } job_stage;
 
 typedef struct job {
     tour_desc what;
@@ -23,6 +23,7 @@ typedef struct job {
     terrimp_terrain *terrain;  /* in memory */
     void *memory, *scratch;
     uint32_t node_count, left;
+    void *walls;               /* of what ridges hide */
     uint8_t *lightmap;         /* rgb[depth][width][3] */
     char error[512];           /* one line, when the stage is JOB_FAILED */
 #ifndef HOST_NO_THREADS
