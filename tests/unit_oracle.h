@@ -154,4 +154,17 @@ static uint32_t hash_bytes(uint32_t hash, const void *memory, size_t bytes)
     return hash;
 }
 
+/* Whether, from the eye, terrain over the rectangle of box b cannot hide any over that of box a: a
+   plane stands between them, and the eye is on the side of a. */
+static inline int oracle_cannot_hide(const terrimp_box *b, const terrimp_box *a,
+                                     const float eye[3])
+{
+    int k;
+    for (k = 0; k < 3; k += 2)
+        if ((a->max[k] <= b->min[k] && eye[k] <= b->min[k]) ||
+            (a->min[k] >= b->max[k] && eye[k] >= b->max[k]))
+            return 1;
+    return 0;
+}
+
 #endif

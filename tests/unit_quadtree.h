@@ -1,4 +1,5 @@
 /* Tests of the Quadtree room. */
+#include "unit_oracle.h"
 
 /* A random tree; its samples are never read. */
 static void tree_make(terrimp_quadtree *tree)
@@ -55,18 +56,6 @@ static void nodes_are_numbered_and_related_by_their_places(void)
     }
 }
 
-/* Whether a line along x or z has box a and the eye on one side and box b on the other: then b
-   cannot hide a. */
-static int tree_cannot_hide(const terrimp_box *a, const terrimp_box *b, const float eye[3])
-{
-    int k;
-    for (k = 0; k < 3; k += 2)
-        if ((a->max[k] <= b->min[k] && eye[k] <= b->min[k]) ||
-            (a->min[k] >= b->max[k] && eye[k] >= b->max[k]))
-            return 1;
-    return 0;
-}
-
 /* A walk that enters everything comes to each node once, after its parent, and no chunk that it
    comes to later hides an earlier one. */
 static void a_walk_sees_all_nodes_closest_first(void)
@@ -97,7 +86,7 @@ static void a_walk_sees_all_nodes_closest_first(void)
                 continue;
             terrimpi_tree_box(&t, &v.node, 0.0f, 0.0f, &boxes[chunks]);
             for (i = 0; i < chunks; i++)
-                CHECK(tree_cannot_hide(&boxes[i], &boxes[chunks], eye));
+                CHECK(oracle_cannot_hide(&boxes[chunks], &boxes[i], eye));
             chunks++;
         }
         CHECK(count == t.node_count);

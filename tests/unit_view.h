@@ -41,22 +41,10 @@ static flight_place flight_place_of(const land *l, uint32_t node)
     return p;
 }
 
-/* Whether, from the eye, terrain over the rectangle of box b cannot hide any over that of box a: a
-   plane stands between them, and the eye is on the side of a. */
-static int cannot_hide(const terrimp_box *b, const terrimp_box *a, const float eye[3])
-{
-    int k;
-    for (k = 0; k < 3; k += 2)
-        if ((a->max[k] <= b->min[k] && eye[k] <= b->min[k]) ||
-            (a->min[k] >= b->max[k] && eye[k] >= b->max[k]))
-            return 1;
-    return 0;
-}
-
 /* Whether b has to be drawn before a in an order from front to back. */
 static int stands_in_front(const terrimp_box *b, const terrimp_box *a, const float eye[3])
 {
-    return cannot_hide(a, b, eye) && !cannot_hide(b, a, eye);
+    return oracle_cannot_hide(a, b, eye) && !oracle_cannot_hide(b, a, eye);
 }
 
 /* ---- a flight: what a host sees of one view ---- */
