@@ -1,0 +1,522 @@
+/* Laws of terrain in pages: they say what a terrain in memory says, in whatever order they are made
+   and come; and nothing that is damaged, late or another's is taken. */
+#ifndef UNIT_PAGES_H
+#define UNIT_PAGES_H
+
+#include "unit_bad_input.h"
+
+/* A land, its pages as a file in memory, and the terrain that is opened from them. */
+typedef struct paged_land {
+    land l;
+    terrimp_pages_desc desc;
+    terrimp_pages_info info;
+    uint32_t block_count;
+    unsigned char *file;
+    size_t bytes;
+    uint64_t from, to;     /* what stores may touch */
+    uint32_t stores, last; /* stores so far; the last one that is carried out */
+    void *scratch;
+    size_t scratch_bytes;
+    void *memory;
+    terrimp_terrain *opened;
+} paged_land;
+
+static int paged_read(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows,
+                      void *samples, size_t row_bytes)
+{
+    const terrimp_heightfield *f = &((const paged_land *)user)->l.desc.field;
+    size_t size = f->format == TERRIMP_FORMAT_U8 ? 1u : 2u;
+    uint32_t r;
+    if (x + cols > f->width || z + rows > f->depth) {
+        CHECK(!"a block reads beyond the terrain");
+        return 0;
+    }
+    for (r = 0; r < rows; r++)
+        memcpy((char *)samples + r * row_bytes,
+               (const char *)f->samples + ((size_t)(z + r) * f->width + x) * size, cols * size);
+    return 1;
+}
+
+static int paged_load(void *user, uint64_t offset, void *bytes, size_t count)
+{
+    const paged_land *p = (const paged_land *)user;
+    if (offset + count > p->bytes)
+        return 0;
+    memcpy(bytes, p->file + offset, count);
+    return 1;
+}
+
+static int paged_store(void *user, uint64_t offset, const void *bytes, size_t count)
+{
+    paged_land *p = (paged_land *)user;
+    CHECK(offset >= p->from && offset + count <= p->to);
+    if (offset + count > p->bytes || p->stores++ >= p->last)
+        return 0;
+    memcpy(p->file + offset, bytes, count);
+    return 1;
+}
+
+/* Builds a block; what it stores has to lie in its part of the file. */
+static terrimp_result paged_build_block(paged_land *p, uint32_t block)
+{
+    uint64_t bytes;
+    CHECK(terrimp_pages_place(&p->desc, block, 1, &p->from, &bytes) == TERRIMP_OK);
+    p->to = p->from + bytes;
+    p->stores = 0;
+    return terrimp_pages_build_block(&p->desc, block, p->scratch, p->scratch_bytes);
+}
+
+static terrimp_result paged_build_end(paged_land *p)
+{
+    uint64_t bytes;
+    p->from = 0;
+    CHECK(terrimp_pages_place(&p->desc, 0, 0, &p->to, &bytes) == TERRIMP_OK && bytes == 0);
+    p->stores = 0;
+    return terrimp_pages_build_end(&p->desc, p->scratch, p->scratch_bytes);
+}
+
+/* A land in memory, and room for its pages. */
+static int paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int format,
+                         land_shape shape, uint32_t chunk_quads, uint32_t block_level)
+{
+    terrimp_pages_desc resolved;
+    uint64_t from, bytes;
+    memset(p, 0, sizeof *p);
+    land_prepare(&p->l, width, depth, format, shape);
+    p->l.desc.chunk_quads = chunk_quads;
+    p->l.desc.height_low = -126.0f;
+    p->l.desc.height_high = 257.0f;
+    p->last = UINT32_MAX;
+    p->desc.terrain = p->l.desc;
+    p->desc.terrain.field.samples = NULL;
+    p->desc.block_level = block_level;
+    p->desc.stamp = 7;
+    p->desc.user = p;
+    p->desc.read = paged_read;
+    p->desc.load = paged_load;
+    p->desc.store = paged_store;
+    CHECK(terrimp_pages_desc_resolve(&p->desc, &resolved, &p->block_count) == TERRIMP_OK);
+    CHECK(terrimp_pages_place(&p->desc, 0, p->block_count, &from, &bytes) == TERRIMP_OK);
+    p->bytes = (size_t)(from + bytes);
+    p->file = (unsigned char *)calloc(1, p->bytes);
+    p->scratch_bytes = terrimp_pages_scratch_bytes(&p->desc);
+    CHECK(p->scratch_bytes > 0);
+    p->scratch = malloc(p->scratch_bytes);
+    return land_build(&p->l);
+}
+
+static int paged_build(paged_land *p)
+{
+    uint32_t block;
+    for (block = 0; block < p->block_count; block++)
+        CHECK(paged_build_block(p, block) == TERRIMP_OK);
+    CHECK(paged_build_end(p) == TERRIMP_OK);
+    CHECK(terrimp_pages_check(p->file, p->bytes, &p->info) == TERRIMP_OK);
+    CHECK(p->info.bytes == p->bytes && p->info.node_count == p->l.info.node_count);
+    return check_bad == 0;
+}
+
+static int paged_open(paged_land *p, uint32_t slots)
+{
+    size_t bytes = terrimp_pages_bytes(p->file, p->bytes, slots);
+    p->memory = malloc(bytes);
+    CHECK(bytes > 0 && terrimp_pages_open(&p->l.desc.field, p->file, p->bytes, slots, p->memory,
+                                          bytes, &p->opened) == TERRIMP_OK);
+    return check_bad == 0;
+}
+
+/* Reads a page as a host would. */
+static terrimp_result paged_fetch(paged_land *p, uint32_t node)
+{
+    terrimp_page_info info;
+    void *page;
+    terrimp_result result = terrimp_page_begin(p->opened, node, &page);
+    if (result != TERRIMP_OK)
+        return result;
+    CHECK(terrimp_page_get_info(p->opened, node, &info) == TERRIMP_OK);
+    CHECK(info.state == TERRIMP_PAGE_COMING && info.offset + info.bytes <= p->bytes);
+    memcpy(page, p->file + info.offset, info.bytes);
+    return terrimp_page_put(p->opened, node);
+}
+
+static int paged_is_here(const paged_land *p, uint32_t node)
+{
+    terrimp_page_info info;
+    CHECK(terrimp_page_get_info(p->opened, node, &info) == TERRIMP_OK);
+    return info.state == TERRIMP_PAGE_HERE;
+}
+
+static void paged_free(paged_land *p)
+{
+    land_free(&p->l);
+    free(p->file);
+    free(p->scratch);
+    free(p->memory);
+}
+
+/* All pages, from the root down. */
+static void paged_fetch_all(paged_land *p)
+{
+    uint32_t node = p->l.info.node_count;
+    while (node-- > 0)
+        CHECK(paged_fetch(p, node) == TERRIMP_OK);
+}
+
+/* Ground, boxes, meshes and the floor of pages against those of memory: the same bits up to a
+   level; above it ground is the same, and no error smaller. */
+static void check_pages_say_the_same(const paged_land *p, uint32_t same_to)
+{
+    const land *l = &p->l;
+    uint32_t node, vertices = l->info.ground_vertex_count, stride = l->info.mesh_vertex_stride;
+    float *xyz[2];
+    uint16_t *indices[2];
+    terrimp_terrain_info info;
+    int i;
+    CHECK(terrimp_terrain_get_info(p->opened, &info) == TERRIMP_OK);
+    CHECK(info.floor_vertex_count == l->info.floor_vertex_count);
+    for (i = 0; i < 2; i++) {
+        size_t most = vertices + stride + info.floor_vertex_count;
+        xyz[i] = (float *)malloc(most * 3u * sizeof(float));
+        indices[i] = (uint16_t *)malloc((info.floor_index_count + info.mesh_index_stride) *
+                                        sizeof(uint16_t));
+    }
+    for (node = 0; node < l->info.node_count; node++) {
+        const terrimp_terrain *terrain[2];
+        terrimp_mesh_info mesh[2];
+        terrimp_box box[2], ground_box[2];
+        uint32_t level = land_place(l, node).level;
+        terrain[0] = l->terrain;
+        terrain[1] = p->opened;
+        for (i = 0; i < 2; i++) {
+            const terrimp_quadtree *tree = terrimp_terrain_tree(terrain[i]);
+            CHECK(terrimp_terrain_get_box(terrain[i], node, &box[i]) == TERRIMP_OK);
+            CHECK(terrimp_geomip_box(tree, node, &ground_box[i]) == TERRIMP_OK);
+            CHECK(terrimp_terrain_get_mesh(terrain[i], node, &mesh[i]) == TERRIMP_OK);
+            CHECK(terrimp_terrain_fill_ground(terrain[i], node, xyz[i], vertices * 3u) ==
+                  TERRIMP_OK);
+        }
+        CHECK(memcmp(xyz[0], xyz[1], vertices * 3u * sizeof(float)) == 0);
+        if (level > same_to) {
+            const terrimp_geomip_node *kept[2];
+            for (i = 0; i < 2; i++)
+                kept[i] = terrimpi_tree_kept(terrimp_terrain_tree(terrain[i]), node);
+            CHECK(kept[1]->error >= kept[0]->error * 0.99999f);
+            CHECK(mesh[1].error > 0.0f || mesh[0].error == 0.0f);
+            continue;
+        }
+        CHECK(memcmp(&ground_box[0], &ground_box[1], sizeof box[0]) == 0);
+        CHECK(memcmp(&box[0], &box[1], sizeof box[0]) == 0);
+        CHECK(mesh[0].error == mesh[1].error && mesh[0].error_rms == mesh[1].error_rms);
+        CHECK(mesh[0].vertex_count == mesh[1].vertex_count);
+        CHECK(mesh[0].index_count == mesh[1].index_count);
+        for (i = 0; i < 2; i++)
+            CHECK(terrimp_terrain_fill_mesh(terrain[i], node, xyz[i], stride * 3u, indices[i],
+                                            info.mesh_index_stride) == TERRIMP_OK);
+        CHECK(memcmp(xyz[0], xyz[1], stride * 3u * sizeof(float)) == 0);
+        CHECK(memcmp(indices[0], indices[1], info.mesh_index_stride * sizeof(uint16_t)) == 0);
+    }
+    for (i = 0; i < 2; i++)
+        CHECK(terrimp_terrain_fill_mesh(i ? p->opened : l->terrain, l->info.node_count, xyz[i],
+                                        info.floor_vertex_count * 3u, indices[i],
+                                        info.floor_index_count) == TERRIMP_OK);
+    CHECK(memcmp(indices[0], indices[1], info.floor_index_count * sizeof(uint16_t)) == 0);
+    for (node = 0; node < info.floor_vertex_count; node++) /* bottoms of walls: the root's lowest */
+        CHECK(same_to < UINT32_MAX || xyz[0][3u * node + 1u] == xyz[1][3u * node + 1u]);
+    for (i = 0; i < 2; i++) {
+        free(xyz[i]);
+        free(indices[i]);
+    }
+}
+
+static void pages_say_what_memory_does(void)
+{
+    static const int formats[] = {TERRIMP_FORMAT_U8, TERRIMP_FORMAT_U16, TERRIMP_FORMAT_S16};
+    uint32_t turn;
+    for (turn = 0; turn < 12u; turn++) {
+        paged_land p;
+        uint32_t width = random_range(2, 300), depth = random_range(2, 200);
+        uint32_t block_level = turn % 3u, chunk = turn % 2u ? 16u : 8u;
+        if (turn % 4u == 1u)
+            width = depth = 257u;
+        if (paged_prepare(&p, width, depth, formats[turn % 3u], turn % 5u ? LAND_HILLS : LAND_NOISE,
+                          chunk, block_level) && paged_build(&p)) {
+            if (paged_open(&p, p.l.info.node_count + 8u)) {
+                paged_fetch_all(&p);
+                check_pages_say_the_same(&p, block_level ? block_level : UINT32_MAX);
+            }
+        }
+        paged_free(&p);
+    }
+}
+
+/* Blocks in any order, some twice, some stopped halfway, each in its own part of the file: the same
+   bytes. What has not been built is told from what has. */
+static void pages_are_built_in_any_order(void)
+{
+    uint32_t turn;
+    for (turn = 0; turn < 4u; turn++) {
+        paged_land p;
+        unsigned char *file;
+        uint32_t i, block, left;
+        if (!paged_prepare(&p, 8u * random_range(10, 30), random_range(60, 200), TERRIMP_FORMAT_S16,
+                           LAND_HILLS, 8, 2) || !paged_build(&p)) {
+            paged_free(&p);
+            continue;
+        }
+        file = p.file;
+        p.file = (unsigned char *)calloc(1, p.bytes);
+        memset(p.scratch, 0x5a, p.scratch_bytes);
+        for (left = p.block_count; left > 0;) {
+            block = random_range(0, p.block_count - 1u);
+            i = terrimp_pages_check_block(&p.desc, block, p.scratch, p.scratch_bytes) == TERRIMP_OK;
+            if (i && random_range(0, 3))
+                continue;
+            p.last = random_range(0, 1) ? UINT32_MAX : random_range(0, 20);
+            CHECK(paged_build_block(&p, block) ==
+                  (p.stores > p.last ? TERRIMP_E_PAGE : TERRIMP_OK));
+            left -= !i && p.stores <= p.last;
+        }
+        p.last = UINT32_MAX;
+        CHECK(terrimp_pages_check(p.file, p.bytes, NULL) == TERRIMP_E_BAKE); /* no header yet */
+        CHECK(paged_build_end(&p) == TERRIMP_OK);
+        CHECK(memcmp(file, p.file, p.bytes) == 0);
+        p.file[p.from + p.bytes / 2u] ^= 1u;
+        free(file);
+        paged_free(&p);
+    }
+}
+
+/* Everything that can be wrong with a page that comes, or with when it comes. */
+static void pages_that_are_no_good_are_refused(void)
+{
+    paged_land p, other;
+    uint32_t turn, node, root;
+    void *page;
+    terrimp_page_info info;
+    if (!paged_prepare(&p, 150, 130, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2) || !paged_build(&p) ||
+        !paged_open(&p, 40) || !paged_prepare(&other, 150, 130, TERRIMP_FORMAT_U16, LAND_NOISE, 8,
+                                              2))
+        return;
+    other.desc.stamp = 8;
+    paged_build(&other);
+    root = p.l.info.node_count - 1u;
+    node = root - 1u;
+    CHECK(terrimp_page_begin(p.opened, node, &page) == TERRIMP_E_STATE); /* before its parent */
+    CHECK(terrimp_page_put(p.opened, root) == TERRIMP_E_STATE);          /* not begun */
+    CHECK(terrimp_page_fail(p.opened, root) == TERRIMP_E_STATE);
+    CHECK(terrimp_page_begin(p.opened, root + 1u, &page) == TERRIMP_E_RANGE);
+    CHECK(paged_fetch(&p, root) == TERRIMP_OK);
+    CHECK(paged_fetch(&p, root) == TERRIMP_E_STATE);            /* twice */
+    CHECK(terrimp_page_put(p.opened, root) == TERRIMP_E_STATE); /* the same */
+    for (turn = 0; turn < 400u; turn++) {
+        int fault = (int)(turn % 5u);
+        CHECK(terrimp_page_begin(p.opened, node, &page) == TERRIMP_OK);
+        CHECK(terrimp_page_get_info(p.opened, node, &info) == TERRIMP_OK);
+        memcpy(page, p.file + info.offset, info.bytes);
+        if (fault == 0) /* a bit turned */
+            ((unsigned char *)page)[random_range(0, info.bytes - 1u)] ^=
+                (unsigned char)(1u << random_range(0, 7));
+        else if (fault == 1) /* cut short */
+            memset((unsigned char *)page + random_range(0, info.bytes - 300u), 0, 300);
+        else if (fault == 2) /* of another node */
+            memcpy(page, p.file + info.offset - info.bytes, info.bytes);
+        else if (fault == 3) /* of another file */
+            memcpy(page, other.file + info.offset, info.bytes);
+        else /* of other heights, with the right stamp and a checksum */
+            ((uint32_t *)page)[1] = p.info.stamp;
+        if (fault == 4) {
+            uint32_t at, hash = 2166136261u, *words = (uint32_t *)page;
+            words[random_range(3, info.bytes / 4u - 1u)] = turn % 2u ? 0x7fc00000u : random_bits();
+            for (at = 1; at < info.bytes / 4u; at++)
+                hash = terrimpi_hash(hash, words[at]);
+            words[0] = hash;
+        }
+        if (terrimp_page_put(p.opened, node) != TERRIMP_E_BAKE) {
+            /* what a page says that nothing else can tell is false, or a byte that stands for
+               nothing: it must be good to use */
+            CHECK(fault == 4 || (fault == 1 && paged_is_here(&p, node)));
+            CHECK(paged_is_here(&p, node));
+            terrimp_pages_next_frame(p.opened);
+            terrimp_pages_next_frame(p.opened);
+            terrimp_pages_next_frame(p.opened);
+            terrimpi_page_clear(&p.opened->tree, terrimpi_page_slot_of(p.opened->tree.pages, node));
+        } else {
+            CHECK(!paged_is_here(&p, node));
+        }
+    }
+    CHECK(terrimp_page_begin(p.opened, node, &page) == TERRIMP_OK);
+    CHECK(terrimp_page_fail(p.opened, node) == TERRIMP_OK);
+    CHECK(terrimp_page_put(p.opened, node) == TERRIMP_E_STATE); /* late */
+    CHECK(paged_fetch(&p, node) == TERRIMP_OK);
+    for (turn = 0; turn < 200u; turn++) { /* headers */
+        unsigned char header[TERRIMP_PAGES_HEADER_BYTES];
+        memcpy(header, p.file, sizeof header);
+        header[random_range(0, sizeof header - 1u)] ^= (unsigned char)(1u << random_range(0, 7));
+        CHECK(terrimp_pages_check(header, sizeof header, NULL) == TERRIMP_E_BAKE);
+    }
+    CHECK(terrimp_pages_check(p.file, TERRIMP_PAGES_HEADER_BYTES - 1u, NULL) == TERRIMP_E_BAKE);
+    paged_free(&p);
+    paged_free(&other);
+}
+
+/* Slots: the parent of what is here is here, a frame's pages stay, and there are never more. */
+static void pages_are_closed_upwards(void)
+{
+    paged_land p;
+    uint32_t turn, node, count, state[4] = {0, 0, 0, 0}, coming[64], full = 0;
+    void *page;
+    if (!paged_prepare(&p, 200, 170, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
+        !paged_open(&p, 24))
+        return;
+    for (turn = 0; turn < 2000u; turn++) {
+        terrimp_result result;
+        node = random_range(0, p.l.info.node_count - 1u);
+        node = p.l.info.node_count - 1u - random_range(0, node);
+        switch (turn % 400u ? random_range(0, 2) : 3u) {
+        case 0: result = paged_fetch(&p, node); break;
+        case 1: result = terrimp_page_begin(p.opened, node, &page); break;
+        case 2: result = terrimp_page_fail(p.opened, node); break;
+        default: result = terrimp_pages_next_frame(p.opened); break;
+        }
+        CHECK(result == TERRIMP_OK || result == TERRIMP_E_STATE || result == TERRIMP_E_CAPACITY);
+        full += result == TERRIMP_E_CAPACITY;
+        CHECK(terrimp_pages_withdrawn(p.opened, coming, 64, &count) == TERRIMP_OK);
+        while (count > 0 && turn % 16u == 0)
+            CHECK(terrimp_page_fail(p.opened, coming[--count]) == TERRIMP_OK);
+        memset(state, 0, sizeof state);
+        for (node = 0; node < p.l.info.node_count; node++) {
+            terrimp_page_info info, above;
+            CHECK(terrimp_page_get_info(p.opened, node, &info) == TERRIMP_OK);
+            state[info.state]++;
+            if (info.state == TERRIMP_PAGE_ABSENT || node + 1u == p.l.info.node_count)
+                continue;
+            CHECK(terrimp_page_get_info(
+                      p.opened, terrimpi_tree_parent_number(&p.opened->tree, node), &above) ==
+                  TERRIMP_OK);
+            CHECK(above.state == TERRIMP_PAGE_HERE && info.slot < 24u);
+        }
+        CHECK(state[TERRIMP_PAGE_HERE] + state[TERRIMP_PAGE_COMING] <= 24u);
+    }
+    CHECK(full > 0);
+    paged_free(&p);
+}
+
+/* Heights, normals and rays: exact where the finest page is here; else "not here", or of the finest
+   that is. */
+static void pages_answer_heights_and_rays(void)
+{
+    paged_land p;
+    uint32_t turn, level;
+    if (!paged_prepare(&p, 201, 161, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
+        !paged_open(&p, 2000))
+        return;
+    for (turn = 0; turn < 4000u; turn++) {
+        float x = random_float(0.0f, 200.0f), z = random_float(0.0f, 160.0f), h, exact;
+        float origin[3], way[3], n[3], m[3];
+        terrimp_ray_hit hit, truth;
+        terrimp_result result, true_result;
+        if (turn % 3u == 0 && turn < 3000u)
+            paged_fetch(&p, random_range(0, p.l.info.node_count - 1u));
+        if (turn == 3000u) {
+            for (level = p.l.info.node_count; level-- > 0;)
+                paged_fetch(&p, level);
+        }
+        CHECK(terrimp_heightfield_height(&p.l.desc.field, x, z, &exact) == TERRIMP_OK);
+        result = terrimp_terrain_height(p.opened, x, z, &h, n, &level);
+        CHECK(result == (paged_is_here(&p, p.l.info.node_count - 1u) ? TERRIMP_OK
+                                                                     : TERRIMP_E_PAGE));
+        if (result == TERRIMP_OK && level == 0) {
+            CHECK(fabsf(h - exact) < 1e-3f);
+            terrimp_heightfield_normal(&p.l.desc.field, x, z, m);
+            CHECK(fabsf(n[1] - m[1]) < 2e-3f);
+        } else if (result == TERRIMP_OK) {
+            CHECK(turn < 3000u);
+            CHECK(terrimp_terrain_height(p.opened, x, z, &h, NULL, NULL) == TERRIMP_E_PAGE);
+        }
+        origin[0] = random_float(-50.0f, 250.0f);
+        origin[1] = random_float(100.0f, 400.0f);
+        origin[2] = random_float(-50.0f, 210.0f);
+        way[0] = x - origin[0], way[1] = exact - origin[1], way[2] = z - origin[2];
+        result = terrimp_terrain_raycast(p.opened, origin, way, 1e6f, &hit, &level);
+        if (result == TERRIMP_E_PAGE)
+            continue;
+        true_result = terrimp_heightfield_raycast(&p.l.desc.field, origin, way, 1e6f, &truth);
+        if (turn >= 3000u) {
+            CHECK(result == true_result && level == 0);
+            if (result == TERRIMP_OK) {
+                CHECK(fabsf(hit.distance - truth.distance) < 1e-3f * truth.distance);
+                CHECK(hit.x + 1u >= truth.x && hit.x <= truth.x + 1u);
+            }
+        } else if (result == TERRIMP_OK && true_result == TERRIMP_OK && level == 0) {
+            CHECK(fabsf(hit.distance - truth.distance) < 1e-3f * truth.distance);
+        }
+    }
+    paged_free(&p);
+}
+
+/* What needs a page that is not here says so; what needs all samples at once does too. */
+static void bad_pages(void)
+{
+    paged_land p;
+    terrimp_box box;
+    terrimp_mesh_info mesh;
+    terrimp_rect all = {0, 0, 20, 20};
+    terrimp_terrain *terrain;
+    terrimp_pages_info info;
+    float xyz[3 * 81];
+    uint16_t index;
+    uint32_t level;
+    size_t bytes;
+    if (!paged_prepare(&p, 60, 50, TERRIMP_FORMAT_U8, LAND_HILLS, 8, 0) || !paged_build(&p) ||
+        !paged_open(&p, 8))
+        return;
+    bytes = terrimp_pages_bytes(p.file, p.bytes, 8);
+    REFUSES(TERRIMP_E_PAGE, box, terrimp_terrain_get_box(p.opened, 0, &box));
+    REFUSES(TERRIMP_E_PAGE, mesh, terrimp_terrain_get_mesh(p.opened, 0, &mesh));
+    REFUSES(TERRIMP_E_PAGE, xyz, terrimp_terrain_fill_ground(p.opened, 0, xyz, 3 * 81));
+    REFUSES(TERRIMP_E_PAGE, xyz, terrimp_terrain_fill_mesh(p.opened, 0, xyz, 243, &index, 1));
+    REFUSES(TERRIMP_E_PAGE, xyz, terrimp_terrain_fill_meshes(p.opened, xyz, 243, &index, 1));
+    REFUSES(TERRIMP_E_PAGE, xyz[0],
+            terrimp_terrain_height(p.opened, 1.0f, 1.0f, xyz, NULL, &level));
+    REFUSES(TERRIMP_E_MISS, xyz[0],
+            terrimp_terrain_height(p.opened, -1.0f, 1.0f, xyz, NULL, &level));
+    GIVES(TERRIMP_E_STATE, terrimp_terrain_rebuild(p.opened, &all, p.scratch, p.scratch_bytes));
+    GIVES(TERRIMP_E_STATE, terrimp_terrain_build_begin(p.opened));
+    GIVES(TERRIMP_E_STATE, terrimp_terrain_build_finish(p.opened));
+    GIVES(TERRIMP_E_STATE, terrimp_pages_next_frame(p.l.terrain));
+    CHECK(terrimp_bake_bytes(p.opened) == 0);
+    REFUSES(TERRIMP_E_NULL, info, terrimp_pages_check(NULL, 9000, &info));
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_pages_check(p.file, 100, &info));
+    REFUSES(TERRIMP_E_RANGE, terrain,
+            terrimp_pages_open(NULL, p.file, p.bytes, 7, p.memory, bytes, &terrain));
+    REFUSES(TERRIMP_E_MEMORY, terrain,
+            terrimp_pages_open(NULL, p.file, p.bytes, 8, p.memory, bytes - 1u, &terrain));
+    REFUSES(TERRIMP_E_ALIGN, terrain,
+            terrimp_pages_open(NULL, p.file, p.bytes, 8, (char *)p.memory + 1, bytes, &terrain));
+    CHECK(terrimp_pages_bytes(p.file, p.bytes, 65535) == 0);
+    GIVES(TERRIMP_E_RANGE,
+          terrimp_pages_build_block(&p.desc, p.block_count, p.scratch, p.scratch_bytes));
+    GIVES(TERRIMP_E_MEMORY, terrimp_pages_build_block(&p.desc, 0, p.scratch, 100));
+    p.desc.terrain.height_low = 200.0f; /* above most samples */
+    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
+    p.desc.terrain.height_low = p.desc.terrain.height_high;
+    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
+    p.desc.terrain.height_low = 0.0f;
+    p.desc.terrain.field.format = TERRIMP_FORMAT_F32;
+    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
+    p.desc.read = NULL;
+    GIVES(TERRIMP_E_NULL, terrimp_pages_build_end(&p.desc, p.scratch, p.scratch_bytes));
+    paged_free(&p);
+}
+
+static void pages_tests(void)
+{
+    RUN(bad_pages);
+    RUN(pages_say_what_memory_does);
+    RUN(pages_are_built_in_any_order);
+    RUN(pages_that_are_no_good_are_refused);
+    RUN(pages_are_closed_upwards);
+    RUN(pages_answer_heights_and_rays);
+}
+
+#endif
