@@ -328,7 +328,7 @@ static void pages_that_are_no_good_are_refused(void)
             uint32_t at, hash = 2166136261u, *words = (uint32_t *)page;
             words[random_range(3, info.bytes / 4u - 1u)] = turn % 2u ? 0x7fc00000u : random_bits();
             for (at = 1; at < info.bytes / 4u; at++)
-                hash = terrimpi_hash(hash, words[at]);
+                hash = terrimpi_bake_hash_word(hash, words[at]);
             words[0] = hash;
         }
         if (terrimp_page_put(p.opened, node) != TERRIMP_E_BAKE) {
