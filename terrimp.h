@@ -1183,7 +1183,7 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 /* Draw a ground node. */
 typedef struct terrimp_ground_command {
     uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
-    uint32_t level;
+    uint32_t level, x, z; /* its column and row on its level */
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
@@ -1196,8 +1196,7 @@ typedef struct terrimp_ground_command {
    when `clear` is set, to transparent black. The ground commands up
    to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
                                        matrices clip what lies before it */
     uint32_t atlas;                 /* < atlas_count */
@@ -1292,8 +1291,7 @@ typedef struct terrimp_view_desc {
    picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
    the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part, part_count;
     uint32_t atlas;
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
@@ -2384,10 +2382,10 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 /* ==== stop here if you only want the API ================================= */
 
-/* Private names are terrimpi_ROOM_...: field, camera, tree, mip, impostor and split, atlas and pack,
-   terrain with mesh and floor, bake, horizon and walls, capture, view with cull, candidate, region,
-   cache and job, sorted, layer; simp and raise, build and fill, layers with mask, cover, record and
-   depth, place and prepare. Those without a room are of Basics. */
+/* Private names are terrimpi_ROOM_...: field, camera, tree, mip, impostor and split, atlas and
+   pack, terrain with mesh and floor, bake, horizon and walls, capture, view with cull, candidate,
+   region, cache and job, sorted, layer; simp and raise, build and fill, layers with mask, cover,
+   record and depth, place and prepare. Those without a room are of Basics. */
 #ifdef TERRIMP_IMPLEMENTATION
 #ifndef TERRIMP_IMPLEMENTATION_ONCE
 #define TERRIMP_IMPLEMENTATION_ONCE
@@ -7611,6 +7609,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     camera.z_far = terrimpi_capture_end(plan, layer);
     command->node = plan->node.number;
     command->level = plan->node.level;
+    command->x = plan->node.x;
+    command->z = plan->node.z;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
@@ -7622,9 +7622,12 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (; from < to; from++) {
-        if (!terrimpi_capture_in_layer(t, plan, draws[from].node, layer))
+        terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
+        if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        ground.node = draws[from].node;
+        ground.node = node.number;
+        ground.x = node.x;
+        ground.z = node.z;
         ground.first_index = draws[from].first_index;
         ground.index_count = draws[from].index_count;
         callbacks->draw_ground(callbacks->user, &ground);
@@ -8954,6 +8957,8 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
     memset(&command, 0, sizeof command);
     command.node = ground->node.number;
     command.level = ground->node.level;
+    command.x = ground->node.x;
+    command.z = ground->node.z;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -8973,6 +8978,8 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     memset(&command, 0, sizeof command);
     command.node = picture->node.number;
     command.level = picture->node.level;
+    command.x = picture->node.x;
+    command.z = picture->node.z;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
