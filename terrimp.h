@@ -4019,7 +4019,7 @@ struct terrimp_pages {
     terrimpi_page_slot *slots; /* [slot_count] */
     unsigned char *pages;      /* [slot_count][page_bytes] */
     const unsigned char *root; /* the record of the root */
-    const float *floor;        /* heights of the floor's vertices */
+    const float *lows;         /* heights of the floor's vertices */
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
@@ -6557,7 +6557,7 @@ static void terrimpi_floor_write_ground(const terrimp_terrain *t, float *xyz, ui
                 for (i = x ? x - 1u : 0; i <= terrimpi_min_u32(x, wide - 1u); i++)
                     low = terrimpi_min(low, nodes[t->tree.level_first[level] + k * wide + i].low);
             if (!nodes)
-                low = t->tree.pages->floor[z * (wide + 1u) + x];
+                low = t->tree.pages->lows[z * (wide + 1u) + x];
             *xyz++ = terrimpi_terrain_x(t, x * quads);
             *xyz++ = low;
             *xyz++ = terrimpi_terrain_z(t, z * quads);
@@ -6621,7 +6621,7 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
         xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
-        top[1] = t->tree.pages ? t->tree.pages->floor[ground + k]
+        top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
                                : terrimpi_min(terrimpi_terrain_lowest(t, before, at),
                                               terrimpi_terrain_lowest(t, at, after));
     }
@@ -7776,7 +7776,7 @@ static int terrimpi_record_ok(const terrimpi_record *r)
 static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terrimp_terrain *t,
                                           terrimpi_pages_head *head)
 {
-    const unsigned char *floor = (const unsigned char *)header + sizeof *head;
+    const unsigned char *lows = (const unsigned char *)header + sizeof *head;
     uint32_t i;
     TERRIMPI_REFUSE(!header, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(bytes < TERRIMP_PAGES_HEADER_BYTES, TERRIMP_E_BAKE);
@@ -7795,7 +7795,7 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
     for (i = 0; i < terrimpi_floor_ground_vertices(t) + terrimpi_floor_wall_points(t); i++) {
         float height;
-        memcpy(&height, floor + i * sizeof height, sizeof height);
+        memcpy(&height, lows + i * sizeof height, sizeof height);
         TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_BAKE);
     }
     return TERRIMP_OK;
@@ -7900,7 +7900,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
     memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
     p.root = copy + offsetof(terrimpi_pages_head, root);
-    p.floor = (const float *)(const void *)(copy + sizeof head);
+    p.lows = (const float *)(const void *)(copy + sizeof head);
     for (i = 0; i < slot_count; i++)
         p.slots[i].node = p.node_count;
     t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
@@ -15275,31 +15275,31 @@ static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uin
 }
 
 /* The heights of the floor's corners and walls: see terrimpi_floor_write. */
-static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *floor)
+static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *lows)
 {
     const terrimp_terrain *t = &w->whole;
     uint32_t level = t->floor_level, wide = t->tree.level_x[level], deep = t->tree.level_z[level];
     uint32_t i, k, x, z, points = terrimpi_floor_wall_points(t);
     terrimpi_page_head head;
     for (i = 0; i < terrimpi_floor_ground_vertices(t) + points; i++)
-        floor[i] = TERRIMPI_FLOAT_MAX;
+        lows[i] = TERRIMPI_FLOAT_MAX;
     for (z = 0; z < deep; z++)
         for (x = 0; x < wide; x++) {
             terrimp_node n = terrimpi_tree_at(&t->tree, level, x, z);
             TERRIMPI_TRY(terrimpi_paging_load(w, &n, w->page, &head));
             for (k = 0; k < 4u; k++) {
-                float *corner = floor + (z + k / 2u) * (wide + 1u) + x + k % 2u;
+                float *corner = lows + (z + k / 2u) * (wide + 1u) + x + k % 2u;
                 *corner = terrimpi_min(*corner, head.record.ground.low);
             }
         }
-    floor += terrimpi_floor_ground_vertices(t);
+    lows += terrimpi_floor_ground_vertices(t);
     for (k = 0; k < points; k++) {
         uint32_t before[2], at[2], after[2];
         terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
         terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &floor[k]));
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &floor[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &lows[k]));
     }
     return TERRIMP_OK;
 }
