@@ -1477,6 +1477,7 @@ typedef struct terrimp_stats {
     uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
+    uint32_t late;               /* nodes and pictures that pages were missing for */
     float ground_tolerance_px;   /* what max_ground made of it */
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
@@ -1515,9 +1516,33 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
-              more nodes in GEOMIP and AUTO even at 1000 px. The frame before stays
+              more nodes in GEOMIP and AUTO even at 1000 px; E_PAGE when the page of the root is not
+              here. The frame before stays
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
+
+/* Why a page is wanted. */
+typedef enum terrimp_want_reason {
+    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
+    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
+    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
+    TERRIMP_WANT_REASON_COUNT
+} terrimp_want_reason;
+
+typedef struct terrimp_want {
+    uint32_t node, level, bytes;
+    int reason;     /* terrimp_want_reason */
+    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
+} terrimp_want;
+
+/* The pages that the last update would have liked to have, best first, and no more than there are
+   slots for. None of them is here or coming, and the parents of all are here. Several views share a
+   terrain's pages: ask them all, and begin refuses what another has asked for.
+
+   wants      [capacity] out
+   count      out: how many */
+TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
+                                              uint32_t capacity, uint32_t *count);
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
@@ -4049,6 +4074,13 @@ static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint
                       (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
 }
 
+/* What PICTURE asks of a node for those below it: the last number of its record. */
+static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
+{
+    return *(const float *)(const void *)(terrimpi_page_record(t, number) +
+                                          TERRIMPI_PAGE_RECORD - sizeof(float));
+}
+
 /* Heights and errors of a node. */
 static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtree *t,
                                                             uint32_t number)
@@ -4396,7 +4428,7 @@ static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, ui
                                    int rule, float tolerance_px, float pixel_factor)
 {
     const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
-    float d;
+    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
     if (level == 0)
         return 0.0f;
     if (rule == TERRIMP_GEOMIP_BOUND || rule == TERRIMP_GEOMIP_DISTANCE) {
@@ -4410,7 +4442,7 @@ static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, ui
            same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
            is equal over all nodes where rms * quad / d^2 is. */
         float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
-        d = n->rms * pixel_factor * (quad * pixel_factor) /
+        d = rms * pixel_factor * (quad * pixel_factor) /
             (tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
     }
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
@@ -4467,6 +4499,7 @@ typedef struct terrimpi_mip_frame {
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
     float relief;              /* what measures are multiplied with */
+    float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
@@ -4564,8 +4597,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp_node *node,
                                       int *planes)
 {
-    float d2, measure, split2 = f->view->distances[node->number];
+    float d2, measure, split2;
     terrimp_box box;
+    split2 = !f->tree->pages ? f->view->distances[node->number]
+                             : terrimpi_mip_distance(f->tree, node->level, node->number,
+                                                     f->view->rule, f->view->tolerance_px,
+                                                     f->factor);
     if (!(split2 > 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
@@ -4738,6 +4775,9 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     wanted[2] = v->morph_ratio;
     wanted[3] = v->rule == TERRIMP_GEOMIP_DISTANCE ? pixel_factor / f->cos2 : pixel_factor;
     wanted[4] = 1.0f;
+    f->factor = wanted[3];
+    if (f->tree->pages) /* they say what those below ask of them */
+        return;
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
@@ -4801,6 +4841,7 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
     terrimp_camera c;
     terrimp_result result;
     TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(tree->pages, TERRIMP_E_PAGE);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
     TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
@@ -8103,6 +8144,43 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
     return TERRIMP_OK;
 }
 
+/* ---- what a frame uses ---- */
+
+static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
+{
+    terrimpi_page_slot *slot = t->pages ? terrimpi_page_slot_of(t->pages, node) : NULL;
+    if (slot)
+        slot->used = t->pages->frame;
+}
+
+/* Whether a node may be left for its children: its page is here, and of these each in sight. */
+static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
+                                 const terrimp_frustum *frustum)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t i;
+    int all = 1;
+    if (!tree->pages)
+        return 1;
+    if (!terrimpi_page_of(tree->pages, node->number))
+        return 0;
+    terrimpi_page_use(tree, node->number);
+    for (i = 0; i < 4u && node->level > 0; i++) {
+        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
+        terrimp_node child;
+        terrimp_box box;
+        if (!terrimpi_tree_has(tree, node->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(tree, node->level - 1u, x, z);
+        terrimpi_terrain_node_box(t, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        terrimpi_page_use(tree, child.number);
+        all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+    }
+    return all;
+}
+
 /* ---- heights and rays ---- */
 
 /* The finest page that is here at a position. */
@@ -8297,7 +8375,8 @@ static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], cons
     return 1;
 }
 
-/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
+/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. Negative
+   when a page is missing that would tell it. */
 static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const terrimp_node *node,
                                            uint32_t level)
 {
@@ -8306,22 +8385,31 @@ static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const t
     uint32_t z1 = terrimpi_min_u32((node->z + 1u) << shift, tree->level_z[level]);
     float worst = 0.0f;
     for (z = node->z << shift; z < z1; z++)
-        for (x = node->x << shift; x < x1; x++)
-            worst = terrimpi_max(worst, terrimpi_tree_kept(tree, tree->level_first[level] +
-                                                                     z * tree->level_x[level] +
-                                                                     x)->rms);
+        for (x = node->x << shift; x < x1; x++) {
+            const terrimp_geomip_node *kept = terrimpi_tree_kept(
+                tree, tree->level_first[level] + z * tree->level_x[level] + x);
+            if (!kept)
+                return -1.0f;
+            worst = terrimpi_max(worst, kept->rms);
+        }
     return worst;
 }
 
 /* The level of the ground that a picture is made of: the coarsest whose rms error [wu] keeps to a
-   limit. */
+   limit; or that of which this is not known yet, when *is_known becomes 0: pages of that level are
+   missing, and it needs them in any case. */
 static uint32_t terrimpi_capture_source(const terrimp_quadtree *tree, const terrimp_node *node,
-                                        float limit)
+                                        float limit, int *is_known)
 {
     uint32_t level = node->level;
-    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES &&
-           terrimpi_capture_source_error(tree, node, level) > limit)
+    float error = 0.0f;
+    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES) {
+        error = terrimpi_capture_source_error(tree, node, level);
+        if (!(error > limit))
+            break;
         level--;
+    }
+    *is_known = error >= 0.0f;
     return level;
 }
 
@@ -8577,6 +8665,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
+#define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
 #define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
                                          exceed this */
@@ -8739,7 +8829,6 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     uint32_t chunks;
     TERRIMPI_REFUSE(!terrain || !desc || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(terrain->tree.pages, TERRIMP_E_PAGE);
     d = *desc;
     if (d.mode == TERRIMP_MODE_DEFAULT)
         d.mode = TERRIMP_MODE_AUTO;
@@ -8759,6 +8848,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(terrain->tree.pages &&
+                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.walls), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8956,7 +9047,8 @@ static int terrimpi_cache_shows(const terrimpi_cache_picture *picture, uint32_t 
 
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
-    TERRIMPI_CULL_IMPOSTOR = 2  /* the impostor cut does */
+    TERRIMPI_CULL_IMPOSTOR = 2, /* the impostor cut does, */
+    TERRIMPI_CULL_SHORT = 4     /* ... only because pages of its children are missing */
 };
 
 /* A node in sight. */
@@ -8995,7 +9087,8 @@ static int terrimpi_cull_hides(terrimpi_cull *cull, int behind, const terrimpi_f
 }
 
 /* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
-   that has a picture keeps its place for a little longer. */
+   that has a picture keeps its place for a little longer. Where pages of its children are missing
+   it has to, with TERRIMPI_CULL_SHORT. */
 static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *node, float closest,
                                   int has_picture)
 {
@@ -9010,7 +9103,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    return closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side);
+    if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
+        return 1;
+    return terrimpi_page_divides(f->terrain, node, &f->frustum) ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -9048,7 +9143,7 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
                               const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
                               float closest, int *done)
 {
-    int cuts = 0;
+    int cuts = 0, impostor;
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
@@ -9056,10 +9151,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
             terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
-    if (!(*done & TERRIMPI_CULL_IMPOSTOR) &&
-        terrimpi_cull_impostor(f, node, closest,
-                               cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE)) {
-        cuts |= TERRIMPI_CULL_IMPOSTOR;
+    if (*done & TERRIMPI_CULL_IMPOSTOR)
+        return cuts;
+    impostor = terrimpi_cull_impostor(f, node, closest, cache->of_node[node->number] !=
+                                                            TERRIMPI_CACHE_NO_PICTURE);
+    if (impostor) {
+        cuts |= TERRIMPI_CULL_IMPOSTOR | (impostor & TERRIMPI_CULL_SHORT);
         *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     return cuts;
@@ -9208,13 +9305,14 @@ static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
 static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node *node,
-                                     float closest)
+                                     float closest, int *is_known)
 {
+    *is_known = 1;
     if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
-                                       (f->pixel_factor * f->desc->texels_per_px));
+                                       (f->pixel_factor * f->desc->texels_per_px), is_known);
 }
 
 /* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
@@ -9282,6 +9380,8 @@ typedef struct terrimpi_candidate {
     float urgency;              /* error of its picture over the tolerance */
     float life;                 /* [frames] that a new picture would last */
     float draw_cost, capture_cost;
+    int is_short;               /* it stands for those below, whose pages are missing */
+    int is_known;               /* so is what of the ground it would show */
     int rank;                   /* among the captures of this frame, */
     float weight;               /* ... and within its rank */
     terrimpi_cache_picture *picture;  /* or NULL */
@@ -9348,6 +9448,8 @@ struct terrimp_view {
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
+    terrimp_want *wants;           /* [want_limit] of a terrain in pages */
+    uint32_t want_count, want_limit, late;
     uint32_t open;                 /* 1 + the job of which pieces are missing */
     int outdated;                  /* what this frame would draw has been forgotten */
     terrimp_geomip_view ground;
@@ -9412,7 +9514,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     if (v->desc.exact_depth)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
-    v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
+    v->want_limit = v->terrain->tree.pages ? TERRIMPI_VIEW_WANTS : 0u;
+    v->wants = (terrimp_want *)terrimpi_take(&l, v->want_limit, sizeof *v->wants);
+    v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
+                                                 sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
     v->cull.capacity = (uint32_t)terrimpi_cull_capacity(&v->terrain->tree, ground + impostors);
     captures = terrimpi_arena_at(NULL);
@@ -9563,6 +9668,193 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     return TERRIMP_OK;
 }
 
+/* ---- the pages that are missing ---- */
+
+/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
+static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
+{
+    if (a->urgency > b->urgency || a->urgency < b->urgency)
+        return a->urgency > b->urgency;
+    return a->level != b->level ? a->level > b->level : a->node < b->node;
+}
+
+/* Notes that a page is of use in this frame. If it is missing it is wanted; or the one above it
+   that has to come first. */
+static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int reason,
+                               float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    terrimp_node n = *node, above;
+    terrimp_want want, *worst = v->wants;
+    uint32_t i;
+    while (n.level + 1u < t->level_count && !t->pages->slot_of[n.number]) {
+        above = terrimpi_tree_parent(t, &n);
+        terrimpi_page_use(t, above.number); /* or it might be given up for this */
+        if (terrimpi_page_of(t->pages, above.number))
+            break;
+        n = above;
+    }
+    terrimpi_page_use(t, n.number);
+    if (t->pages->slot_of[n.number])
+        return;
+    want.node = n.number;
+    want.level = n.level;
+    want.bytes = t->pages->page_bytes;
+    want.reason = reason;
+    want.urgency = urgency;
+    for (i = 0; i < v->want_count; i++) {
+        if (v->wants[i].node == n.number) {
+            if (terrimpi_want_before(&want, &v->wants[i]))
+                v->wants[i] = want;
+            return;
+        }
+        if (terrimpi_want_before(worst, &v->wants[i]))
+            worst = &v->wants[i];
+    }
+    if (v->want_count < v->want_limit)
+        v->wants[v->want_count++] = want;
+    else if (terrimpi_want_before(&want, worst))
+        *worst = want;
+}
+
+/* The same for the children of a node that are in sight, and the node itself. */
+static void terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
+                                        const terrimp_node *node, int reason, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    uint32_t i;
+    if (!t->pages)
+        return;
+    terrimpi_view_want(v, node, reason, urgency);
+    if (!terrimpi_page_of(t->pages, node->number))
+        return;
+    for (i = 0; i < 4u && node->level > 0; i++) {
+        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
+        terrimp_node child;
+        terrimp_box box;
+        if (!terrimpi_tree_has(t, node->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(t, node->level - 1u, x, z);
+        terrimpi_terrain_node_box(v->terrain, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+            terrimpi_view_want(v, &child, reason, urgency);
+    }
+}
+
+/* Whether the nodes exist that have to beside and above one that is split. */
+static int terrimpi_view_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
+{
+    terrimp_node beyond;
+    int side;
+    if (node->level + 1u == mip->tree->level_count)
+        return 1;
+    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
+        return 0;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
+            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
+            return 0;
+    return 1;
+}
+
+/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
+   neighbours still differ by one level at most. All that the split would need is wanted. */
+static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
+                                 const terrimpi_mip_frame *mip)
+{
+    const terrimp_quadtree *t = mip->tree;
+    uint32_t level, number;
+    v->want_count = v->late = 0;
+    if (!t->pages)
+        return;
+    terrimpi_page_use(t, t->node_count - 1u);
+    for (level = t->level_count; level-- > 1u;)
+        for (number = mip->first[level]; number != t->node_count;
+             number = v->ground.marks[number].next) {
+            terrimp_geomip_mark *mark = &v->ground.marks[number];
+            terrimp_node node = terrimpi_tree_node(t, number);
+            if (mark->measure < 1.0f)
+                continue;
+            terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
+                                        TERRIMP_SQRTF(mark->measure));
+            if (terrimpi_view_has_around(mip, &node) &&
+                terrimpi_page_divides(v->terrain, &node, &f->frustum))
+                continue;
+            mark->measure = 0.0f;
+            v->late++;
+        }
+}
+
+/* Asks for the pages that ground will need soon, as the eye goes on. */
+static void terrimpi_view_look_ahead(terrimp_view *v, const terrimpi_frame *f,
+                                     const terrimpi_mip_frame *mip)
+{
+    const float *away = f->motion.away[0];
+    float frames = f->motion.frames[0] > 0.0f ? TERRIMPI_VIEW_SOON / f->motion.frames[0] : 0.0f;
+    uint32_t i, k;
+    if (!mip->tree->pages || f->desc->no_lookahead || !(terrimpi_length(away) > 0.0f))
+        return;
+    for (i = 0; i < v->ground.draw_count; i++) {
+        const terrimp_node *node = &v->ground.draws[i].node;
+        int planes = 0;
+        float measure, now, soon, eye[3];
+        terrimp_box box;
+        if (node->level == 0)
+            continue;
+        measure = terrimpi_mip_split_ratio(mip, node, &planes);
+        terrimpi_terrain_node_box(v->terrain, node, &box);
+        for (k = 0; k < 3u; k++)
+            eye[k] = f->camera.eye[k] + away[k] * frames;
+        now = terrimp_box_distance(&box, f->camera.eye);
+        soon = terrimp_box_distance(&box, eye);
+        if (measure * now * now >= soon * soon)
+            terrimpi_view_want_children(v, &f->frustum, node, TERRIMP_WANT_AHEAD,
+                                        0.99f * terrimpi_min(measure, 1.0f));
+    }
+}
+
+/* Whether all pages are here that a capture draws; those that are not are wanted. */
+static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
+                                   uint32_t count, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    uint32_t i;
+    int all = 1;
+    for (i = 0; i < count && t->pages; i++) {
+        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
+        terrimpi_view_want(v, &node, urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE,
+                           terrimpi_min(urgency, 2.0f));
+        all &= terrimpi_page_of(t->pages, node.number) != NULL;
+    }
+    v->late += all ? 0u : 1u;
+    return all;
+}
+
+TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
+                                              uint32_t capacity, uint32_t *count)
+{
+    uint32_t i, k, gap, room = 0;
+    const struct terrimp_pages *p;
+    TERRIMPI_REFUSE(!view || !count || (!wants && capacity > 0), TERRIMP_E_NULL);
+    *count = 0;
+    p = view->terrain->tree.pages;
+    if (!p)
+        return TERRIMP_OK;
+    for (gap = view->want_count / 2u; gap > 0; gap /= 2u)
+        for (i = gap; i < view->want_count; i++) {
+            terrimp_want moved = view->wants[i];
+            for (k = i; k >= gap && terrimpi_want_before(&moved, &view->wants[k - gap]); k -= gap)
+                view->wants[k] = view->wants[k - gap];
+            view->wants[k] = moved;
+        }
+    for (i = 0; i < p->slot_count; i++)
+        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
+    *count = terrimpi_min_u32(terrimpi_min_u32(view->want_count, room), capacity);
+    for (i = 0; i < *count; i++)
+        wants[i] = view->wants[i];
+    return TERRIMP_OK;
+}
+
 /* ---- the regions ---- */
 
 /* Makes the ground draw of a node in the ground cut. */
@@ -9603,6 +9895,7 @@ static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_
             memset(c, 0, sizeof *c);
             c->node = node;
             c->closest = nodes[i].closest;
+            c->is_short = (nodes[i].cuts & TERRIMPI_CULL_SHORT) != 0;
         }
         v->candidate_count++;
     }
@@ -9644,6 +9937,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
+        terrimpi_view_settle(v, f, &mip);
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most)
@@ -9651,6 +9945,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
     terrimpi_view_make_regions(v, &mip);
+    terrimpi_view_look_ahead(v, f, &mip);
     return TERRIMP_OK;
 }
 
@@ -9665,12 +9960,13 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
-    uint32_t quads;
+    uint32_t quads, source;
     terrimpi_terrain_node_box(f->terrain, &c->node, &box);
     if (terrimpi_camera_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
+    c->is_known = 1;
     c->pixels = k * k * (camera.tan_right - camera.tan_left) * (camera.tan_up - camera.tan_down);
     c->draw_cost = terrimpi_cost_draw(costs, (float)(mesh.index_count / 3u));
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
@@ -9680,8 +9976,8 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 1;
     }
     c->urgency = 1e9f;
-    quads = f->terrain->desc.chunk_quads
-            << (c->node.level - terrimpi_view_source(f, &c->node, c->closest));
+    source = terrimpi_view_source(f, &c->node, c->closest, &c->is_known);
+    quads = f->terrain->desc.chunk_quads << (c->node.level - source);
     c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
     return 1;
@@ -9772,8 +10068,9 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node, float most_urgent)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    if (!p)
+    if (!p || !terrimpi_tree_opens(&v->terrain->tree, node->number))
         return 0;
+    terrimpi_page_use(&v->terrain->tree, node->number);
     if (p->listed == v->frame.number) {
         v->draws[p->draw].alpha = 1.0f;
         return 1;
@@ -9797,7 +10094,8 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
     count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.camera.eye, children);
     for (i = 0; i < count; i++) {
         const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
-        if (!p || p->layer_count == 0)
+        if (!p || p->layer_count == 0 ||
+            !terrimpi_tree_opens(&v->terrain->tree, children[i].number))
             return 0;
     }
     for (i = 0; i < count; i++)
@@ -9960,6 +10258,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     int before = v->kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
+    int is_known = 1;
     terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
@@ -9973,7 +10272,11 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
         terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = best;
-    v->kind_of[region->node] = (unsigned char)best;
+    for (i = 0; i < region->candidate_count; i++)
+        is_known &= v->candidates[region->first_candidate + i].is_known &&
+                    !v->candidates[region->first_candidate + i].is_short;
+    if (is_known) /* else a page that comes later must not find it settled */
+        v->kind_of[region->node] = (unsigned char)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
@@ -10039,7 +10342,13 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     uint32_t size[2], i, largest = terrimpi_max_u32(
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
     terrimp_mesh_info mesh;
+    int is_known;
     memset(job, 0, sizeof *job);
+    if (c->is_short) {
+        terrimpi_view_want_children(v, &f->frustum, &c->node, TERRIMP_WANT_PICTURE, 2.0f);
+        v->late++;
+        return 0;
+    }
     job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
         return 0;
@@ -10053,14 +10362,16 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
         return 0;
+    distance = terrimp_box_distance(&plan->box, eye);
+    plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
+    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
+    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+        return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    distance = terrimp_box_distance(&plan->box, eye);
-    plan->source = terrimpi_view_source(f, &c->node, distance);
-    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
     job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
@@ -10231,7 +10542,12 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
     terrimpi_job *job = &v->jobs[0];
     float angle, parallax;
-    if (terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
+    int has_pages;
+    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
+                terrimpi_view_has_pages(v, v->capture_draws, job->draw_count, 2.0f);
+    if (!has_pages ||
+        terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
         v->open = 0;
@@ -10239,7 +10555,6 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
     terrimpi_job_cut(v->capture_draws, terrimpi_spending_left(&v->frame, s), job);
     terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
 }
@@ -10285,7 +10600,8 @@ static int terrimpi_view_over(const terrimpi_frame *f)
 {
     const float *eye = f->camera.eye;
     float ground;
-    return terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
+    uint32_t level; /* of the finest ground that is here */
+    return terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level) ==
                TERRIMP_OK &&
            eye[1] >= ground;
 }
@@ -10341,6 +10657,7 @@ static void terrimpi_view_count_frame(terrimp_view *v)
     for (i = 0; i < v->draw_count; i++)
         terrimpi_view_count_draw(v, &v->draws[i], s);
     s->visible = v->region_count;
+    s->late = v->late;
     s->evictions = v->cache.evictions;
     s->atlas_failures = v->cache.failures;
     for (i = 0; i < v->region_count; i++) {
@@ -10391,6 +10708,13 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     frame = terrimpi_frame_next(&view->frame, &resolved);
+    if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
+                                                          view->terrain->tree.node_count - 1u)) {
+        terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
+        view->want_count = 0;
+        terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
+        return TERRIMP_E_PAGE;
+    }
     TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
     view->frame = frame;
     view->cache.frame = frame.number;

@@ -509,6 +509,330 @@ static void bad_pages(void)
     paged_free(&p);
 }
 
+/* ---- views ---- */
+
+/* What a frame draws: where slots lie, and what follows from it, hangs on the order of captures. */
+typedef struct paged_frame {
+    terrimp_ground_command ground[2000];
+    terrimp_impostor_command impostors[2000];
+    uint32_t ground_count, impostor_count, captures, captured;
+    paged_land *p; /* NULL: all is in memory */
+    int in_capture;
+} paged_frame;
+
+static void paged_begin_capture(void *user, const terrimp_capture_command *c)
+{
+    paged_frame *f = (paged_frame *)user;
+    CHECK(!f->p || paged_is_here(f->p, c->node));
+    f->captures++;
+    f->in_capture = 1;
+}
+
+static void paged_end_capture(void *user, const terrimp_capture_command *c)
+{
+    (void)c;
+    ((paged_frame *)user)->in_capture = 0;
+}
+
+static void paged_ground(void *user, const terrimp_ground_command *c)
+{
+    paged_frame *f = (paged_frame *)user;
+    CHECK(!f->p || paged_is_here(f->p, c->node)); /* the host would fill its buffers now */
+    f->captured += f->in_capture ? 1u : 0u;
+    if (!f->in_capture && f->ground_count < 2000u)
+        f->ground[f->ground_count++] = *c;
+}
+
+static void paged_impostor(void *user, const terrimp_impostor_command *c)
+{
+    paged_frame *f = (paged_frame *)user;
+    terrimp_impostor_command *own = &f->impostors[f->impostor_count];
+    CHECK(!f->p || paged_is_here(f->p, c->node));
+    if (f->impostor_count == 2000u)
+        return;
+    f->impostor_count++;
+    *own = *c;
+    own->atlas = own->base_vertex = own->first_index = 0;
+    memset(own->texture_matrix, 0, sizeof own->texture_matrix);
+}
+
+static terrimp_result paged_render(terrimp_view *view, paged_frame *frame, paged_land *p)
+{
+    terrimp_callbacks callbacks;
+    memset(frame, 0, sizeof *frame);
+    memset(&callbacks, 0, sizeof callbacks);
+    frame->p = p;
+    callbacks.user = frame;
+    callbacks.begin_capture = paged_begin_capture;
+    callbacks.end_capture = paged_end_capture;
+    callbacks.draw_ground = paged_ground;
+    callbacks.draw_impostor = paged_impostor;
+    return terrimp_view_render(view, &callbacks);
+}
+
+/* A host whose pages come late, in any order, and sometimes not at all. */
+typedef struct paged_host {
+    paged_land *p;
+    uint32_t coming[64], count;
+    uint32_t reads, again; /* those of pages that had been read before */
+    uint32_t *times;       /* [node_count] each page has been read */
+    uint32_t pace;         /* percent of those coming that come in a frame */
+} paged_host;
+
+/* Returns whether anything is wanted or coming. */
+static int paged_serve(paged_host *h, terrimp_view *view)
+{
+    terrimp_want wants[64];
+    uint32_t count, i, gone[64], gone_count;
+    int busy;
+    CHECK(terrimp_view_wants(view, wants, 64, &count) == TERRIMP_OK);
+    busy = count > 0;
+    for (i = 0; i < count; i++) {
+        terrimp_page_info info;
+        void *page;
+        terrimp_result result;
+        CHECK(i == 0 || wants[i].urgency <= wants[i - 1u].urgency);
+        CHECK(terrimp_page_get_info(h->p->opened, wants[i].node, &info) == TERRIMP_OK);
+        CHECK(info.state == TERRIMP_PAGE_ABSENT && info.level == wants[i].level);
+        if (h->count == 64u || random_range(1, 100) > h->pace)
+            continue;
+        result = terrimp_page_begin(h->p->opened, wants[i].node, &page);
+        CHECK(result == TERRIMP_OK);
+        if (result != TERRIMP_OK)
+            continue;
+        memcpy(page, h->p->file + info.offset, info.bytes);
+        h->reads++;
+        h->again += h->times[wants[i].node]++ > 0;
+        h->coming[h->count++] = wants[i].node;
+    }
+    busy |= h->count > 0;
+    CHECK(terrimp_pages_withdrawn(h->p->opened, gone, 64, &gone_count) == TERRIMP_OK);
+    for (i = 0; i < h->count;) {
+        uint32_t node = h->coming[i], k, is_gone = 0;
+        for (k = 0; k < gone_count; k++)
+            is_gone |= gone[k] == node;
+        if (is_gone || random_range(1, 200) == 1u) {
+            CHECK(terrimp_page_fail(h->p->opened, node) == TERRIMP_OK);
+            h->reads--;
+            h->times[node]--;
+        } else if (random_range(1, 100) <= h->pace) {
+            CHECK(terrimp_page_put(h->p->opened, node) == TERRIMP_OK);
+        } else {
+            i++;
+            continue;
+        }
+        h->coming[i] = h->coming[--h->count];
+    }
+    return busy;
+}
+
+/* All of the terrain in sight is drawn, by ground or a picture, and ground meets ground: neighbours
+   differ by one level at most, and both know of it. */
+static void check_paged_frame(const land *l, const paged_frame *frame, const terrimp_camera *camera)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(l->terrain);
+    uint8_t *drawn = (uint8_t *)calloc(1, l->info.node_count); /* 1 ground, 2 impostor */
+    terrimp_frustum frustum;
+    uint32_t i, holes = 0, cracks = 0;
+    int side;
+    CHECK(terrimp_camera_frustum(camera, &frustum) == TERRIMP_OK);
+    for (i = 0; i < frame->ground_count; i++)
+        drawn[frame->ground[i].node] |= 1u;
+    for (i = 0; i < frame->impostor_count; i++)
+        drawn[frame->impostors[i].node] |= 2u;
+    for (i = 0; i < l->info.chunks_x * l->info.chunks_z; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i);
+        terrimp_box box;
+        int shown = drawn[i];
+        CHECK(terrimp_geomip_box(tree, i, &box) == TERRIMP_OK);
+        if (terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        while (!shown && n.level + 1u < tree->level_count) {
+            n = terrimpi_tree_parent(tree, &n);
+            shown = drawn[n.number];
+        }
+        holes += !shown;
+    }
+    for (i = 0; i < frame->ground_count; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, frame->ground[i].node), beyond;
+        terrimp_pattern pattern;
+        uint32_t k = 0;
+        for (;; k++) {
+            CHECK(k < TERRIMP_PATTERN_COUNT && terrimp_pattern_find(l->info.chunk_quads,
+                  TERRIMP_FORM_LIST, k, &pattern) == TERRIMP_OK);
+            if (k >= TERRIMP_PATTERN_COUNT || pattern.first_index == frame->ground[i].first_index)
+                break;
+        }
+        for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+            uint32_t up = 0;
+            if (!terrimpi_tree_beyond(tree, &n, side, &beyond))
+                continue;
+            while (!(drawn[beyond.number] & 1u) && beyond.level + 1u < tree->level_count) {
+                beyond = terrimpi_tree_parent(tree, &beyond);
+                up++;
+            }
+            if (drawn[beyond.number] & 1u) /* else finer ground, pictures or nothing is there */
+                cracks += up > 1u || (up == 1u) != (k >> side & 1u);
+        }
+    }
+    CHECK(holes == 0);
+    CHECK(cracks == 0);
+    free(drawn);
+}
+
+static terrimp_camera paged_camera(const land *l, uint32_t turn)
+{
+    terrimp_camera c;
+    float wide = (float)(l->desc.field.width - 1u), angle = random_float(0.0f, 6.28f);
+    memset(&c, 0, sizeof c);
+    c.eye[0] = random_float(0.05f, 0.95f) * wide;
+    c.eye[2] = random_float(0.05f, 0.95f) * wide;
+    c.eye[1] = turn % 3u == 0 ? random_float(300.0f, 900.0f) : random_float(200.0f, 260.0f);
+    c.forward[0] = cosf(angle);
+    c.forward[1] = turn % 3u == 0 ? -1.0f : -0.2f;
+    c.forward[2] = sinf(angle);
+    c.width_px = 640;
+    c.height_px = 480;
+    c.z_near = 1.0f;
+    c.z_far = 1e5f;
+    return c;
+}
+
+static void paged_land_1025(paged_land *p, uint32_t slots)
+{
+    if (!paged_prepare(p, 1025, 1025, TERRIMP_FORMAT_U16, LAND_HILLS, 16, 0) || !paged_build(p))
+        return;
+    paged_open(p, slots);
+}
+
+static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode)
+{
+    terrimp_view_desc desc;
+    terrimp_view *view = NULL;
+    memset(&desc, 0, sizeof desc);
+    desc.mode = mode;
+    desc.tolerance_px = 2.0f;
+    desc.atlas_size = 4096;
+    CHECK(terrimp_view_create(terrain, &desc, NULL, &view) == TERRIMP_OK);
+    return view;
+}
+
+/* Whatever the order in which pages come: in the end the eye sees what it sees of memory. */
+static void pages_settle_to_what_memory_shows(void)
+{
+    static paged_frame frames[2];
+    paged_land p;
+    uint32_t turn;
+    paged_land_1025(&p, 2000);
+    for (turn = 0; turn < 12u && check_bad == 0; turn++) {
+        int mode = turn % 4u == 3u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        terrimp_view *views[2];
+        terrimp_camera camera = paged_camera(&p.l, turn);
+        terrimp_stats stats[2] = {{0}, {0}};
+        paged_host host;
+        uint32_t frame, quiet = 0;
+        memset(&host, 0, sizeof host);
+        free(p.memory);
+        paged_open(&p, 2000);
+        host.p = &p;
+        host.pace = turn % 3u == 0 ? 10u : 60u;
+        host.times = (uint32_t *)calloc(p.l.info.node_count, sizeof *host.times);
+        views[0] = paged_view(p.l.terrain, mode);
+        views[1] = paged_view(p.opened, mode);
+        for (frame = 0; frame < 2000u && quiet < 8u; frame++) {
+            terrimp_result result;
+            CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+            result = terrimp_view_update(views[1], &camera);
+            CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && frame < 50u));
+            if (paged_serve(&host, views[1]) || result != TERRIMP_OK)
+                quiet = 0;
+            if (result != TERRIMP_OK)
+                continue;
+            CHECK(paged_render(views[1], &frames[1], &p) == TERRIMP_OK);
+            if (frame % 8u == 0)
+                check_paged_frame(&p.l, &frames[1], &camera);
+            quiet = frames[1].captures ? 0 : quiet + 1u;
+        }
+        CHECK(quiet == 8u);
+        for (frame = 0, quiet = 0; frame < 500u && quiet < 8u; frame++) {
+            CHECK(terrimp_view_update(views[0], &camera) == TERRIMP_OK);
+            CHECK(paged_render(views[0], &frames[0], NULL) == TERRIMP_OK);
+            quiet = frames[0].captures ? 0 : quiet + 1u;
+        }
+        CHECK(terrimp_view_get_stats(views[0], &stats[0]) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(views[1], &stats[1]) == TERRIMP_OK);
+        CHECK(stats[1].late == 0 && stats[0].late == 0);
+        CHECK(frames[0].ground_count == frames[1].ground_count);
+        CHECK(frames[0].impostor_count == frames[1].impostor_count);
+        CHECK(memcmp(frames[0].ground, frames[1].ground, sizeof frames[0].ground) == 0);
+        CHECK(memcmp(frames[0].impostors, frames[1].impostors, sizeof frames[0].impostors) == 0);
+        CHECK(stats[0].triangles == stats[1].triangles);
+        terrimp_view_destroy(views[0]);
+        terrimp_view_destroy(views[1]);
+        free(host.times);
+    }
+    paged_free(&p);
+}
+
+/* A flight with far too few slots: no holes, no cracks; nothing is read again while the eye rests.
+   With enough slots nothing is read again at all, but what failed to come. */
+static void pages_fly_without_holes(void)
+{
+    static paged_frame frame;
+    paged_land p;
+    uint32_t turn;
+    paged_land_1025(&p, 40);
+    for (turn = 0; turn < 6u && check_bad == 0; turn++) {
+        static const uint32_t slots[] = {40, 100, 1500};
+        int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        terrimp_camera camera = paged_camera(&p.l, turn);
+        terrimp_view *view;
+        paged_host host;
+        uint32_t i, k, once = 0, before = 0, at_rest = 0;
+        memset(&host, 0, sizeof host);
+        free(p.memory);
+        paged_open(&p, slots[turn % 3u]);
+        host.p = &p;
+        host.pace = 50;
+        host.times = (uint32_t *)calloc(p.l.info.node_count, sizeof *host.times);
+        view = paged_view(p.opened, mode);
+        for (i = 0; i < 300u; i++) {
+            terrimp_result result;
+            int rests = i % 100u >= 50u;
+            if (!rests) {
+                camera.eye[0] += camera.forward[0] * 2.0f;
+                camera.eye[2] += camera.forward[2] * 2.0f;
+                if (camera.eye[0] < 50.0f || camera.eye[0] > 950.0f || camera.eye[2] < 50.0f ||
+                    camera.eye[2] > 950.0f)
+                    camera.forward[0] = -camera.forward[0], camera.forward[2] = -camera.forward[2];
+            }
+            if (i == 150u)
+                camera = paged_camera(&p.l, turn);
+            CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+            result = terrimp_view_update(view, &camera);
+            CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && i < 40u));
+            paged_serve(&host, view);
+            if (i % 100u == 60u)
+                before = host.again;
+            if (i % 100u == 99u)
+                at_rest += host.again - before;
+            if (result != TERRIMP_OK)
+                continue;
+            CHECK(paged_render(view, &frame, &p) == TERRIMP_OK);
+            if (i % 3u == 0)
+                check_paged_frame(&p.l, &frame, &camera);
+        }
+        for (k = 0; k < p.l.info.node_count; k++)
+            once += host.times[k] > 0;
+        CHECK(at_rest <= 2u); /* not one, but for what was withdrawn with them */
+        if (slots[turn % 3u] == 1500u)
+            CHECK(host.reads * 10u <= once * 11u);
+        terrimp_view_destroy(view);
+        free(host.times);
+    }
+    paged_free(&p);
+}
+
 static void pages_tests(void)
 {
     RUN(bad_pages);
@@ -517,6 +841,8 @@ static void pages_tests(void)
     RUN(pages_that_are_no_good_are_refused);
     RUN(pages_are_closed_upwards);
     RUN(pages_answer_heights_and_rays);
+    RUN(pages_settle_to_what_memory_shows);
+    RUN(pages_fly_without_holes);
 }
 
 #endif
