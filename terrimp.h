@@ -10711,7 +10711,8 @@ static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
 static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtree *tree,
                                   const terrimp_node *n, const float eye[3])
 {
-    uint32_t rows[2], cols[2], k, x, z, i0 = n->x * tree->chunk_quads, j0 = n->z * tree->chunk_quads;
+    uint32_t i0 = n->x * tree->chunk_quads, j0 = n->z * tree->chunk_quads;
+    uint32_t rows[2], cols[2], k, x, z;
     rows[0] = b->part.z0 & ~1u;
     rows[1] = (b->part.z1 + 1u) & ~1u;
     while (rows[0] < rows[1]) {
@@ -10924,7 +10925,8 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
         memcpy(indices + 3u * done, net.corners + 3u * t, 3u * sizeof *indices);
         for (k = 0; k < 3u && done >= walls && done < walls + net.surface; k++) {
             uint32_t closer = terrimpi_sorted_beyond(&net, 3u * t + k, 1);
-            if (closer != 0xffffu && net.waits[closer] < TERRIMPI_SORTED_WALL && --net.waits[closer] == 0)
+            if (closer != 0xffffu && net.waits[closer] < TERRIMPI_SORTED_WALL &&
+                --net.waits[closer] == 0)
                 terrimpi_sorted_push(&net, closer);
         }
     }

@@ -3,8 +3,9 @@
    and the four callbacks; the lines after them make the terrain and check the pictures.
    Build:  make software
    Expect: 40 frames of a flight, some of them compared with the full mesh; the last one in
-           build/software.png. All of them again in painter's order, without a depth buffer. Exit code 1 when a frame
-           has holes, is too far from the full mesh, or changes without the depth buffer. */
+           build/software.png. All of them again in painter's order, with a depth buffer and
+           without. Exit code 1 when a frame has holes, is too far from the full mesh, or changes
+           without the depth buffer. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/image.h"
