@@ -9416,9 +9416,9 @@ typedef struct terrimpi_candidate {
     float urgency;              /* error of its picture over the tolerance */
     float life;                 /* [frames] that a new picture would last */
     float draw_cost, capture_cost;
-    int is_short;               /* it stands for those below, whose pages are missing */
-    int is_known;               /* so is what of the ground it would show */
-    int rank;                   /* among the captures of this frame, */
+    uint8_t is_short;           /* it stands for those below, whose pages are missing */
+    uint8_t is_known;           /* what of the ground it would show */
+    uint16_t rank;              /* among the captures of this frame, */
     float weight;               /* ... and within its rank */
     terrimpi_cache_picture *picture;  /* or NULL */
 } terrimpi_candidate;
@@ -9997,6 +9997,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     terrimp_mesh_info mesh;
     terrimp_box box;
     uint32_t quads, source;
+    int is_known;
     terrimpi_terrain_node_box(f->terrain, &c->node, &box);
     if (terrimpi_camera_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
         return 0;
@@ -10012,7 +10013,8 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 1;
     }
     c->urgency = 1e9f;
-    source = terrimpi_view_source(f, &c->node, c->closest, &c->is_known);
+    source = terrimpi_view_source(f, &c->node, c->closest, &is_known);
+    c->is_known = (uint8_t)is_known;
     quads = f->terrain->desc.chunk_quads << (c->node.level - source);
     c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
