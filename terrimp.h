@@ -10793,8 +10793,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
      collapses alone, vertices at their samples             max 18.1  rms 3.62  0.31 ms
      + heights fitted by least squares                      max 16.2  rms 3.27  0.46 ms
      + the survivor of a collapse moved to its best place   max 15.4  rms 3.00  0.56 ms
-     + a sixth of the vertices put where the error is worst max 13.7  rms 2.95  0.58 ms
-     + flips and moves at the end                           max 12.7  rms 2.67  0.65 ms
+     + flips and moves at the end, a start at the extremes  max 13.7  rms 2.67  0.62 ms
 
    What makes it quick: collapses, flips and moves visit no single samples. The squared error of a
    plane over a set of samples follows from ten sums over that set, and the sums over a triangle are
@@ -10806,16 +10805,12 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_STEPS 2047
 
 /* Tenths of vertices inside the start mesh for each one inside the final mesh. More are better and
-   slower: 20 gives rms 2.83 %, 30 gives 2.70 %, 40 gives 2.64 % in 1.15 times the time. */
-#define TERRIMPI_SIMP_START_TENTHS 35
+   slower: 20 gives rms 2.83 %, 25 gives 2.73 %, 35 gives 2.64 % in 1.14 times the time. */
+#define TERRIMPI_SIMP_START_TENTHS 30
 
 /* Fans that a collapse is priced by, of those that miss the removed vertex least. All of them
    together gain nothing over 3, and 2 lose less than they save. */
 #define TERRIMPI_SIMP_FANS 2
-
-/* One inner vertex in so many is placed by insertion at the worst sample. 4 gives the same max and
-   a worse rms, 8 a worse max. */
-#define TERRIMPI_SIMP_INSERT_SHARE 6
 
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
@@ -11304,6 +11299,36 @@ static int terrimpi_simp_improve_vertex(terrimpi_simplifier *s, int32_t v)
     return 0;
 }
 
+/* Moves the vertices of the start mesh, each within its cell of samples, to the highest or the
+   lowest one there where that fits better: else a spike between them would be lost, which no later
+   step looks for. */
+static void terrimpi_simp_seek_extremes(terrimpi_simplifier *s)
+{
+    float area = (float)(s->cols * s->rows) / (float)(s->vertex_count - s->border_count);
+    int32_t v, x, z, k, side = (int32_t)terrimpi_ceil_u32(TERRIMP_SQRTF(area));
+    for (v = s->border_count; v < s->vertex_count; v++) {
+        int32_t from_x = s->x[v] - side / 2, from_z = s->z[v] - side / 2, at[2][2], best[2];
+        float error, dx, dz;
+        terrimpi_simp_ring ring;
+        best[0] = best[1] = -2 * TERRIMPI_SIMP_STEPS;
+        for (z = from_z < 1 ? 1 : from_z; z < from_z + side && z < s->rows - 1; z++)
+            for (x = from_x < 1 ? 1 : from_x; x < from_x + side && x < s->cols - 1; x++) {
+                const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols + x;
+                int32_t h = row[1].h - row[0].h;
+                for (k = 0; k < 2; k++, h = -h)
+                    if (h > best[k]) {
+                        best[k] = h;
+                        at[k][0] = x;
+                        at[k][1] = z;
+                    }
+            }
+        terrimpi_simp_find_ring(s, v, &ring);
+        error = TERRIMPI_SIMP_GAIN * terrimpi_simp_newton_step(s, v, &ring, &dx, &dz);
+        for (k = 0; k < 2 && error > 0.0f; k++)
+            terrimpi_simp_try_move(s, v, &ring, at[k][0], at[k][1], &error);
+    }
+}
+
 /* --- flips --- */
 
 static void terrimpi_simp_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32_t edge)
@@ -11602,189 +11627,7 @@ static void terrimpi_simp_collapse_to(terrimpi_simplifier *s, int32_t budget)
     }
 }
 
-/* --- insertion --- */
-
-/* Where a vertex helps most: the worst sample of the triangle of half-edge e. */
-typedef struct terrimpi_simp_candidate {
-    int32_t e, x, z;
-    float score;
-} terrimpi_simp_candidate;
-
-/* Looks for the worst sample strictly inside the tile among those of e's triangle. Not where a
-   corner lies on a last column or row that is squeezed: there a sample within the triangle on the
-   grid may lie outside of the true one. */
-static void terrimpi_simp_scan_triangle(const terrimpi_simplifier *s, int32_t e,
-                                        terrimpi_simp_candidate *best)
-{
-    const int32_t *corner = s->origin + e;
-    terrimp_mesh_vertex v[3];
-    terrimpi_simp_span span;
-    int32_t k, x, z;
-    float limit = best->score / s->square[e >> 2], h0, gx, gz;
-    terrimpi_simp_moments none;
-    terrimpi_simp_local l;
-    for (k = 0; k < 3; k++) {
-        v[k].x = (uint16_t)s->x[corner[k]];
-        v[k].z = (uint16_t)s->z[corner[k]];
-        if (s->squeeze && (v[k].x == s->cols - 1 || v[k].z == s->rows - 1))
-            return;
-    }
-    terrimpi_simp_find_span(v, &span);
-    memset(&none, 0, sizeof none);
-    terrimpi_simp_recentre(s, &none, corner[0], corner[1], corner[2], 0, &l);
-    h0 = s->height[corner[0]];
-    gx = l.gx + h0 * l.wx;
-    gz = l.gz + h0 * l.wz;
-    for (z = span.low > 0 ? span.low : 1; z < span.high; z++) {
-        const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols;
-        float base = h0 + (float)(z - v[0].z) * gz;
-        for (x = span.left[z] > 0 ? span.left[z] : 1; x < span.right[z]; x++) {
-            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - v[0].x) * gx);
-            for (k = 0; r * r > limit && k < 3; k++)
-                if (v[k].x == x && v[k].z == z)
-                    r = 0.0f; /* a corner */
-            if (r * r > limit) {
-                limit = r * r;
-                best->e = e;
-                best->x = x;
-                best->z = z;
-                best->score = limit * s->square[e >> 2];
-            }
-        }
-    }
-}
-
-/* The sample where the product of its own squared error and its triangle's is largest: the first
-   alone chases single samples (max better, rms worse), the second alone misses peaks. */
-static terrimpi_simp_candidate terrimpi_simp_worst_sample(terrimpi_simplifier *s)
-{
-    int32_t e, first = -1;
-    terrimpi_simp_candidate best = {-1, 0, 0, 0.0f};
-    for (e = 0; e < s->half_edge_end; e += 4)
-        if (s->origin[e] >= 0) {
-            float error = terrimpi_simp_triangle_error(s, e);
-            if (first < 0 || error > s->square[first >> 2])
-                first = e;
-        }
-    if (first >= 0 && s->square[first >> 2] > 0.0f)
-        terrimpi_simp_scan_triangle(s, first, &best);
-    /* a sample rarely has more than a quarter of its triangle's error: others need no scan */
-    for (e = 0; e < s->half_edge_end; e += 4)
-        if (e != first && s->origin[e] >= 0 &&
-            s->square[e >> 2] * s->square[e >> 2] > 4.0f * best.score)
-            terrimpi_simp_scan_triangle(s, e, &best);
-    return best;
-}
-
-static int32_t terrimpi_simp_free_triangle(const terrimpi_simplifier *s, int32_t from)
-{
-    while (from < s->half_edge_end && s->origin[from] >= 0)
-        from += 4;
-    return from;
-}
-
-/* Puts vertex v into triangle abc of half-edge e = ab, which leaves abv, bcv, cav. */
-static void terrimpi_simp_split_triangle(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                         int32_t v)
-{
-    int32_t e1 = terrimpi_simp_next(e), e2 = terrimpi_simp_prev(e), fresh = s->edge_count;
-    int32_t a = s->origin[e], b = s->origin[e1], c = s->origin[e2];
-    s->origin[t] = b;
-    s->origin[t + 1] = c;
-    s->origin[u] = c;
-    s->origin[u + 1] = a;
-    s->origin[e2] = s->origin[t + 2] = s->origin[u + 2] = v;
-    terrimpi_simp_link(s, t, s->twin[e1], s->edge[e1]);
-    terrimpi_simp_link(s, u, s->twin[e2], s->edge[e2]);
-    terrimpi_simp_link(s, e1, t + 2, fresh);
-    terrimpi_simp_link(s, t + 1, u + 2, fresh + 1);
-    terrimpi_simp_link(s, u + 1, e2, fresh + 2);
-    s->out_edge[v] = e2;
-    s->out_edge[a] = e;
-    s->out_edge[b] = t;
-    s->out_edge[c] = u;
-    terrimpi_simp_update_edge(s, e1);
-    terrimpi_simp_update_edge(s, t + 1);
-    terrimpi_simp_update_edge(s, u + 1);
-    s->square[e >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
-}
-
-/* Puts vertex v on the edge ab of triangles abc (half-edge e) and bad, which leaves avc, vbc, bvd
-   and vad. */
-static void terrimpi_simp_split_edge(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                     int32_t v)
-{
-    int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f), fresh =
-        s->edge_count;
-    int32_t a = s->origin[e], b = s->origin[f];
-    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
-    s->origin[t] = s->origin[u] = v;
-    s->origin[t + 1] = b;
-    s->origin[t + 2] = c;
-    s->origin[u + 1] = a;
-    s->origin[u + 2] = d;
-    terrimpi_simp_link(s, t + 1, s->twin[bc], s->edge[bc]);
-    terrimpi_simp_link(s, u + 1, s->twin[ad], s->edge[ad]);
-    s->origin[bc] = s->origin[ad] = v; /* vc and vd now */
-    terrimpi_simp_link(s, e, u, s->edge[e]);
-    terrimpi_simp_link(s, f, t, fresh);
-    terrimpi_simp_link(s, bc, t + 2, fresh + 1);
-    terrimpi_simp_link(s, ad, u + 2, fresh + 2);
-    s->out_edge[v] = bc;
-    s->out_edge[a] = e;
-    s->out_edge[b] = f;
-    s->out_edge[c] = t + 2;
-    s->out_edge[d] = u + 2;
-    terrimpi_simp_update_edge(s, e);
-    terrimpi_simp_update_edge(s, f);
-    terrimpi_simp_update_edge(s, bc);
-    terrimpi_simp_update_edge(s, ad);
-    s->square[e >> 2] = s->square[f >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
-}
-
-/* Inserts a vertex; takes the places of one that was collapsed. Returns it. */
-static int32_t terrimpi_simp_insert(terrimpi_simplifier *s, const terrimpi_simp_candidate *spot)
-{
-    int32_t v = s->border_count, e = spot->e, k;
-    int32_t t = terrimpi_simp_free_triangle(s, 0), u = terrimpi_simp_free_triangle(s, t + 4);
-    const terrimpi_simp_row_prefix *at = s->row_sums + spot->z * s->cols + spot->x;
-    while (s->out_edge[v] >= 0)
-        v++;
-    s->x[v] = spot->x;
-    s->z[v] = spot->z;
-    s->height[v] = (float)(at[1].h - at[0].h);
-    for (k = 0; k < 3; k++, e = terrimpi_simp_next(e))
-        if (terrimpi_simp_area(s, s->origin[e], s->origin[terrimpi_simp_next(e)], v) == 0)
-            break;
-    if (k < 3)
-        terrimpi_simp_split_edge(s, e, t, u, v);
-    else
-        terrimpi_simp_split_triangle(s, e, t, u, v);
-    s->edge_count += 3;
-    s->triangle_count += 2;
-    return v;
-}
-
-/* Inserts vertices at the worst samples while the budget lasts. */
-static void terrimpi_simp_insert_all(terrimpi_simplifier *s, int32_t budget)
-{
-    while (s->triangle_count + 2 <= budget) {
-        terrimpi_simp_candidate spot = terrimpi_simp_worst_sample(s);
-        terrimpi_simp_ring ring;
-        int32_t v, i;
-        if (spot.e < 0)
-            return;
-        v = terrimpi_simp_insert(s, &spot);
-        terrimpi_simp_find_ring(s, v, &ring);
-        for (i = 0; i < ring.count; i++)
-            terrimpi_simp_try_flip(s, terrimpi_simp_next(ring.spoke[i]));
-        terrimpi_simp_fit_height(s, v);
-        terrimpi_simp_find_ring(s, v, &ring);
-        for (i = 0; i < ring.count; i++)
-            if (ring.vertex[i] >= s->border_count)
-                terrimpi_simp_fit_height(s, ring.vertex[i]);
-    }
-}
+/* --- moves at the end --- */
 
 /* Flips and moves on the mesh of the final size, then the last fit of the heights. */
 static void terrimpi_simp_polish(terrimpi_simplifier *s)
@@ -12168,7 +12011,7 @@ static size_t terrimpi_simp_layout(terrimpi_simplifier *s, const terrimpi_simp_p
     terrimpi_arena b = terrimpi_arena_at(base);
     size_t vertices = plan->lattice + plan->border, samples = (size_t)plan->cols * plan->rows;
     size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_SIMP_MAX_DEGREE;
-    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
+    size_t edges = 3 * plan->lattice + 2 * plan->border;
     s->sums = (terrimpi_simp_moments *)terrimpi_take(&b, edges, sizeof *s->sums);
     s->spare = (terrimpi_simp_moments *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
     s->row_sums = (terrimpi_simp_row_prefix *)terrimpi_take(&b, samples, sizeof *s->row_sums);
@@ -12290,20 +12133,19 @@ static void terrimpi_simp_emit(const terrimpi_simplifier *s, const float *exact_
     mesh->index_count = mesh->surface_index_count = (uint32_t)indices;
 }
 
-/* Makes the mesh between its borders: collapses, insertions, moves. On a squeezed tile a collapse
+/* Makes the mesh between its borders: collapses, then flips and moves. On a squeezed tile a collapse
    can be barred on every side: then the start mesh is made anew, so coarse that it needs none. */
 static void terrimpi_simp_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
                                  const terrimpi_simp_plan *plan, terrimp_mesh_vertex *loop)
 {
     int32_t budget = (int32_t)plan->budget;
-    int32_t inserted = (int32_t)plan->inner / TERRIMPI_SIMP_INSERT_SHARE;
     terrimpi_simp_fit_all(s);
-    terrimpi_simp_collapse_to(s, budget - 2 * inserted);
+    terrimpi_simp_seek_extremes(s);
+    terrimpi_simp_collapse_to(s, budget);
     if (s->triangle_count > budget) {
         terrimpi_simp_start(s, desc, (int32_t)plan->inner, loop);
         terrimpi_simp_fit_all(s);
     }
-    terrimpi_simp_insert_all(s, budget);
     terrimpi_simp_polish(s);
 }
 
