@@ -838,8 +838,8 @@ typedef struct terrimp_live_atlas_desc {
 typedef struct terrimp_live_atlas {
     terrimp_live_atlas_desc desc;
     terrimp_rect *slots; /* [max_slots] where each lies; width 0: unused, x is the next unused */
-    terrimp_rect *holes; /* [max_holes] the maximal free rectangles, which overlap each other */
-    uint32_t hole_count, max_holes;
+    terrimp_rect *free_rects; /* [max_free] the maximal ones, which overlap each other */
+    uint32_t free_count, max_free;
     uint32_t unused;     /* the first unused slot, max_slots for none */
     uint32_t slot_end;   /* above every slot that was ever used */
     uint32_t slot_count, texels_used; /* without padding */
@@ -4120,9 +4120,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
     uint32_t i = x >> level, j = z >> level;
     uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
     uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
-    float a = terrimpi_field_sample(&t->field, x0, z0), d =
-        terrimpi_field_sample(&t->field, x1, z1);
-    float b, c, u, v;
+    float a = terrimpi_field_sample(&t->field, x0, z0), b, c, u, v;
+    float d = terrimpi_field_sample(&t->field, x1, z1);
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
     down = z - z0;
@@ -5286,11 +5285,11 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, te
 
 /* ---- the live atlas ----
 
-   The free space is kept as all of its maximal rectangles, here called holes: those that no other
-   free rectangle contains. A rectangle fits somewhere if and only if it fits into one of them, and
-   neighbouring free areas need no merging. One operation makes them all: cutting a rectangle out of
-   a list of holes. An allocation cuts the new slot out of the list. When a slot is freed, the holes
-   that overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
+   The free space is kept as all of its maximal free rectangles: those that no other one contains. A
+   rectangle fits somewhere if and only if it fits into one of them, and neighbouring free areas
+   need no merging. One operation makes them all: cutting a rectangle out of a list of them. An
+   allocation cuts the new slot out of the list. When a slot is freed, those that overlap it are the
+   whole atlas with every other slot cut out, as far as they overlap it.
 
    Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
    count as larger by it, so that the rest of the code need not know of it. */
@@ -5333,67 +5332,69 @@ static int terrimpi_atlas_touch(const terrimp_rect *a, const terrimp_rect *b)
            b->y <= a->y + a->height;
 }
 
-/* Moves the holes from `begin` on that touch a rectangle to the end; returns the first of them. */
+/* Moves the free rectangles from `begin` on that touch a rectangle to the end; returns the first
+   of them. */
 static uint32_t terrimpi_atlas_free_part(terrimp_live_atlas *atlas, uint32_t begin,
                                          const terrimp_rect *rect)
 {
     uint32_t i, first = begin;
-    for (i = begin; i < atlas->hole_count; i++)
-        if (!terrimpi_atlas_touch(&atlas->holes[i], rect)) {
-            terrimp_rect swap = atlas->holes[i];
-            atlas->holes[i] = atlas->holes[first];
-            atlas->holes[first++] = swap;
+    for (i = begin; i < atlas->free_count; i++)
+        if (!terrimpi_atlas_touch(&atlas->free_rects[i], rect)) {
+            terrimp_rect swap = atlas->free_rects[i];
+            atlas->free_rects[i] = atlas->free_rects[first];
+            atlas->free_rects[first++] = swap;
         }
     return first;
 }
 
-/* Marks the holes from `first` to `last` that one from `by` on contains: their width becomes 0. */
+/* Marks the free rectangles from `first` to `last` that one from `by` on contains: their width
+   becomes 0. */
 static void terrimpi_atlas_free_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
                                      uint32_t by)
 {
-    terrimp_rect *holes = atlas->holes;
+    terrimp_rect *rects = atlas->free_rects;
     uint32_t i, k;
     for (i = first; i < last; i++)
-        for (k = by; k < atlas->hole_count; k++)
-            if (k != i && holes[k].width > 0 && terrimpi_atlas_contains(&holes[k], &holes[i])) {
-                holes[i].width = 0;
+        for (k = by; k < atlas->free_count; k++)
+            if (k != i && rects[k].width > 0 && terrimpi_atlas_contains(&rects[k], &rects[i])) {
+                rects[i].width = 0;
                 break;
             }
 }
 
-/* Removes the marked holes from `first` on. */
+/* Removes the marked free rectangles from `first` on. */
 static void terrimpi_atlas_free_compact(terrimp_live_atlas *atlas, uint32_t first)
 {
     uint32_t i, kept = first;
-    for (i = first; i < atlas->hole_count; i++)
-        if (atlas->holes[i].width > 0)
-            atlas->holes[kept++] = atlas->holes[i];
-    atlas->hole_count = kept;
+    for (i = first; i < atlas->free_count; i++)
+        if (atlas->free_rects[i].width > 0)
+            atlas->free_rects[kept++] = atlas->free_rects[i];
+    atlas->free_count = kept;
 }
 
-/* Cuts a rectangle out of the holes from `begin` on. Of the pieces, those that are maximal and
+/* Cuts a rectangle out of the free ones from `begin` on. Of the pieces, those that are maximal and
    overlap `window` are kept; what contains one of them touches the rectangle as they do. A piece
    for which there is no memory is lost until a slot beside it is freed. */
 static void terrimpi_atlas_free_cut(terrimp_live_atlas *atlas, uint32_t begin,
                                     const terrimp_rect *taken, const terrimp_rect *window)
 {
-    terrimp_rect *holes = atlas->holes;
-    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->hole_count;
+    terrimp_rect *rects = atlas->free_rects;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->free_count;
     int side, cut = 0;
     for (i = first; i < old; i++) {
-        if (!terrimpi_atlas_overlap(&holes[i], taken))
+        if (!terrimpi_atlas_overlap(&rects[i], taken))
             continue;
         for (side = 0; side < 4; side++) {
-            terrimp_rect piece = terrimpi_atlas_beside(&holes[i], taken, side);
+            terrimp_rect piece = terrimpi_atlas_beside(&rects[i], taken, side);
             if (piece.width > 0 && piece.height > 0 && terrimpi_atlas_overlap(&piece, window) &&
-                atlas->hole_count < atlas->max_holes)
-                holes[atlas->hole_count++] = piece;
+                atlas->free_count < atlas->max_free)
+                rects[atlas->free_count++] = piece;
         }
-        holes[i].width = 0;
+        rects[i].width = 0;
         cut = 1;
     }
     if (cut) {
-        terrimpi_atlas_free_mark(atlas, old, atlas->hole_count, first);
+        terrimpi_atlas_free_mark(atlas, old, atlas->free_count, first);
         terrimpi_atlas_free_compact(atlas, first);
     }
 }
@@ -5437,8 +5438,8 @@ static void terrimpi_atlas_reset(terrimp_live_atlas *atlas)
     uint32_t i;
     for (i = 0; i < atlas->desc.max_slots; i++)
         atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
-    atlas->holes[0] = terrimpi_atlas_whole(atlas);
-    atlas->hole_count = 1;
+    atlas->free_rects[0] = terrimpi_atlas_whole(atlas);
+    atlas->free_count = 1;
     atlas->unused = atlas->slot_end = 0;
     atlas->slot_count = atlas->texels_used = atlas->failures = 0;
 }
@@ -5449,8 +5450,8 @@ static void terrimpi_atlas_init(terrimp_live_atlas *atlas, const terrimp_live_at
 {
     atlas->desc = *desc;
     atlas->slots = (terrimp_rect *)memory;
-    atlas->holes = atlas->slots + desc->max_slots;
-    atlas->max_holes = terrimpi_atlas_free_most(desc);
+    atlas->free_rects = atlas->slots + desc->max_slots;
+    atlas->max_free = terrimpi_atlas_free_most(desc);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
@@ -5466,21 +5467,21 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     return TERRIMP_OK;
 }
 
-/* The smallest hole that a size fits into, the first of equals; hole_count for none. */
+/* The smallest free rectangle that a size fits into, the first of equals; free_count for none. */
 static uint32_t terrimpi_atlas_find(const terrimp_live_atlas *atlas, uint32_t width,
                                     uint32_t height)
 {
-    uint32_t i, best = atlas->hole_count, best_area = 0xffffffffu;
+    uint32_t i, best = atlas->free_count, best_area = 0xffffffffu;
     if (width > atlas->desc.width || height > atlas->desc.height)
         return best;
     width += atlas->desc.padding;
     height += atlas->desc.padding;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        if (hole->width >= width && hole->height >= height &&
-            hole->width * hole->height < best_area) {
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        if (spot->width >= width && spot->height >= height &&
+            spot->width * spot->height < best_area) {
             best = i;
-            best_area = hole->width * hole->height;
+            best_area = spot->width * spot->height;
         }
     }
     return best;
@@ -5512,17 +5513,18 @@ static uint32_t terrimpi_atlas_contact(const terrimp_live_atlas *atlas, const te
     return length;
 }
 
-/* The corner of a hole where a padded size touches most: what stays free is in one piece there. */
-static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
+/* The corner of a free rectangle where a padded size touches most: what stays free is in one piece
+   there. */
+static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *spot,
                                           uint32_t width, uint32_t height)
 {
-    terrimp_rect best = terrimpi_rect(hole->x, hole->y, width, height);
+    terrimp_rect best = terrimpi_rect(spot->x, spot->y, width, height);
     uint32_t corner, most = 0;
     for (corner = 0; corner < 4u; corner++) {
-        terrimp_rect place = terrimpi_rect(hole->x, hole->y, width, height);
+        terrimp_rect place = terrimpi_rect(spot->x, spot->y, width, height);
         uint32_t length;
-        place.x += corner & 1u ? hole->width - width : 0u;
-        place.y += corner & 2u ? hole->height - height : 0u;
+        place.x += corner & 1u ? spot->width - width : 0u;
+        place.y += corner & 2u ? spot->height - height : 0u;
         length = terrimpi_atlas_contact(atlas, &place);
         if (length > most) {
             most = length;
@@ -5536,15 +5538,15 @@ static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const
 static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                            uint32_t height, uint32_t *slot)
 {
-    uint32_t hole, handle;
+    uint32_t spot, handle;
     terrimp_rect taken, whole;
-    hole = terrimpi_atlas_find(atlas, width, height);
+    spot = terrimpi_atlas_find(atlas, width, height);
     handle = atlas->unused;
-    if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
+    if (spot == atlas->free_count || handle == atlas->desc.max_slots) {
         atlas->failures++;
         return TERRIMP_E_CAPACITY;
     }
-    taken = terrimpi_atlas_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
+    taken = terrimpi_atlas_corner(atlas, &atlas->free_rects[spot], width + atlas->desc.padding,
                                   height + atlas->desc.padding);
     atlas->unused = atlas->slots[handle].x;
     atlas->slots[handle] = terrimpi_rect(taken.x, taken.y, width, height);
@@ -5566,14 +5568,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     return terrimpi_atlas_alloc(atlas, width, height, slot);
 }
 
-/* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
-   contain, which touch it. */
+/* Adds the free rectangles that overlap `freed`, which is no slot any more. They replace those
+   that they contain, which touch it. */
 static void terrimpi_atlas_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->hole_count;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->free_count;
     int beside;
     /* There is memory for one more: what was cut last has left its place. */
-    atlas->holes[atlas->hole_count++] = terrimpi_atlas_whole(atlas);
+    atlas->free_rects[atlas->free_count++] = terrimpi_atlas_whole(atlas);
     /* What lies beside, above or below cuts most: with it first, the list stays short. */
     for (beside = 1; beside >= 0; beside--)
         for (i = 0; i < atlas->slot_end; i++) {
@@ -5610,10 +5612,10 @@ static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                 uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
-        uint32_t y = terrimpi_min_u32(hole->height, atlas->desc.padding + height);
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
+        uint32_t y = terrimpi_min_u32(spot->height, atlas->desc.padding + height);
         if (x <= atlas->desc.padding || y <= atlas->desc.padding)
             continue;
         x -= atlas->desc.padding;
@@ -11190,9 +11192,8 @@ static void terrimpi_simp_fit_all(terrimpi_simplifier *s)
 static int terrimpi_simp_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
                                   int32_t x, int32_t z, float *error)
 {
-    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]), n =
-        ring->count;
-    int32_t i, j;
+    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]);
+    int32_t n = ring->count, i, j;
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     if (x <= 0 || z <= 0 || x >= s->cols - 1 || z >= s->rows - 1)
         return 0;
@@ -11360,8 +11361,8 @@ static int terrimpi_simp_can_flip(const terrimpi_simplifier *s, int32_t e, int32
 static void terrimpi_simp_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_simp_moments *sums)
 {
     int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f);
-    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)], flipped =
-        s->edge[e];
+    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
+    int32_t flipped = s->edge[e];
     s->out_edge[s->origin[e]] = e;
     s->out_edge[s->origin[f]] = f;
     s->out_edge[c] = ad;
@@ -11692,8 +11693,8 @@ static int32_t terrimpi_simp_middle_along(const terrimpi_simplifier *s,
 static void terrimpi_simp_zip(terrimpi_simplifier *s, const terrimpi_simp_chain *outer,
                               const terrimpi_simp_chain *inner)
 {
-    int32_t first = terrimpi_simp_chain_at(outer, 0), last =
-        terrimpi_simp_chain_at(outer, outer->count - 1);
+    int32_t first = terrimpi_simp_chain_at(outer, 0);
+    int32_t last = terrimpi_simp_chain_at(outer, outer->count - 1);
     int32_t dx = s->x[last] - s->x[first], dz = s->z[last] - s->z[first], i = 0, j = 0;
     while (i + 1 < outer->count || j + 1 < inner->count) {
         int32_t o = terrimpi_simp_chain_at(outer, i), n = terrimpi_simp_chain_at(inner, j);
@@ -12133,8 +12134,9 @@ static void terrimpi_simp_emit(const terrimpi_simplifier *s, const float *exact_
     mesh->index_count = mesh->surface_index_count = (uint32_t)indices;
 }
 
-/* Makes the mesh between its borders: collapses, then flips and moves. On a squeezed tile a collapse
-   can be barred on every side: then the start mesh is made anew, so coarse that it needs none. */
+/* Makes the mesh between its borders: collapses, then flips and moves. On a squeezed tile a
+   collapse can be barred on every side: then the start mesh is made anew, so coarse that it
+   needs none. */
 static void terrimpi_simp_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
                                  const terrimpi_simp_plan *plan, terrimp_mesh_vertex *loop)
 {
