@@ -1183,7 +1183,7 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 /* Draw a ground node. */
 typedef struct terrimp_ground_command {
     uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
-    uint32_t level;
+    uint32_t level, x, z; /* its column and row on its level */
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
@@ -1196,8 +1196,7 @@ typedef struct terrimp_ground_command {
    when `clear` is set, to transparent black. The ground commands up
    to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
                                        matrices clip what lies before it */
     uint32_t atlas;                 /* < atlas_count */
@@ -1292,8 +1291,7 @@ typedef struct terrimp_view_desc {
    picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
    the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part, part_count;
     uint32_t atlas;
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
@@ -2407,6 +2405,10 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 /* ==== stop here if you only want the API ================================= */
 
+/* Private names are terrimpi_ROOM_...: field, camera, tree, mip, impostor and split, atlas and
+   pack, terrain with mesh and floor, bake, horizon and walls, capture, view with cull, candidate,
+   region, cache and job, sorted, layer; simp and raise, build and fill, layers with mask, cover,
+   record and depth, place and prepare. Those without a room are of Basics. */
 #ifdef TERRIMP_IMPLEMENTATION
 #ifndef TERRIMP_IMPLEMENTATION_ONCE
 #define TERRIMP_IMPLEMENTATION_ONCE
@@ -4720,7 +4722,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
 
 #define TERRIMPI_SPLIT_COUNT 24u /* places of a split that are tried */
 #define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
-#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
+#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: beyond, its neighbour hides it */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
 static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
@@ -6310,9 +6312,9 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
    it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
    beside it would end below that. So the line of feet is below every sample, and no neighbour
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
-   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
-   there. When one of them is within D of L, both end at L <= s; else each hangs by D or, since then
-   L is deeper, by more, and the line is <= s + e - D <= s - e.
+   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most
+   s + e there. When one of them is within D of L, both end at L <= s; else each hangs by D or,
+   since then L is deeper, by more, and the line is <= s + e - D <= s - e.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
 static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
@@ -7630,6 +7632,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     camera.z_far = terrimpi_capture_end(plan, layer);
     command->node = plan->node.number;
     command->level = plan->node.level;
+    command->x = plan->node.x;
+    command->z = plan->node.z;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
@@ -7641,9 +7645,12 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (; from < to; from++) {
-        if (!terrimpi_capture_in_layer(t, plan, draws[from].node, layer))
+        terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
+        if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        ground.node = draws[from].node;
+        ground.node = node.number;
+        ground.x = node.x;
+        ground.z = node.z;
         ground.first_index = draws[from].first_index;
         ground.index_count = draws[from].index_count;
         callbacks->draw_ground(callbacks->user, &ground);
@@ -9078,6 +9085,8 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
     memset(&command, 0, sizeof command);
     command.node = ground->node.number;
     command.level = ground->node.level;
+    command.x = ground->node.x;
+    command.z = ground->node.z;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -9097,6 +9106,8 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     memset(&command, 0, sizeof command);
     command.node = picture->node.number;
     command.level = picture->node.level;
+    command.x = picture->node.x;
+    command.z = picture->node.z;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
@@ -9146,7 +9157,8 @@ typedef struct terrimpi_view_kind {
 } terrimpi_view_kind;
 
 static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = {
-    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list, terrimpi_view_ground_emit},
+    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list,
+     terrimpi_view_ground_emit},
     {terrimpi_view_impostor_estimate, terrimpi_view_impostor_ready, terrimpi_view_impostor_list,
      terrimpi_view_impostor_emit},
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
@@ -10943,7 +10955,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
    those left of its edges, added and subtracted. An edge costs one step a row, thanks to running
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
-/* Heights are worked with in steps, -TERRIMPI_SIMP_STEPS to +TERRIMPI_SIMP_STEPS over the tile's range: few
+/* Heights are worked with in steps, of which a tile's range has twice TERRIMPI_SIMP_STEPS: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
 #define TERRIMPI_SIMP_STEPS 2047
 
@@ -10962,8 +10974,8 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
 #define TERRIMPI_SIMP_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
-#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
-#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
+#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that changes */
+#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height: all sums stay within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
 typedef struct terrimpi_simp_row_prefix {
@@ -11290,9 +11302,9 @@ static void terrimpi_simp_forget_errors(terrimpi_simplifier *s, const terrimpi_s
 }
 
 /* Squared error round v as a function of its height, and what it is made of, by triangle. */
-static terrimpi_simp_quadric terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                                      const terrimpi_simp_ring *ring, int32_t ref,
-                                                      terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
+static terrimpi_simp_quadric
+terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
+                         int32_t ref, terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
 {
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     int32_t i;
@@ -13493,10 +13505,9 @@ static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
         uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        TERRIMPI_TRY(terrimp_border_simplify(line, count,
-                                             terrimpi_terrain_border_points(t->desc.triangle_budget),
-                                             points[side], 16,
-                                             &desc.borders[side].point_count));
+        TERRIMPI_TRY(terrimp_border_simplify(
+            line, count, terrimpi_terrain_border_points(t->desc.triangle_budget), points[side], 16,
+            &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
@@ -13610,10 +13621,10 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
-   that is coarser than by one level could leave one, of less than its tolerance; to lift borders
-   over all of it would double the errors of meshes where ridges are steep. Neighbours of a level
-   still share what lies between the corners. */
+   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a
+   mesh that is coarser than by one level could leave one, of less than its tolerance; to lift
+   borders over all of it would double the errors of meshes where ridges are steep. Neighbours of a
+   level still share what lies between the corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {
