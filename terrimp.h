@@ -395,6 +395,9 @@ typedef struct terrimp_camera {
     float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
                                ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
+    int rows_from_top;      /* nonzero: clip y = +1 is row 0 of a render target (Direct3D, Metal,
+                               WebGPU), else its last row (OpenGL, Vulkan). Matrices are alike; the
+                               texture matrices of pictures look where these were drawn */
 } terrimp_camera;
 
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
@@ -718,6 +721,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
    in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
+   capture         if clip y = +1 is row 0 of the atlas: with tan_up and tan_down exchanged
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
@@ -729,7 +733,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of
-   a capture's picture, to the place that is seen there, relative to an eye, times a factor.
+   a capture's picture, to the place that is seen there, relative to an eye, times a factor. capture
+   and slot as for the texture matrix.
 
    eye             [3] [wu] of the frame: results are exact close to it, wherever the origin is
    matrix          [16] out, column-major
@@ -9649,6 +9654,10 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
+        if (v->frame.camera.rows_from_top) {
+            camera.tan_up = job->plan.camera.tan_down;
+            camera.tan_down = job->plan.camera.tan_up;
+        }
         terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                          p->texture_matrix[i]);
         if (v->cache.places)

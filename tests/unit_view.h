@@ -525,6 +525,8 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         rim_y = rim + texture_rounding(command->texture_matrix, p, 1, size);
         rim += texture_rounding(command->texture_matrix, p, 0, size);
         CHECK(fabs(x - (clip[0] / clip[3] * 0.5 + 0.5) * (double)capture->slot.width) < rim);
+        if (f->camera.rows_from_top)
+            clip[1] = -clip[1];
         CHECK(fabs(y - (clip[1] / clip[3] * 0.5 + 0.5) * (double)capture->slot.height) < rim_y);
         if (f->desc.exact_depth) { /* and back */
             double in_atlas[3], place[4];
@@ -1009,6 +1011,7 @@ static uint32_t fly_with_failures(const land *l, const terrimp_view_desc *desc, 
     if (!flight_open(f, l, desc))
         return 0;
     p.camera.depth_zero_to_one = frames & 1;
+    p.camera.rows_from_top = frames >> 1 & 1;
     f->fails = fails;
     allocations = unit_allocations;
     while (p.frame < frames) {
