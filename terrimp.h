@@ -7694,7 +7694,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
-#define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... and of that the share when the first pictures are due */
+#define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... the share of it after which the first are due */
 #define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
 #define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
                                          exceed this */
@@ -7771,7 +7771,7 @@ typedef struct terrimpi_frame {
     terrimp_frustum frustum;
     float pixel_factor;
     terrimpi_motion motion;
-    float light[3], light_tolerance; /* unit length; a chord of that circle; 0: light is no matter */
+    float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
 
