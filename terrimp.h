@@ -395,6 +395,9 @@ typedef struct terrimp_camera {
     float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
                                ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
+    int rows_from_top;      /* nonzero: clip y = +1 is row 0 of a render target (Direct3D, Metal,
+                               WebGPU), else its last row (OpenGL, Vulkan). Matrices are alike; the
+                               texture matrices of pictures look where these were drawn */
 } terrimp_camera;
 
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
@@ -718,6 +721,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
    in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
+   capture         if clip y = +1 is row 0 of the atlas: with tan_up and tan_down exchanged
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
@@ -729,7 +733,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of
-   a capture's picture, to the place that is seen there, relative to an eye, times a factor.
+   a capture's picture, to the place that is seen there, relative to an eye, times a factor. capture
+   and slot as for the texture matrix.
 
    eye             [3] [wu] of the frame: results are exact close to it, wherever the origin is
    matrix          [16] out, column-major
@@ -1322,7 +1327,8 @@ typedef struct terrimp_floor_command {
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
-   the thread of terrimp_view_render and may not call functions of the same view. */
+   the thread of terrimp_view_render and may not call functions of the same view, but
+   terrimp_view_drop for captures. */
 typedef struct terrimp_callbacks {
     void *user; /* first argument of each */
     void (*begin_capture)(void *user, const terrimp_capture_command *command);
@@ -1401,15 +1407,37 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
    of a picture in two parts the back part first.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
-              before the first update, and after invalidate and touch until the next one */
+              before the first update, and after invalidate, touch and drop until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
 /* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
-/* Forgets every picture, for instance when the light has changed or textures were lost. */
+/* Forgets every picture, for instance when textures were lost. */
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
+
+#define TERRIMP_EVERY_NODE 0xffffffffu
+
+/* Makes the picture of a node due, or that of TERRIMP_EVERY_NODE: it is worn until the schedule has
+   renewed it. For what has changed, but not so that the old pictures would be wrong. */
+TERRIMP_API terrimp_result terrimp_view_expire(terrimp_view *view, uint32_t node);
+
+/* Says where the light comes from, from the next update on. Pictures whose light came from farther
+   round are due, each at a share of the tolerance of its own, 0.7 to 1, so that not all are due at
+   once; and impostors cost what such captures do. Not called, light is no matter.
+
+   direction        [3] towards the light, any length > 0; NULL: no matter any more
+   tolerance_rad    [Limits: 0.001..3.1] [Default 0 -> 0.0157: where it shines on matt ground, 4 of
+                    255 grey levels at most] */
+TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float direction[3],
+                                              float tolerance_rad);
+
+/* Forgets the picture of a node, or that of TERRIMP_EVERY_NODE: the host could not make it, or has
+   lost it. It is the one function of a view that begin_capture, end_capture and what is called
+   between the two may call: what the picture should have shown is then drawn from others or as
+   ground, in this same render. Called from elsewhere, an update has to come first. */
+TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node);
 
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
@@ -7702,6 +7730,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
+#define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
+#define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... the share of it after which the first are due */
 #define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
 #define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
                                          exceed this */
@@ -7778,6 +7809,8 @@ typedef struct terrimpi_frame {
     terrimp_frustum frustum;
     float pixel_factor;
     terrimpi_motion motion;
+    float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
+    float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
 
 #ifndef TERRIMP_NO_HORIZON
@@ -7902,13 +7935,16 @@ typedef struct terrimpi_cache_picture {
     uint32_t draw;            /* ... and its place on the list of that frame */
     uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
-    uint32_t layer_count;     /* 0: not made yet */
-    uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
+    uint8_t layer_count;      /* 0: not made yet */
+    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
+    uint8_t expired;          /* the host wants it renewed, */
+    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
     float angle_rad, parallax_px, urgency;
     float sharpness;          /* texels per unit of size at distance 1 */
     float cost;               /* of the capture */
+    float light[3];           /* in which it was made */
     terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
     float texture_matrix[TERRIMPI_CAPTURE_LAYERS][16];
 } terrimpi_cache_picture;
@@ -8321,6 +8357,8 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
     float reach = way * closest * terrimpi_view_sine(f, node, closest);
     float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
     life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
+    if (f->light_speed > 0.0f)
+        life = terrimpi_min(life, f->light_tolerance / f->light_speed);
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -8396,6 +8434,21 @@ static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_cache_pictu
     return terrimpi_min(urgency, 1e6f);
 }
 
+/* The light's way since a picture was made over what the picture may wait for; from 1 on it is due.
+   The golden ratio spreads what nodes of following numbers wait for. */
+static float terrimpi_view_age(const terrimpi_frame *f, const terrimpi_cache_picture *p)
+{
+    float wait = 0.618034f * (float)(p->node.number & 0xffffu), way[3];
+    if (p->expired || !(f->light_tolerance > 0.0f))
+        return p->expired ? 1.0f : 0.0f;
+    wait -= (float)(uint32_t)wait;
+    terrimpi_sub(f->light, p->light, way);
+    return terrimpi_length(way) / (f->light_tolerance *
+                                   (f->desc->no_spreading
+                                        ? 1.0f
+                                        : 1.0f - (1.0f - TERRIMPI_VIEW_LIGHT_FIRST) * wait));
+}
+
 /* ---- regions, and what shows them ---- */
 
 /* An impostor that would be good to have. */
@@ -8430,8 +8483,8 @@ typedef struct terrimpi_region {
     uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
     uint32_t first_candidate, candidate_count; /* none: ground is all it can be */
     float pixels;                        /* that the candidates cover, about */
-    int fits;                            /* there are some, and a camera fits round each */
-    int kind;                            /* that shows it */
+    uint8_t fits;                        /* there are some, and a camera fits round each */
+    uint8_t kind;                        /* that shows it */
 } terrimpi_region;
 
 /* What a kind would cost a region. */
@@ -8455,7 +8508,8 @@ typedef struct terrimpi_job {
     uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
     int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
     uint32_t triangles, texels;    /* of the whole picture */
-    float sharpness, cost;
+    float sharpness, cost, light[3];
+    uint8_t expired;               /* since its first piece was made */
 } terrimpi_job;
 
 struct terrimp_view {
@@ -8463,7 +8517,7 @@ struct terrimp_view {
     uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
-    unsigned char *kind_of;        /* [node_count] that showed the region */
+    uint8_t *kind_of;              /* [node_count] that showed the region */
     terrimpi_region *regions;      /* [max_ground + 1] front to back */
     terrimpi_candidate *candidates; /* [max_impostors] by region */
     uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
@@ -8473,7 +8527,8 @@ struct terrimp_view {
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
     uint32_t open;                 /* 1 + the job of which pieces are missing */
-    int outdated;                  /* what this frame would draw has been forgotten */
+    uint8_t outdated;              /* what this frame would draw has been forgotten */
+    uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
     float ground_scale;            /* of its tolerance: 1, or more when max_ground is short */
     terrimp_view_desc desc;        /* resolved */
@@ -8546,7 +8601,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->cull.nodes = (terrimpi_cull_node *)terrimpi_take(&l, scratch, 1);
     captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
     terrimpi_view_layout_captures(v, &captures);
-    v->kind_of = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
+    v->kind_of = (uint8_t *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
     v->regions = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *v->regions);
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
@@ -8662,6 +8717,42 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
     return TERRIMP_OK;
 }
 
+/* Forgets a picture, and what of it has been begun. */
+static void terrimpi_view_forget(terrimp_view *v, terrimpi_cache_picture *p)
+{
+    if (v->open && v->jobs[v->open - 1u].picture == p) {
+        terrimpi_job_cancel(&v->cache, &v->jobs[v->open - 1u]);
+        v->open = 0;
+    }
+    terrimpi_cache_drop(&v->cache, p);
+}
+
+/* The same for all that are lost. */
+static void terrimpi_view_lose(terrimp_view *v)
+{
+    terrimpi_cache_picture *p;
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+        if (p->lost)
+            terrimpi_view_forget(v, p);
+}
+
+/* Marks the picture of a node, or all, as lost, else as expired. Pieces of one that is being made
+   are older than that. */
+static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int lost)
+{
+    terrimpi_cache_picture *p;
+    TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->cache.node_count, TERRIMP_E_RANGE);
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
+        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE && p->node.number != node))
+            continue;
+        *(lost ? &p->lost : &p->expired) = 1;
+        if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
+            v->jobs[v->open - 1u].expired = 1;
+    }
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows)
 {
@@ -8675,15 +8766,55 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
-    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++) {
-        if (!terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
-            continue;
-        if (view->open && view->jobs[0].picture == p) {
-            terrimpi_job_cancel(&view->cache, &view->jobs[0]);
-            view->open = 0;
-        }
-        terrimpi_cache_drop(&view->cache, p);
+    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
+        if (terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
+            terrimpi_view_forget(view, p);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node)
+{
+    TERRIMPI_TRY(terrimpi_view_mark(view, node, 1));
+    view->lost = view->capturing;
+    if (view->capturing)
+        return TERRIMP_OK;
+    terrimpi_view_cancel(view);
+    view->outdated = 1;
+    terrimpi_view_lose(view);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_expire(terrimp_view *view, uint32_t node)
+{
+    return terrimpi_view_mark(view, node, 0);
+}
+
+TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float direction[3],
+                                              float tolerance_rad)
+{
+    float light[3] = {0.0f, 0.0f, 0.0f}, step[3];
+    terrimpi_frame *f;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
+    f = &view->frame;
+    if (direction) {
+        TERRIMPI_REFUSE(!terrimpi_finite3(direction) || !terrimpi_finite(tolerance_rad),
+                        TERRIMP_E_NOT_FINITE);
+        memcpy(light, direction, sizeof light);
+        if (tolerance_rad == 0.0f)
+            tolerance_rad = TERRIMPI_VIEW_LIGHT;
+        TERRIMPI_REFUSE(!terrimpi_within(tolerance_rad, 0.001f, 3.1f) ||
+                        !terrimpi_normalize(light), TERRIMP_E_RANGE);
     }
+    terrimpi_sub(light, f->light, step);
+    f->light_step = terrimpi_length(step);
+    if (!direction)
+        f->light_speed = f->light_step = 0.0f;
+    else if (f->light_step > tolerance_rad) { /* a jump is no motion */
+        f->light_step = 0.0f;
+        terrimpi_motion_lose(&f->motion);
+    }
+    memcpy(f->light, light, sizeof light);
+    f->light_tolerance = direction ? 2.0f * TERRIMP_SINF(0.5f * tolerance_rad) : 0.0f;
     return TERRIMP_OK;
 }
 
@@ -8800,7 +8931,9 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
     if (c->picture && c->picture->layer_count > 0) {
         c->capture_cost = c->picture->cost;
-        c->urgency = terrimpi_view_urgency(f, c->picture, c->closest);
+        c->urgency = terrimpi_max(terrimpi_view_urgency(f, c->picture, c->closest),
+                                  terrimpi_min(terrimpi_view_age(f, c->picture),
+                                               TERRIMPI_VIEW_AGED * TERRIMPI_VIEW_STALE));
         return 1;
     }
     c->urgency = 1e9f;
@@ -8826,7 +8959,7 @@ static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cach
     region->fits = region->candidate_count > 0;
     region->pixels = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++) {
-        region->fits = terrimpi_candidate_estimate(f, cache, &candidates[i]);
+        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &candidates[i]);
         region->pixels += candidates[i].pixels;
     }
 }
@@ -9098,8 +9231,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
         terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
-    region->kind = best;
-    v->kind_of[region->node] = (unsigned char)best;
+    region->kind = v->kind_of[region->node] = (uint8_t)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
@@ -9204,6 +9336,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
     job->sharpness = terrimpi_view_sharpness(f, distance);
+    memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
     for (i = 0; i < plan->layer_count; i++) {
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &job->slots[i]);
@@ -9271,7 +9404,8 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
                                                    : TERRIMPI_JOB_RANK_EARLY;
             c->weight = c->rank == TERRIMPI_JOB_RANK_MISSING
                             ? weight
-                            : weight * terrimpi_min(c->urgency, 2.0f);
+                            : weight * terrimpi_max(terrimpi_min(c->urgency, 2.0f),
+                                                    terrimpi_view_age(&v->frame, c->picture));
             v->queue[count++] = index;
         }
     terrimpi_view_sort_queue(v->candidates, v->queue, count);
@@ -9319,7 +9453,7 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     if (job->to < job->draw_count)
         return;
     p->judged = f->number;
-    p->layers_now = job->plan.layer_count;
+    p->layers_now = (uint8_t)job->plan.layer_count;
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.camera.eye, &p->angle_rad,
                                      &p->parallax_px);
 }
@@ -9498,6 +9632,8 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
+    f.light_speed += (f.light_step - f.light_speed) / 16.0f;
+    f.light_step = 0.0f;
     if (f.number == 1u) {
         terrimpi_motion_begin(&f.motion);
         return f;
@@ -9547,21 +9683,44 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
         if (memcmp(job->slots, p->slots, sizeof p->slots) != 0)
             terrimpi_cache_free(&v->cache, p->slots, p->layer_count);
     }
-    p->layer_count = job->plan.layer_count;
+    p->layer_count = (uint8_t)job->plan.layer_count;
     memcpy(p->slots, job->slots, sizeof p->slots);
     p->drawn_count = 0;
     p->sharpness = job->sharpness;
     p->cost = job->cost;
+    p->expired = job->expired;
+    memcpy(p->light, job->light, sizeof p->light);
     memcpy(p->eye, job->plan.camera.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
+        if (v->frame.camera.rows_from_top) {
+            camera.tan_up = job->plan.camera.tan_down;
+            camera.tan_down = job->plan.camera.tan_up;
+        }
         terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                          p->texture_matrix[i]);
         if (v->cache.places)
             terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                            v->cache.places[p - v->cache.pictures].matrix[i]);
     }
+}
+
+/* Lists the frame without the pictures that could not be made. */
+static void terrimpi_view_list_again(terrimp_view *v)
+{
+    terrimp_stats *s = &v->stats;
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+            v->cache.pictures[v->draws[i].index].listed = 0;
+    terrimpi_view_lose(v);
+    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
+    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
+    s->texels_used = 0;
+    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    terrimpi_view_list(v);
+    terrimpi_view_count_frame(v);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -9599,9 +9758,13 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
+    view->capturing = 1;
     for (i = 0; i < view->job_count; i++)
         terrimpi_view_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
+    if (view->lost)
+        terrimpi_view_list_again(view);
+    view->capturing = view->lost = 0;
     for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
         terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
