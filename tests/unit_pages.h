@@ -698,9 +698,9 @@ static terrimp_camera paged_camera(const land *l, uint32_t turn)
     return c;
 }
 
-static void paged_land_1025(paged_land *p, uint32_t slots)
+static void paged_wide(paged_land *p, uint32_t slots)
 {
-    if (!paged_prepare(p, 1025, 1025, TERRIMP_FORMAT_U16, LAND_HILLS, 16, 0) || !paged_build(p))
+    if (!paged_prepare(p, 513, 513, TERRIMP_FORMAT_U16, LAND_HILLS, 16, 0) || !paged_build(p))
         return;
     paged_open(p, slots);
 }
@@ -723,7 +723,7 @@ static void pages_settle_to_what_memory_shows(void)
     static paged_frame frames[2];
     paged_land p;
     uint32_t turn;
-    paged_land_1025(&p, 2000);
+    paged_wide(&p, 2000);
     for (turn = 0; turn < 12u && check_bad == 0; turn++) {
         int mode = turn % 4u == 3u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
         terrimp_view *views[2];
@@ -781,7 +781,7 @@ static void pages_fly_without_holes(void)
     static paged_frame frame;
     paged_land p;
     uint32_t turn;
-    paged_land_1025(&p, 40);
+    paged_wide(&p, 40);
     for (turn = 0; turn < 6u && check_bad == 0; turn++) {
         static const uint32_t slots[] = {40, 100, 1500};
         int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
@@ -802,8 +802,8 @@ static void pages_fly_without_holes(void)
             if (!rests) {
                 camera.eye[0] += camera.forward[0] * 2.0f;
                 camera.eye[2] += camera.forward[2] * 2.0f;
-                if (camera.eye[0] < 50.0f || camera.eye[0] > 950.0f || camera.eye[2] < 50.0f ||
-                    camera.eye[2] > 950.0f)
+                if (camera.eye[0] < 25.0f || camera.eye[0] > 487.0f || camera.eye[2] < 25.0f ||
+                    camera.eye[2] > 487.0f)
                     camera.forward[0] = -camera.forward[0], camera.forward[2] = -camera.forward[2];
             }
             if (i == 150u)
