@@ -394,6 +394,9 @@ typedef struct terrimp_camera {
     float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
                                ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
+    int rows_from_top;      /* nonzero: clip y = +1 is row 0 of a render target (Direct3D, Metal,
+                               WebGPU), else its last row (OpenGL, Vulkan). Matrices are alike; the
+                               texture matrices of pictures look where these were drawn */
 } terrimp_camera;
 
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
@@ -717,6 +720,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
    in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
+   capture         if clip y = +1 is row 0 of the atlas: with tan_up and tan_down exchanged
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
@@ -728,7 +732,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of
-   a capture's picture, to the place that is seen there, relative to an eye, times a factor.
+   a capture's picture, to the place that is seen there, relative to an eye, times a factor. capture
+   and slot as for the texture matrix.
 
    eye             [3] [wu] of the frame: results are exact close to it, wherever the origin is
    matrix          [16] out, column-major
@@ -1250,7 +1255,7 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 /* Draw a ground node. */
 typedef struct terrimp_ground_command {
     uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
-    uint32_t level;
+    uint32_t level, x, z; /* its column and row on its level */
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
@@ -1263,8 +1268,7 @@ typedef struct terrimp_ground_command {
    when `clear` is set, to transparent black. The ground commands up
    to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
                                        matrices clip what lies before it */
     uint32_t atlas;                 /* < atlas_count */
@@ -1345,6 +1349,8 @@ typedef struct terrimp_view_desc {
                                would show a ridge smeared over the slope behind it is */
     int no_spreading;       /* nonzero: a picture is renewed when it is due; else some frames before
                                or after that, so that the load of frames is even */
+    int sorted;             /* nonzero: draws come in painter's order, for hosts without a depth
+                               buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
@@ -1359,8 +1365,7 @@ typedef struct terrimp_view_desc {
    picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
    the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part, part_count;
     uint32_t atlas;
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
@@ -1389,7 +1394,8 @@ typedef struct terrimp_floor_command {
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
-   the thread of terrimp_view_render and may not call functions of the same view. */
+   the thread of terrimp_view_render and may not call functions of the same view, but
+   terrimp_view_drop for captures. */
 typedef struct terrimp_callbacks {
     void *user; /* first argument of each */
     void (*begin_capture)(void *user, const terrimp_capture_command *command);
@@ -1464,17 +1470,41 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
+   With `sorted`: captures, the floor, then ground and impostors as they come, farthest first, and
+   of a picture in two parts the back part first.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
-              before the first update, and after invalidate and touch until the next one */
+              before the first update, and after invalidate, touch and drop until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
 /* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
-/* Forgets every picture, for instance when the light has changed or textures were lost. */
+/* Forgets every picture, for instance when textures were lost. */
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
+
+#define TERRIMP_EVERY_NODE 0xffffffffu
+
+/* Makes the picture of a node due, or that of TERRIMP_EVERY_NODE: it is worn until the schedule has
+   renewed it. For what has changed, but not so that the old pictures would be wrong. */
+TERRIMP_API terrimp_result terrimp_view_expire(terrimp_view *view, uint32_t node);
+
+/* Says where the light comes from, from the next update on. Pictures whose light came from farther
+   round are due, each at a share of the tolerance of its own, 0.7 to 1, so that not all are due at
+   once; and impostors cost what such captures do. Not called, light is no matter.
+
+   direction        [3] towards the light, any length > 0; NULL: no matter any more
+   tolerance_rad    [Limits: 0.001..3.1] [Default 0 -> 0.0157: where it shines on matt ground, 4 of
+                    255 grey levels at most] */
+TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float direction[3],
+                                              float tolerance_rad);
+
+/* Forgets the picture of a node, or that of TERRIMP_EVERY_NODE: the host could not make it, or has
+   lost it. It is the one function of a view that begin_capture, end_capture and what is called
+   between the two may call: what the picture should have shown is then drawn from others or as
+   ground, in this same render. Called from elsewhere, an update has to come first. */
+TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node);
 
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
@@ -1682,6 +1712,38 @@ TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float tar
 TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
                                                 uint32_t height, uint32_t channels, int wrap,
                                                 uint8_t *out);
+
+/* The indices of a ground node, or of the strip of one that a capture draws, in exact painter's
+   order for an eye: for the draws of a view, which come in that order when its settings say
+   `sorted`. Nothing but the eye's place within or beside the node counts.
+
+   first_index  of its command
+   eye          of the frame; for the ground of a capture, that of the capture's command [wu]
+   indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
+                pattern's triangles, but none of no area
+   count        out. Never more than the command's index_count
+   Cost         O(quads); 15 cycles a triangle */
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
+                                                 uint32_t first_index, const float eye[3],
+                                                 uint16_t *indices, size_t capacity,
+                                                 uint32_t *count);
+
+/* Puts the triangles of a coarse mesh into painter's order for an eye, in place: walls that face
+   away from it, the surface, which has to be convex as seen from above, and the walls that face the
+   eye, below the surface's closest borders. Where triangles hide each other in a circle there is no
+   such order: then the farthest of them comes first.
+
+   xyz         [vertex_count][3] as terrimp_terrain_fill_mesh writes them, floats
+   eye         of the frame [wu]
+   indices     [index_count] in, out [Limits: of index_count: a multiple of 3, < 65536]
+   scratch     [vertex_count + 3 * index_count] of the caller
+   circles     out: how often there was no order; NULL: not wanted
+   Errors      E_RANGE also for an index that is too large
+   Cost        O(index_count) */
+TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex_count,
+                                               const float eye[3], uint16_t *indices,
+                                               uint32_t index_count, uint16_t *scratch,
+                                               uint32_t *circles);
 
 /* The world position of a vertex [wu]. No pointer may be null. */
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
@@ -2474,6 +2536,10 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 /* ==== stop here if you only want the API ================================= */
 
+/* Private names are terrimpi_ROOM_...: field, camera, tree, mip, impostor and split, atlas and
+   pack, terrain with mesh and floor, bake, horizon and walls, capture, view with cull, candidate,
+   region, cache and job, sorted, layer; simp and raise, build and fill, layers with mask, cover,
+   record and depth, place and prepare. Those without a room are of Basics. */
 #ifdef TERRIMP_IMPLEMENTATION
 #ifndef TERRIMP_IMPLEMENTATION_ONCE
 #define TERRIMP_IMPLEMENTATION_ONCE
@@ -4787,7 +4853,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
 
 #define TERRIMPI_SPLIT_COUNT 24u /* places of a split that are tried */
 #define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
-#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
+#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: beyond, its neighbour hides it */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
 static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
@@ -6377,9 +6443,9 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
    it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
    beside it would end below that. So the line of feet is below every sample, and no neighbour
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
-   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
-   there. When one of them is within D of L, both end at L <= s; else each hangs by D or, since then
-   L is deeper, by more, and the line is <= s + e - D <= s - e.
+   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most
+   s + e there. When one of them is within D of L, both end at L <= s; else each hangs by D or,
+   since then L is deeper, by more, and the line is <= s + e - D <= s - e.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
 static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
@@ -7853,6 +7919,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     camera.z_far = terrimpi_capture_end(plan, layer);
     command->node = plan->node.number;
     command->level = plan->node.level;
+    command->x = plan->node.x;
+    command->z = plan->node.z;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
@@ -7864,9 +7932,12 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (; from < to; from++) {
-        if (!terrimpi_capture_in_layer(t, plan, draws[from].node, layer))
+        terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
+        if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        ground.node = draws[from].node;
+        ground.node = node.number;
+        ground.x = node.x;
+        ground.z = node.z;
         ground.first_index = draws[from].first_index;
         ground.index_count = draws[from].index_count;
         callbacks->draw_ground(callbacks->user, &ground);
@@ -7889,8 +7960,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          made from ahead, so that this falls before it grows */
 #define TERRIMPI_VIEW_AHEAD_BOX 0.8f  /* ... but not so far that a node is closer than this */
 #define TERRIMPI_VIEW_EARLY 0.8f      /* error over limit from which a picture may be renewed */
-#define TERRIMPI_VIEW_STALE 2.0f      /* ... from which it is not drawn */
-#define TERRIMPI_VIEW_STALE_OTHER 4.0f /* ... in the place of another that does not exist yet */
+#define TERRIMPI_VIEW_STALE 1.3f      /* ... from which it is not drawn: skylines of pictures that
+                                         are older are torn */
 #define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
@@ -7903,6 +7974,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
+#define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
+#define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... the share of it after which the first are due */
 #define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
 #define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
                                          exceed this */
@@ -7979,6 +8053,8 @@ typedef struct terrimpi_frame {
     terrimp_frustum frustum;
     float pixel_factor;
     terrimpi_motion motion;
+    float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
+    float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
 
 /* ---- settings ---- */
@@ -8099,13 +8175,16 @@ typedef struct terrimpi_cache_picture {
     uint32_t draw;            /* ... and its place on the list of that frame */
     uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
-    uint32_t layer_count;     /* 0: not made yet */
-    uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
+    uint8_t layer_count;      /* 0: not made yet */
+    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
+    uint8_t expired;          /* the host wants it renewed, */
+    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
     float angle_rad, parallax_px, urgency;
     float sharpness;          /* texels per unit of size at distance 1 */
     float cost;               /* of the capture */
+    float light[3];           /* in which it was made */
     terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
     float texture_matrix[TERRIMPI_CAPTURE_LAYERS][16];
 } terrimpi_cache_picture;
@@ -8520,6 +8599,8 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
     float reach = way * closest * terrimpi_view_sine(f, node, closest);
     float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
     life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
+    if (f->light_speed > 0.0f)
+        life = terrimpi_min(life, f->light_tolerance / f->light_speed);
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -8595,6 +8676,21 @@ static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_cache_pictu
     return terrimpi_min(urgency, 1e6f);
 }
 
+/* The light's way since a picture was made over what the picture may wait for; from 1 on it is due.
+   The golden ratio spreads what nodes of following numbers wait for. */
+static float terrimpi_view_age(const terrimpi_frame *f, const terrimpi_cache_picture *p)
+{
+    float wait = 0.618034f * (float)(p->node.number & 0xffffu), way[3];
+    if (p->expired || !(f->light_tolerance > 0.0f))
+        return p->expired ? 1.0f : 0.0f;
+    wait -= (float)(uint32_t)wait;
+    terrimpi_sub(f->light, p->light, way);
+    return terrimpi_length(way) / (f->light_tolerance *
+                                   (f->desc->no_spreading
+                                        ? 1.0f
+                                        : 1.0f - (1.0f - TERRIMPI_VIEW_LIGHT_FIRST) * wait));
+}
+
 /* ---- regions, and what shows them ---- */
 
 /* An impostor that would be good to have. */
@@ -8629,8 +8725,8 @@ typedef struct terrimpi_region {
     uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
     uint32_t first_candidate, candidate_count; /* none: ground is all it can be */
     float pixels;                        /* that the candidates cover, about */
-    int fits;                            /* there are some, and a camera fits round each */
-    int kind;                            /* that shows it */
+    uint8_t fits;                        /* there are some, and a camera fits round each */
+    uint8_t kind;                        /* that shows it */
 } terrimpi_region;
 
 /* What a kind would cost a region. */
@@ -8654,7 +8750,8 @@ typedef struct terrimpi_job {
     uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
     int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
     uint32_t triangles, texels;    /* of the whole picture */
-    float sharpness, cost;
+    float sharpness, cost, light[3];
+    uint8_t expired;               /* since its first piece was made */
 } terrimpi_job;
 
 struct terrimp_view {
@@ -8662,7 +8759,7 @@ struct terrimp_view {
     uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
-    unsigned char *kind_of;        /* [node_count] that showed the region */
+    uint8_t *kind_of;              /* [node_count] that showed the region */
     terrimpi_region *regions;      /* [max_ground + 1] front to back */
     terrimpi_candidate *candidates; /* [max_impostors] by region */
     uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
@@ -8672,7 +8769,8 @@ struct terrimp_view {
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
     uint32_t open;                 /* 1 + the job of which pieces are missing */
-    int outdated;                  /* what this frame would draw has been forgotten */
+    uint8_t outdated;              /* what this frame would draw has been forgotten */
+    uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
     float ground_scale;            /* of its tolerance: 1, or more when max_ground is short */
     terrimp_view_desc desc;        /* resolved */
@@ -8745,7 +8843,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->cull.nodes = (terrimpi_cull_node *)terrimpi_take(&l, scratch, 1);
     captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
     terrimpi_view_layout_captures(v, &captures);
-    v->kind_of = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
+    v->kind_of = (uint8_t *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
     v->regions = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *v->regions);
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
@@ -8858,6 +8956,42 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
     return TERRIMP_OK;
 }
 
+/* Forgets a picture, and what of it has been begun. */
+static void terrimpi_view_forget(terrimp_view *v, terrimpi_cache_picture *p)
+{
+    if (v->open && v->jobs[v->open - 1u].picture == p) {
+        terrimpi_job_cancel(&v->cache, &v->jobs[v->open - 1u]);
+        v->open = 0;
+    }
+    terrimpi_cache_drop(&v->cache, p);
+}
+
+/* The same for all that are lost. */
+static void terrimpi_view_lose(terrimp_view *v)
+{
+    terrimpi_cache_picture *p;
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+        if (p->lost)
+            terrimpi_view_forget(v, p);
+}
+
+/* Marks the picture of a node, or all, as lost, else as expired. Pieces of one that is being made
+   are older than that. */
+static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int lost)
+{
+    terrimpi_cache_picture *p;
+    TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->cache.node_count, TERRIMP_E_RANGE);
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
+        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE && p->node.number != node))
+            continue;
+        *(lost ? &p->lost : &p->expired) = 1;
+        if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
+            v->jobs[v->open - 1u].expired = 1;
+    }
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows)
 {
@@ -8871,15 +9005,55 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
-    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++) {
-        if (!terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
-            continue;
-        if (view->open && view->jobs[0].picture == p) {
-            terrimpi_job_cancel(&view->cache, &view->jobs[0]);
-            view->open = 0;
-        }
-        terrimpi_cache_drop(&view->cache, p);
+    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
+        if (terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
+            terrimpi_view_forget(view, p);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node)
+{
+    TERRIMPI_TRY(terrimpi_view_mark(view, node, 1));
+    view->lost = view->capturing;
+    if (view->capturing)
+        return TERRIMP_OK;
+    terrimpi_view_cancel(view);
+    view->outdated = 1;
+    terrimpi_view_lose(view);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_expire(terrimp_view *view, uint32_t node)
+{
+    return terrimpi_view_mark(view, node, 0);
+}
+
+TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float direction[3],
+                                              float tolerance_rad)
+{
+    float light[3] = {0.0f, 0.0f, 0.0f}, step[3];
+    terrimpi_frame *f;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
+    f = &view->frame;
+    if (direction) {
+        TERRIMPI_REFUSE(!terrimpi_finite3(direction) || !terrimpi_finite(tolerance_rad),
+                        TERRIMP_E_NOT_FINITE);
+        memcpy(light, direction, sizeof light);
+        if (tolerance_rad == 0.0f)
+            tolerance_rad = TERRIMPI_VIEW_LIGHT;
+        TERRIMPI_REFUSE(!terrimpi_within(tolerance_rad, 0.001f, 3.1f) ||
+                        !terrimpi_normalize(light), TERRIMP_E_RANGE);
     }
+    terrimpi_sub(light, f->light, step);
+    f->light_step = terrimpi_length(step);
+    if (!direction)
+        f->light_speed = f->light_step = 0.0f;
+    else if (f->light_step > tolerance_rad) { /* a jump is no motion */
+        f->light_step = 0.0f;
+        terrimpi_motion_lose(&f->motion);
+    }
+    memcpy(f->light, light, sizeof light);
+    f->light_tolerance = direction ? 2.0f * TERRIMP_SINF(0.5f * tolerance_rad) : 0.0f;
     return TERRIMP_OK;
 }
 
@@ -8996,7 +9170,9 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
     if (c->picture && c->picture->layer_count > 0) {
         c->capture_cost = c->picture->cost;
-        c->urgency = terrimpi_view_urgency(f, c->picture, c->closest);
+        c->urgency = terrimpi_max(terrimpi_view_urgency(f, c->picture, c->closest),
+                                  terrimpi_min(terrimpi_view_age(f, c->picture),
+                                               TERRIMPI_VIEW_AGED * TERRIMPI_VIEW_STALE));
         return 1;
     }
     c->urgency = 1e9f;
@@ -9022,7 +9198,7 @@ static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cach
     region->fits = region->candidate_count > 0;
     region->pixels = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++) {
-        region->fits = terrimpi_candidate_estimate(f, cache, &candidates[i]);
+        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &candidates[i]);
         region->pixels += candidates[i].pixels;
     }
 }
@@ -9089,7 +9265,7 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 
 /* Lists a node's impostor, once, if it has a picture that is good. One that is drawn for several
    regions does not fade. */
-static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node, float most_urgent)
+static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
     if (!p)
@@ -9099,7 +9275,7 @@ static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node,
         return 1;
     }
     terrimpi_view_judge(&v->frame, p);
-    if (p->layers_now == 0 || p->urgency > most_urgent)
+    if (p->layers_now == 0 || p->urgency > TERRIMPI_VIEW_STALE)
         return 0;
     p->listed = p->seen = v->frame.number;
     p->draw = v->draw_count;
@@ -9121,31 +9297,32 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
             return 0;
     }
     for (i = 0; i < count; i++)
-        if (!terrimpi_view_impostor_add(v, &children[i], TERRIMPI_VIEW_STALE_OTHER))
+        if (!terrimpi_view_impostor_add(v, &children[i]))
             return 0;
     return 1;
 }
 
 /* Lists a candidate, or in its place what shows the same: its children, of which it was put
-   together, or its parents, of which it is a part. Returns 0 when there is no picture. */
+   together, or its parents, of which it is a part; but these show more than the region, which in
+   painter's order would cover what is before it. Returns 0 when there is no picture. */
 static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
 {
     const terrimp_quadtree *tree = &v->terrain->tree;
     terrimp_node node = c->node;
     uint32_t up;
-    if (terrimpi_view_impostor_add(v, &node, TERRIMPI_VIEW_STALE))
+    if (terrimpi_view_impostor_add(v, &node))
         return 1;
     v->stats.waiting++;
     if (terrimpi_view_impostors(&v->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
         return 0;
     if (terrimpi_view_impostor_add_children(v, &node))
         return 1;
-    for (up = 0; up < 2u && node.level + 1u < tree->level_count; up++) {
+    for (up = v->desc.sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
         terrimpi_terrain_node_box(v->terrain, &node, &box);
         if (terrimp_box_distance(&box, v->frame.camera.eye) >= v->desc.fade_start &&
-            terrimpi_view_impostor_add(v, &node, TERRIMPI_VIEW_STALE_OTHER))
+            terrimpi_view_impostor_add(v, &node))
             return 1;
     }
     return 0;
@@ -9191,6 +9368,8 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
     memset(&command, 0, sizeof command);
     command.node = ground->node.number;
     command.level = ground->node.level;
+    command.x = ground->node.x;
+    command.z = ground->node.z;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -9205,11 +9384,13 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
-    uint32_t layer;
+    uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
     command.node = picture->node.number;
     command.level = picture->node.level;
+    command.x = picture->node.x;
+    command.z = picture->node.z;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
@@ -9217,7 +9398,8 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     command.alpha = draw->alpha;
     memcpy(command.eye, picture->eye, sizeof command.eye);
     picture->drawn_count++;
-    for (layer = 0; layer < picture->layer_count; layer++) {
+    for (k = 0; k < picture->layer_count; k++) {
+        layer = v->desc.sorted ? picture->layer_count - 1u - k : k;
         command.part = layer;
         command.atlas = picture->slots[layer].atlas;
         memcpy(command.texture_matrix, picture->texture_matrix[layer],
@@ -9259,7 +9441,8 @@ typedef struct terrimpi_view_kind {
 } terrimpi_view_kind;
 
 static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = {
-    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list, terrimpi_view_ground_emit},
+    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list,
+     terrimpi_view_ground_emit},
     {terrimpi_view_impostor_estimate, terrimpi_view_impostor_ready, terrimpi_view_impostor_list,
      terrimpi_view_impostor_emit},
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
@@ -9287,8 +9470,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
         terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
-    region->kind = best;
-    v->kind_of[region->node] = (unsigned char)best;
+    region->kind = v->kind_of[region->node] = (uint8_t)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
@@ -9393,6 +9575,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
     job->sharpness = terrimpi_view_sharpness(f, distance);
+    memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
     for (i = 0; i < plan->layer_count; i++) {
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &job->slots[i]);
@@ -9460,7 +9643,8 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
                                                    : TERRIMPI_JOB_RANK_EARLY;
             c->weight = c->rank == TERRIMPI_JOB_RANK_MISSING
                             ? weight
-                            : weight * terrimpi_min(c->urgency, 2.0f);
+                            : weight * terrimpi_max(terrimpi_min(c->urgency, 2.0f),
+                                                    terrimpi_view_age(&v->frame, c->picture));
             v->queue[count++] = index;
         }
     terrimpi_view_sort_queue(v->candidates, v->queue, count);
@@ -9508,7 +9692,7 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     if (job->to < job->draw_count)
         return;
     p->judged = f->number;
-    p->layers_now = job->plan.layer_count;
+    p->layers_now = (uint8_t)job->plan.layer_count;
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.camera.eye, &p->angle_rad,
                                      &p->parallax_px);
 }
@@ -9687,6 +9871,8 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
+    f.light_speed += (f.light_step - f.light_speed) / 16.0f;
+    f.light_step = 0.0f;
     if (f.number == 1u) {
         terrimpi_motion_begin(&f.motion);
         return f;
@@ -9736,21 +9922,44 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
         if (memcmp(job->slots, p->slots, sizeof p->slots) != 0)
             terrimpi_cache_free(&v->cache, p->slots, p->layer_count);
     }
-    p->layer_count = job->plan.layer_count;
+    p->layer_count = (uint8_t)job->plan.layer_count;
     memcpy(p->slots, job->slots, sizeof p->slots);
     p->drawn_count = 0;
     p->sharpness = job->sharpness;
     p->cost = job->cost;
+    p->expired = job->expired;
+    memcpy(p->light, job->light, sizeof p->light);
     memcpy(p->eye, job->plan.camera.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
+        if (v->frame.camera.rows_from_top) {
+            camera.tan_up = job->plan.camera.tan_down;
+            camera.tan_down = job->plan.camera.tan_up;
+        }
         terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                          p->texture_matrix[i]);
         if (v->cache.places)
             terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                            v->cache.places[p - v->cache.pictures].matrix[i]);
     }
+}
+
+/* Lists the frame without the pictures that could not be made. */
+static void terrimpi_view_list_again(terrimp_view *v)
+{
+    terrimp_stats *s = &v->stats;
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+            v->cache.pictures[v->draws[i].index].listed = 0;
+    terrimpi_view_lose(v);
+    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
+    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
+    s->texels_used = 0;
+    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    terrimpi_view_list(v);
+    terrimpi_view_count_frame(v);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -9788,10 +9997,16 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
+    view->capturing = 1;
     for (i = 0; i < view->job_count; i++)
         terrimpi_view_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
-    for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT; kind++)
+    if (view->lost)
+        terrimpi_view_list_again(view);
+    view->capturing = view->lost = 0;
+    for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
+        terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
+    for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
         for (i = 0; i < view->draw_count; i++)
             if (view->draws[i].kind == kind)
                 terrimpi_view_kinds[kind].emit(view, &view->draws[i], callbacks);
@@ -10894,6 +11109,312 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     return TERRIMP_OK;
 }
 
+/* ---- the draws of a view ---- */
+
+/* A node is a triangulation of a rectangle: what may hide what across an inner edge is told by the
+   side of the edge's plane that the eye is on, and what is in order across each edge is in order.
+   Blocks of 2 x 2 quads hold whole triangles even where a coarser neighbour makes them merge, so
+   rows and columns of blocks come from both ends towards the eye's. Within a block four edges meet
+   at its middle, along x and z, and a diagonal where a side has merged; they tell which of the four
+   quads comes first. The last edge is a quad's own diagonal. */
+typedef struct terrimpi_sorted_block {
+    terrimpi_mip_writer out;
+    terrimpi_terrain_pattern part; /* quads that are drawn */
+    float x[3], z[3];      /* of the columns and rows of vertices, from the eye on */
+} terrimpi_sorted_block;
+
+/* The quads of a block, two bits each, first one lowest; by which of these is closer than the one
+   before it: bit 0 the second of the first row, 1 of the second row, 2 of the first column, 3 of
+   the second one. Two of them, 6 and 9, cannot be. */
+static const uint8_t terrimpi_sorted_quads[16] = {
+    0x27, 0x4b, 0x1e, 0x72, 0x87, 0x9c, 0x78, 0x78, 0x2d, 0xb4, 0xc9, 0xd2, 0xb1, 0xb4, 0xe1, 0xe4
+};
+
+/* Below 0: the eye, at the origin, is where +x and -z are of the line from vertex (i, j) to (k, l),
+   which lies at +x of it; above 0: it is on the other side. */
+static float terrimpi_sorted_cross(const terrimpi_sorted_block *b, int i, int j, int k, int l)
+{
+    return (b->z[l] - b->z[j]) * b->x[i] - (b->x[k] - b->x[i]) * b->z[j];
+}
+
+static void terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t x, uint32_t z,
+                                        uint32_t *order)
+{
+    uint32_t last = b->out.quads - 2u, coarse = b->out.pattern;
+    uint32_t right = b->x[1] < 0.0f ? 1u : 0u, below = b->z[1] < 0.0f ? 1u : 0u;
+    uint32_t bits = right * 3u + below * 12u;
+    coarse &= (z == 0 ? 1u : 0u) | (z == last ? 2u : 0u) | (x == 0 ? 4u : 0u) |
+              (x == last ? 8u : 0u);
+    if (coarse & 9u) /* merged with the quad at the corner of +x, -z */
+        right = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? 1u : 0u;
+    if (coarse & 6u)
+        below = terrimpi_sorted_cross(b, 0, 2, 1, 1) > 0.0f ? 1u : 0u;
+    bits = coarse & 1u ? (bits & ~1u) | right : bits;
+    bits = coarse & 8u ? (bits & ~8u) | right << 3 : bits;
+    bits = coarse & 2u ? (bits & ~2u) | below << 1 : bits;
+    bits = coarse & 4u ? (bits & ~4u) | below << 2 : bits;
+    *order = terrimpi_sorted_quads[bits];
+}
+
+static void terrimpi_sorted_write_block(terrimpi_sorted_block *b, uint32_t x, uint32_t z)
+{
+    uint32_t order, k;
+    terrimpi_sorted_block_order(b, x, z, &order);
+    for (k = 0; k < 4u; k++, order >>= 2) {
+        uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz;
+        int first = terrimpi_sorted_cross(b, (int)dx, (int)dz, (int)dx + 1, (int)dz + 1) < 0.0f;
+        uint16_t v[4];
+        if (i < b->part.x0 || i >= b->part.x1 || j < b->part.z0 || j >= b->part.z1)
+            continue;
+        v[0] = terrimpi_mip_index(&b->out, i, j);
+        v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
+        v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
+        v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+        if (first)
+            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
+        terrimpi_mip_triangle(&b->out, v[0], v[2], v[3]);
+        if (!first)
+            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
+    }
+}
+
+/* The next of the blocks at *low to *high along an axis: from both ends towards the eye's. `past`
+   says that the eye lies behind the end of the block at *low. */
+static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
+{
+    uint32_t at = past ? *low : *high - 2u;
+    *low += past ? 2u : 0u;
+    *high -= past ? 0u : 2u;
+    return at;
+}
+
+static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtree *tree,
+                                  const terrimp_node *n, const float eye[3])
+{
+    uint32_t i0 = n->x * tree->chunk_quads, j0 = n->z * tree->chunk_quads;
+    uint32_t rows[2], cols[2], k, x, z;
+    rows[0] = b->part.z0 & ~1u;
+    rows[1] = (b->part.z1 + 1u) & ~1u;
+    while (rows[0] < rows[1]) {
+        z = terrimpi_sorted_turn(&rows[0], &rows[1],
+                                 terrimpi_tree_z(tree, n->level, j0 + rows[0] + 2u) <= eye[2]);
+        for (k = 0; k < 3u; k++)
+            b->z[k] = terrimpi_tree_z(tree, n->level, j0 + z + k) - eye[2];
+        cols[0] = b->part.x0 & ~1u;
+        cols[1] = (b->part.x1 + 1u) & ~1u;
+        while (cols[0] < cols[1]) {
+            x = terrimpi_sorted_turn(&cols[0], &cols[1],
+                                     terrimpi_tree_x(tree, n->level, i0 + cols[0] + 2u) <= eye[0]);
+            for (k = 0; k < 3u; k++)
+                b->x[k] = terrimpi_tree_x(tree, n->level, i0 + x + k) - eye[0];
+            terrimpi_sorted_write_block(b, x, z);
+        }
+    }
+}
+
+/* The pattern that begins at an index of the shared buffer, and its coarse sides. */
+static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index,
+                                terrimpi_terrain_pattern *part, uint32_t *coarse)
+{
+    uint32_t i, strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
+    terrimp_pattern pattern;
+    *coarse = 0;
+    *part = terrimpi_terrain_pattern_of(quads, 0);
+    for (i = 0; i < TERRIMP_PATTERN_COUNT; i++)
+        if (terrimp_pattern_find(quads, TERRIMP_FORM_LIST, i, &pattern) == TERRIMP_OK &&
+            pattern.first_index == first_index) {
+            part->triangle_count = pattern.triangle_count;
+            *coarse = i;
+            return 1;
+        }
+    for (i = 1; i <= strips; i++) {
+        *part = terrimpi_terrain_pattern_of(quads, i);
+        if (part->first_index == first_index)
+            return 1;
+    }
+    return 0;
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
+                                                 uint32_t first_index, const float eye[3],
+                                                 uint16_t *indices, size_t capacity,
+                                                 uint32_t *count)
+{
+    terrimpi_sorted_block b;
+    terrimp_node n;
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, indices));
+    TERRIMPI_REFUSE(!eye || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(eye[0], eye[2]), TERRIMP_E_NOT_FINITE);
+    b.out.quads = terrain->desc.chunk_quads;
+    b.out.form = TERRIMP_FORM_LIST;
+    b.out.start = b.out.out = indices;
+    TERRIMPI_REFUSE(!terrimpi_sorted_find(b.out.quads, first_index, &b.part, &b.out.pattern),
+                    TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(capacity / 3u < b.part.triangle_count, TERRIMP_E_CAPACITY);
+    n = terrimpi_tree_node(&terrain->tree, node);
+    terrimpi_sorted_write(&b, &terrain->tree, &n, eye);
+    *count = (uint32_t)(b.out.out - indices);
+    return TERRIMP_OK;
+}
+
+#define TERRIMPI_SORTED_WALL 0xfffeu
+
+/* The surface of a mesh: its half-edges in lists by the vertex that they start from, and how many
+   triangles beside a triangle are to be drawn before it. */
+typedef struct terrimpi_sorted_net {
+    const float *xyz, *eye;
+    uint16_t *first, *next;   /* of a vertex, of a half-edge; 0xffff: none */
+    uint16_t *corners;        /* the indices as they were */
+    uint16_t *waits, *queue;  /* of a triangle: 0xffff when it is queued; triangles */
+    uint32_t queued, surface; /* triangles of the surface */
+} terrimpi_sorted_net;
+
+static uint16_t terrimpi_sorted_end(const terrimpi_sorted_net *net, uint32_t edge)
+{
+    return net->corners[edge % 3u == 2u ? edge - 2u : edge + 1u];
+}
+
+/* Above 0 if the third vertex, or the eye, lies on the side of an edge on which its triangle is;
+   the same number with the other sign for the half-edge that runs the other way. */
+static float terrimpi_sorted_within(const terrimpi_sorted_net *net, uint32_t edge,
+                                    const float at[3])
+{
+    uint16_t from = net->corners[edge], to = terrimpi_sorted_end(net, edge);
+    const float *a = net->xyz + 3u * terrimpi_min_u32(from, to);
+    const float *b = net->xyz + 3u * terrimpi_max_u32(from, to);
+    float side = (b[2] - a[2]) * (at[0] - a[0]) - (b[0] - a[0]) * (at[2] - a[2]);
+    return from < to ? side : -side;
+}
+
+/* The triangle beyond a half-edge, if the eye is (not: is not) beyond it too; else 0xffff. */
+static uint32_t terrimpi_sorted_beyond(const terrimpi_sorted_net *net, uint32_t edge, int eye)
+{
+    float side = terrimpi_sorted_within(net, edge, net->eye);
+    uint16_t from = net->corners[edge];
+    uint32_t other = net->first[terrimpi_sorted_end(net, edge)];
+    if (eye ? !(side < 0.0f) : !(side > 0.0f))
+        return 0xffffu;
+    while (other != 0xffffu && terrimpi_sorted_end(net, other) != from)
+        other = net->next[other];
+    return other == 0xffffu ? other : other / 3u;
+}
+
+static void terrimpi_sorted_push(terrimpi_sorted_net *net, uint32_t triangle)
+{
+    net->waits[triangle] = 0xffffu;
+    net->queue[net->queued++] = (uint16_t)triangle;
+}
+
+/* The farthest triangle that waits, by its corners. */
+static uint32_t terrimpi_sorted_farthest(const terrimpi_sorted_net *net, uint32_t count)
+{
+    uint32_t t, k, best = 0;
+    float most = -1.0f;
+    for (t = 0; t < count; t++) {
+        float sum = 0.0f;
+        for (k = 0; k < 3u && net->waits[t] < TERRIMPI_SORTED_WALL; k++) {
+            const float *p = net->xyz + 3u * net->corners[3u * t + k];
+            sum += (p[0] - net->eye[0]) * (p[0] - net->eye[0]) +
+                   (p[2] - net->eye[2]) * (p[2] - net->eye[2]);
+        }
+        if (net->waits[t] < TERRIMPI_SORTED_WALL && sum > most) {
+            most = sum;
+            best = t;
+        }
+    }
+    return best;
+}
+
+/* Whether the eye is before a triangle's face. */
+static int terrimpi_sorted_faces(const terrimpi_sorted_net *net, uint32_t triangle)
+{
+    const uint16_t *corner = net->corners + 3u * triangle;
+    float ab[3], ac[3], to[3], normal[3];
+    terrimpi_sub(net->xyz + 3u * corner[1], net->xyz + 3u * corner[0], ab);
+    terrimpi_sub(net->xyz + 3u * corner[2], net->xyz + 3u * corner[0], ac);
+    terrimpi_sub(net->eye, net->xyz + 3u * corner[0], to);
+    terrimpi_cross(ab, ac, normal);
+    return terrimpi_dot(normal, to) > 0.0f;
+}
+
+/* Enters the half-edges of the surface. Walls, which have no area as seen from above, wait until
+   the end if the eye is before them; the others come first. */
+static void terrimpi_sorted_net_begin(terrimpi_sorted_net *net, uint32_t vertex_count,
+                                      uint32_t count)
+{
+    uint32_t t, e, k;
+    memset(net->first, 0xff, vertex_count * sizeof *net->first);
+    for (t = 0; t < count; t++) {
+        net->waits[t] = 0;
+        if (!(terrimpi_sorted_within(net, 3u * t, net->xyz + 3u * net->corners[3u * t + 2u]) >
+              0.0f)) {
+            net->waits[t] = TERRIMPI_SORTED_WALL;
+            if (!terrimpi_sorted_faces(net, t))
+                terrimpi_sorted_push(net, t);
+            continue;
+        }
+        net->surface++;
+        for (e = 3u * t; e < 3u * t + 3u; e++) {
+            net->next[e] = net->first[net->corners[e]];
+            net->first[net->corners[e]] = (uint16_t)e;
+        }
+    }
+    for (t = 0; t < count; t++)
+        for (k = 0; k < 3u && net->waits[t] < TERRIMPI_SORTED_WALL; k++)
+            net->waits[t] = (uint16_t)(net->waits[t] +
+                (terrimpi_sorted_beyond(net, 3u * t + k, 0) != 0xffffu ? 1u : 0u));
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex_count,
+                                               const float eye[3], uint16_t *indices,
+                                               uint32_t index_count, uint16_t *scratch,
+                                               uint32_t *circles)
+{
+    terrimpi_sorted_net net;
+    uint32_t count = index_count / 3u, walls, done = 0, i, faults = 0;
+    TERRIMPI_REFUSE(!xyz || !eye || !indices || !scratch, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(index_count % 3u != 0 || index_count > 65535u || vertex_count > 65535u,
+                    TERRIMP_E_RANGE);
+    for (i = 0; i < index_count; i++)
+        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
+    net.xyz = xyz;
+    net.eye = eye;
+    net.first = scratch;
+    net.next = net.first + vertex_count;
+    net.corners = net.next + index_count;
+    net.waits = net.corners + index_count;
+    net.queue = net.waits + count;
+    net.queued = net.surface = 0;
+    memcpy(net.corners, indices, index_count * sizeof *indices);
+    terrimpi_sorted_net_begin(&net, vertex_count, count);
+    walls = net.queued;
+    for (i = 0; i < count; i++)
+        if (net.waits[i] == 0)
+            terrimpi_sorted_push(&net, i);
+    for (; done < count; done++) {
+        uint32_t t, k;
+        if (done == net.queued && done < walls + net.surface) {
+            terrimpi_sorted_push(&net, terrimpi_sorted_farthest(&net, count));
+            faults++;
+        }
+        for (t = 0; done == net.queued; t++)
+            if (net.waits[t] == TERRIMPI_SORTED_WALL)
+                terrimpi_sorted_push(&net, t);
+        t = net.queue[done];
+        memcpy(indices + 3u * done, net.corners + 3u * t, 3u * sizeof *indices);
+        for (k = 0; k < 3u && done >= walls && done < walls + net.surface; k++) {
+            uint32_t closer = terrimpi_sorted_beyond(&net, 3u * t + k, 1);
+            if (closer != 0xffffu && net.waits[closer] < TERRIMPI_SORTED_WALL &&
+                --net.waits[closer] == 0)
+                terrimpi_sorted_push(&net, closer);
+        }
+    }
+    if (circles)
+        *circles = faults;
+    return TERRIMP_OK;
+}
+
 /* ==== Layers ============================================================= >>impl-layers */
 /* Based on: Jeschke 2004, chapter 3. With the reference point on the cell's near side each of his
    spacings is an affine step of 1 / depth, so that the n-th layer needs no sum over those before
@@ -11030,7 +11551,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
    those left of its edges, added and subtracted. An edge costs one step a row, thanks to running
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
-/* Heights are worked with in steps, -TERRIMPI_SIMP_STEPS to +TERRIMPI_SIMP_STEPS over the tile's range: few
+/* Heights are worked with in steps, of which a tile's range has twice TERRIMPI_SIMP_STEPS: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
 #define TERRIMPI_SIMP_STEPS 2047
 
@@ -11049,8 +11570,8 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
 #define TERRIMPI_SIMP_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
-#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
-#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
+#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that changes */
+#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height: all sums stay within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
 typedef struct terrimpi_simp_row_prefix {
@@ -11377,9 +11898,9 @@ static void terrimpi_simp_forget_errors(terrimpi_simplifier *s, const terrimpi_s
 }
 
 /* Squared error round v as a function of its height, and what it is made of, by triangle. */
-static terrimpi_simp_quadric terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                                      const terrimpi_simp_ring *ring, int32_t ref,
-                                                      terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
+static terrimpi_simp_quadric
+terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
+                         int32_t ref, terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
 {
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     int32_t i;
@@ -13580,10 +14101,9 @@ static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
         uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        TERRIMPI_TRY(terrimp_border_simplify(line, count,
-                                             terrimpi_terrain_border_points(t->desc.triangle_budget),
-                                             points[side], 16,
-                                             &desc.borders[side].point_count));
+        TERRIMPI_TRY(terrimp_border_simplify(
+            line, count, terrimpi_terrain_border_points(t->desc.triangle_budget), points[side], 16,
+            &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
@@ -13697,10 +14217,10 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
-   that is coarser than by one level could leave one, of less than its tolerance; to lift borders
-   over all of it would double the errors of meshes where ridges are steep. Neighbours of a level
-   still share what lies between the corners. */
+   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a
+   mesh that is coarser than by one level could leave one, of less than its tolerance; to lift
+   borders over all of it would double the errors of meshes where ridges are steep. Neighbours of a
+   level still share what lies between the corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {
