@@ -842,8 +842,8 @@ typedef struct terrimp_live_atlas_desc {
 typedef struct terrimp_live_atlas {
     terrimp_live_atlas_desc desc;
     terrimp_rect *slots; /* [max_slots] where each lies; width 0: unused, x is the next unused */
-    terrimp_rect *holes; /* [max_holes] the maximal free rectangles, which overlap each other */
-    uint32_t hole_count, max_holes;
+    terrimp_rect *free_rects; /* [max_free] the maximal ones, which overlap each other */
+    uint32_t free_count, max_free;
     uint32_t unused;     /* the first unused slot, max_slots for none */
     uint32_t slot_end;   /* above every slot that was ever used */
     uint32_t slot_count, texels_used; /* without padding */
@@ -4274,9 +4274,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
     uint32_t i = x >> level, j = z >> level;
     uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
     uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
-    float a = terrimpi_field_sample(&t->field, x0, z0), d =
-        terrimpi_field_sample(&t->field, x1, z1);
-    float b, c, u, v;
+    float a = terrimpi_field_sample(&t->field, x0, z0), b, c, u, v;
+    float d = terrimpi_field_sample(&t->field, x1, z1);
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
     down = z - z0;
@@ -5440,11 +5439,11 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, te
 
 /* ---- the live atlas ----
 
-   The free space is kept as all of its maximal rectangles, here called holes: those that no other
-   free rectangle contains. A rectangle fits somewhere if and only if it fits into one of them, and
-   neighbouring free areas need no merging. One operation makes them all: cutting a rectangle out of
-   a list of holes. An allocation cuts the new slot out of the list. When a slot is freed, the holes
-   that overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
+   The free space is kept as all of its maximal free rectangles: those that no other one contains. A
+   rectangle fits somewhere if and only if it fits into one of them, and neighbouring free areas
+   need no merging. One operation makes them all: cutting a rectangle out of a list of them. An
+   allocation cuts the new slot out of the list. When a slot is freed, those that overlap it are the
+   whole atlas with every other slot cut out, as far as they overlap it.
 
    Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
    count as larger by it, so that the rest of the code need not know of it. */
@@ -5487,67 +5486,69 @@ static int terrimpi_atlas_touch(const terrimp_rect *a, const terrimp_rect *b)
            b->y <= a->y + a->height;
 }
 
-/* Moves the holes from `begin` on that touch a rectangle to the end; returns the first of them. */
+/* Moves the free rectangles from `begin` on that touch a rectangle to the end; returns the first
+   of them. */
 static uint32_t terrimpi_atlas_free_part(terrimp_live_atlas *atlas, uint32_t begin,
                                          const terrimp_rect *rect)
 {
     uint32_t i, first = begin;
-    for (i = begin; i < atlas->hole_count; i++)
-        if (!terrimpi_atlas_touch(&atlas->holes[i], rect)) {
-            terrimp_rect swap = atlas->holes[i];
-            atlas->holes[i] = atlas->holes[first];
-            atlas->holes[first++] = swap;
+    for (i = begin; i < atlas->free_count; i++)
+        if (!terrimpi_atlas_touch(&atlas->free_rects[i], rect)) {
+            terrimp_rect swap = atlas->free_rects[i];
+            atlas->free_rects[i] = atlas->free_rects[first];
+            atlas->free_rects[first++] = swap;
         }
     return first;
 }
 
-/* Marks the holes from `first` to `last` that one from `by` on contains: their width becomes 0. */
+/* Marks the free rectangles from `first` to `last` that one from `by` on contains: their width
+   becomes 0. */
 static void terrimpi_atlas_free_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
                                      uint32_t by)
 {
-    terrimp_rect *holes = atlas->holes;
+    terrimp_rect *rects = atlas->free_rects;
     uint32_t i, k;
     for (i = first; i < last; i++)
-        for (k = by; k < atlas->hole_count; k++)
-            if (k != i && holes[k].width > 0 && terrimpi_atlas_contains(&holes[k], &holes[i])) {
-                holes[i].width = 0;
+        for (k = by; k < atlas->free_count; k++)
+            if (k != i && rects[k].width > 0 && terrimpi_atlas_contains(&rects[k], &rects[i])) {
+                rects[i].width = 0;
                 break;
             }
 }
 
-/* Removes the marked holes from `first` on. */
+/* Removes the marked free rectangles from `first` on. */
 static void terrimpi_atlas_free_compact(terrimp_live_atlas *atlas, uint32_t first)
 {
     uint32_t i, kept = first;
-    for (i = first; i < atlas->hole_count; i++)
-        if (atlas->holes[i].width > 0)
-            atlas->holes[kept++] = atlas->holes[i];
-    atlas->hole_count = kept;
+    for (i = first; i < atlas->free_count; i++)
+        if (atlas->free_rects[i].width > 0)
+            atlas->free_rects[kept++] = atlas->free_rects[i];
+    atlas->free_count = kept;
 }
 
-/* Cuts a rectangle out of the holes from `begin` on. Of the pieces, those that are maximal and
+/* Cuts a rectangle out of the free ones from `begin` on. Of the pieces, those that are maximal and
    overlap `window` are kept; what contains one of them touches the rectangle as they do. A piece
    for which there is no memory is lost until a slot beside it is freed. */
 static void terrimpi_atlas_free_cut(terrimp_live_atlas *atlas, uint32_t begin,
                                     const terrimp_rect *taken, const terrimp_rect *window)
 {
-    terrimp_rect *holes = atlas->holes;
-    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->hole_count;
+    terrimp_rect *rects = atlas->free_rects;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->free_count;
     int side, cut = 0;
     for (i = first; i < old; i++) {
-        if (!terrimpi_atlas_overlap(&holes[i], taken))
+        if (!terrimpi_atlas_overlap(&rects[i], taken))
             continue;
         for (side = 0; side < 4; side++) {
-            terrimp_rect piece = terrimpi_atlas_beside(&holes[i], taken, side);
+            terrimp_rect piece = terrimpi_atlas_beside(&rects[i], taken, side);
             if (piece.width > 0 && piece.height > 0 && terrimpi_atlas_overlap(&piece, window) &&
-                atlas->hole_count < atlas->max_holes)
-                holes[atlas->hole_count++] = piece;
+                atlas->free_count < atlas->max_free)
+                rects[atlas->free_count++] = piece;
         }
-        holes[i].width = 0;
+        rects[i].width = 0;
         cut = 1;
     }
     if (cut) {
-        terrimpi_atlas_free_mark(atlas, old, atlas->hole_count, first);
+        terrimpi_atlas_free_mark(atlas, old, atlas->free_count, first);
         terrimpi_atlas_free_compact(atlas, first);
     }
 }
@@ -5591,8 +5592,8 @@ static void terrimpi_atlas_reset(terrimp_live_atlas *atlas)
     uint32_t i;
     for (i = 0; i < atlas->desc.max_slots; i++)
         atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
-    atlas->holes[0] = terrimpi_atlas_whole(atlas);
-    atlas->hole_count = 1;
+    atlas->free_rects[0] = terrimpi_atlas_whole(atlas);
+    atlas->free_count = 1;
     atlas->unused = atlas->slot_end = 0;
     atlas->slot_count = atlas->texels_used = atlas->failures = 0;
 }
@@ -5603,8 +5604,8 @@ static void terrimpi_atlas_init(terrimp_live_atlas *atlas, const terrimp_live_at
 {
     atlas->desc = *desc;
     atlas->slots = (terrimp_rect *)memory;
-    atlas->holes = atlas->slots + desc->max_slots;
-    atlas->max_holes = terrimpi_atlas_free_most(desc);
+    atlas->free_rects = atlas->slots + desc->max_slots;
+    atlas->max_free = terrimpi_atlas_free_most(desc);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
@@ -5620,21 +5621,21 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     return TERRIMP_OK;
 }
 
-/* The smallest hole that a size fits into, the first of equals; hole_count for none. */
+/* The smallest free rectangle that a size fits into, the first of equals; free_count for none. */
 static uint32_t terrimpi_atlas_find(const terrimp_live_atlas *atlas, uint32_t width,
                                     uint32_t height)
 {
-    uint32_t i, best = atlas->hole_count, best_area = 0xffffffffu;
+    uint32_t i, best = atlas->free_count, best_area = 0xffffffffu;
     if (width > atlas->desc.width || height > atlas->desc.height)
         return best;
     width += atlas->desc.padding;
     height += atlas->desc.padding;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        if (hole->width >= width && hole->height >= height &&
-            hole->width * hole->height < best_area) {
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        if (spot->width >= width && spot->height >= height &&
+            spot->width * spot->height < best_area) {
             best = i;
-            best_area = hole->width * hole->height;
+            best_area = spot->width * spot->height;
         }
     }
     return best;
@@ -5666,17 +5667,18 @@ static uint32_t terrimpi_atlas_contact(const terrimp_live_atlas *atlas, const te
     return length;
 }
 
-/* The corner of a hole where a padded size touches most: what stays free is in one piece there. */
-static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
+/* The corner of a free rectangle where a padded size touches most: what stays free is in one piece
+   there. */
+static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *spot,
                                           uint32_t width, uint32_t height)
 {
-    terrimp_rect best = terrimpi_rect(hole->x, hole->y, width, height);
+    terrimp_rect best = terrimpi_rect(spot->x, spot->y, width, height);
     uint32_t corner, most = 0;
     for (corner = 0; corner < 4u; corner++) {
-        terrimp_rect place = terrimpi_rect(hole->x, hole->y, width, height);
+        terrimp_rect place = terrimpi_rect(spot->x, spot->y, width, height);
         uint32_t length;
-        place.x += corner & 1u ? hole->width - width : 0u;
-        place.y += corner & 2u ? hole->height - height : 0u;
+        place.x += corner & 1u ? spot->width - width : 0u;
+        place.y += corner & 2u ? spot->height - height : 0u;
         length = terrimpi_atlas_contact(atlas, &place);
         if (length > most) {
             most = length;
@@ -5690,15 +5692,15 @@ static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const
 static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                            uint32_t height, uint32_t *slot)
 {
-    uint32_t hole, handle;
+    uint32_t spot, handle;
     terrimp_rect taken, whole;
-    hole = terrimpi_atlas_find(atlas, width, height);
+    spot = terrimpi_atlas_find(atlas, width, height);
     handle = atlas->unused;
-    if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
+    if (spot == atlas->free_count || handle == atlas->desc.max_slots) {
         atlas->failures++;
         return TERRIMP_E_CAPACITY;
     }
-    taken = terrimpi_atlas_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
+    taken = terrimpi_atlas_corner(atlas, &atlas->free_rects[spot], width + atlas->desc.padding,
                                   height + atlas->desc.padding);
     atlas->unused = atlas->slots[handle].x;
     atlas->slots[handle] = terrimpi_rect(taken.x, taken.y, width, height);
@@ -5720,14 +5722,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     return terrimpi_atlas_alloc(atlas, width, height, slot);
 }
 
-/* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
-   contain, which touch it. */
+/* Adds the free rectangles that overlap `freed`, which is no slot any more. They replace those
+   that they contain, which touch it. */
 static void terrimpi_atlas_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->hole_count;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->free_count;
     int beside;
     /* There is memory for one more: what was cut last has left its place. */
-    atlas->holes[atlas->hole_count++] = terrimpi_atlas_whole(atlas);
+    atlas->free_rects[atlas->free_count++] = terrimpi_atlas_whole(atlas);
     /* What lies beside, above or below cuts most: with it first, the list stays short. */
     for (beside = 1; beside >= 0; beside--)
         for (i = 0; i < atlas->slot_end; i++) {
@@ -5764,10 +5766,10 @@ static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                 uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
-        uint32_t y = terrimpi_min_u32(hole->height, atlas->desc.padding + height);
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
+        uint32_t y = terrimpi_min_u32(spot->height, atlas->desc.padding + height);
         if (x <= atlas->desc.padding || y <= atlas->desc.padding)
             continue;
         x -= atlas->desc.padding;
@@ -11543,8 +11545,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
      collapses alone, vertices at their samples             max 18.1  rms 3.62  0.31 ms
      + heights fitted by least squares                      max 16.2  rms 3.27  0.46 ms
      + the survivor of a collapse moved to its best place   max 15.4  rms 3.00  0.56 ms
-     + a sixth of the vertices put where the error is worst max 13.7  rms 2.95  0.58 ms
-     + flips and moves at the end                           max 12.7  rms 2.67  0.65 ms
+     + flips and moves at the end, a start at the extremes  max 13.7  rms 2.67  0.62 ms
 
    What makes it quick: collapses, flips and moves visit no single samples. The squared error of a
    plane over a set of samples follows from ten sums over that set, and the sums over a triangle are
@@ -11556,16 +11557,12 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_STEPS 2047
 
 /* Tenths of vertices inside the start mesh for each one inside the final mesh. More are better and
-   slower: 20 gives rms 2.83 %, 30 gives 2.70 %, 40 gives 2.64 % in 1.15 times the time. */
-#define TERRIMPI_SIMP_START_TENTHS 35
+   slower: 20 gives rms 2.83 %, 25 gives 2.73 %, 35 gives 2.64 % in 1.14 times the time. */
+#define TERRIMPI_SIMP_START_TENTHS 30
 
 /* Fans that a collapse is priced by, of those that miss the removed vertex least. All of them
    together gain nothing over 3, and 2 lose less than they save. */
 #define TERRIMPI_SIMP_FANS 2
-
-/* One inner vertex in so many is placed by insertion at the worst sample. 4 gives the same max and
-   a worse rms, 8 a worse max. */
-#define TERRIMPI_SIMP_INSERT_SHARE 6
 
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
@@ -11945,9 +11942,8 @@ static void terrimpi_simp_fit_all(terrimpi_simplifier *s)
 static int terrimpi_simp_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
                                   int32_t x, int32_t z, float *error)
 {
-    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]), n =
-        ring->count;
-    int32_t i, j;
+    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]);
+    int32_t n = ring->count, i, j;
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     if (x <= 0 || z <= 0 || x >= s->cols - 1 || z >= s->rows - 1)
         return 0;
@@ -12054,6 +12050,36 @@ static int terrimpi_simp_improve_vertex(terrimpi_simplifier *s, int32_t v)
     return 0;
 }
 
+/* Moves the vertices of the start mesh, each within its cell of samples, to the highest or the
+   lowest one there where that fits better: else a spike between them would be lost, which no later
+   step looks for. */
+static void terrimpi_simp_seek_extremes(terrimpi_simplifier *s)
+{
+    float area = (float)(s->cols * s->rows) / (float)(s->vertex_count - s->border_count);
+    int32_t v, x, z, k, side = (int32_t)terrimpi_ceil_u32(TERRIMP_SQRTF(area));
+    for (v = s->border_count; v < s->vertex_count; v++) {
+        int32_t from_x = s->x[v] - side / 2, from_z = s->z[v] - side / 2, at[2][2], best[2];
+        float error, dx, dz;
+        terrimpi_simp_ring ring;
+        best[0] = best[1] = -2 * TERRIMPI_SIMP_STEPS;
+        for (z = from_z < 1 ? 1 : from_z; z < from_z + side && z < s->rows - 1; z++)
+            for (x = from_x < 1 ? 1 : from_x; x < from_x + side && x < s->cols - 1; x++) {
+                const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols + x;
+                int32_t h = row[1].h - row[0].h;
+                for (k = 0; k < 2; k++, h = -h)
+                    if (h > best[k]) {
+                        best[k] = h;
+                        at[k][0] = x;
+                        at[k][1] = z;
+                    }
+            }
+        terrimpi_simp_find_ring(s, v, &ring);
+        error = TERRIMPI_SIMP_GAIN * terrimpi_simp_newton_step(s, v, &ring, &dx, &dz);
+        for (k = 0; k < 2 && error > 0.0f; k++)
+            terrimpi_simp_try_move(s, v, &ring, at[k][0], at[k][1], &error);
+    }
+}
+
 /* --- flips --- */
 
 static void terrimpi_simp_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32_t edge)
@@ -12085,8 +12111,8 @@ static int terrimpi_simp_can_flip(const terrimpi_simplifier *s, int32_t e, int32
 static void terrimpi_simp_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_simp_moments *sums)
 {
     int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f);
-    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)], flipped =
-        s->edge[e];
+    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
+    int32_t flipped = s->edge[e];
     s->out_edge[s->origin[e]] = e;
     s->out_edge[s->origin[f]] = f;
     s->out_edge[c] = ad;
@@ -12352,189 +12378,7 @@ static void terrimpi_simp_collapse_to(terrimpi_simplifier *s, int32_t budget)
     }
 }
 
-/* --- insertion --- */
-
-/* Where a vertex helps most: the worst sample of the triangle of half-edge e. */
-typedef struct terrimpi_simp_candidate {
-    int32_t e, x, z;
-    float score;
-} terrimpi_simp_candidate;
-
-/* Looks for the worst sample strictly inside the tile among those of e's triangle. Not where a
-   corner lies on a last column or row that is squeezed: there a sample within the triangle on the
-   grid may lie outside of the true one. */
-static void terrimpi_simp_scan_triangle(const terrimpi_simplifier *s, int32_t e,
-                                        terrimpi_simp_candidate *best)
-{
-    const int32_t *corner = s->origin + e;
-    terrimp_mesh_vertex v[3];
-    terrimpi_simp_span span;
-    int32_t k, x, z;
-    float limit = best->score / s->square[e >> 2], h0, gx, gz;
-    terrimpi_simp_moments none;
-    terrimpi_simp_local l;
-    for (k = 0; k < 3; k++) {
-        v[k].x = (uint16_t)s->x[corner[k]];
-        v[k].z = (uint16_t)s->z[corner[k]];
-        if (s->squeeze && (v[k].x == s->cols - 1 || v[k].z == s->rows - 1))
-            return;
-    }
-    terrimpi_simp_find_span(v, &span);
-    memset(&none, 0, sizeof none);
-    terrimpi_simp_recentre(s, &none, corner[0], corner[1], corner[2], 0, &l);
-    h0 = s->height[corner[0]];
-    gx = l.gx + h0 * l.wx;
-    gz = l.gz + h0 * l.wz;
-    for (z = span.low > 0 ? span.low : 1; z < span.high; z++) {
-        const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols;
-        float base = h0 + (float)(z - v[0].z) * gz;
-        for (x = span.left[z] > 0 ? span.left[z] : 1; x < span.right[z]; x++) {
-            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - v[0].x) * gx);
-            for (k = 0; r * r > limit && k < 3; k++)
-                if (v[k].x == x && v[k].z == z)
-                    r = 0.0f; /* a corner */
-            if (r * r > limit) {
-                limit = r * r;
-                best->e = e;
-                best->x = x;
-                best->z = z;
-                best->score = limit * s->square[e >> 2];
-            }
-        }
-    }
-}
-
-/* The sample where the product of its own squared error and its triangle's is largest: the first
-   alone chases single samples (max better, rms worse), the second alone misses peaks. */
-static terrimpi_simp_candidate terrimpi_simp_worst_sample(terrimpi_simplifier *s)
-{
-    int32_t e, first = -1;
-    terrimpi_simp_candidate best = {-1, 0, 0, 0.0f};
-    for (e = 0; e < s->half_edge_end; e += 4)
-        if (s->origin[e] >= 0) {
-            float error = terrimpi_simp_triangle_error(s, e);
-            if (first < 0 || error > s->square[first >> 2])
-                first = e;
-        }
-    if (first >= 0 && s->square[first >> 2] > 0.0f)
-        terrimpi_simp_scan_triangle(s, first, &best);
-    /* a sample rarely has more than a quarter of its triangle's error: others need no scan */
-    for (e = 0; e < s->half_edge_end; e += 4)
-        if (e != first && s->origin[e] >= 0 &&
-            s->square[e >> 2] * s->square[e >> 2] > 4.0f * best.score)
-            terrimpi_simp_scan_triangle(s, e, &best);
-    return best;
-}
-
-static int32_t terrimpi_simp_free_triangle(const terrimpi_simplifier *s, int32_t from)
-{
-    while (from < s->half_edge_end && s->origin[from] >= 0)
-        from += 4;
-    return from;
-}
-
-/* Puts vertex v into triangle abc of half-edge e = ab, which leaves abv, bcv, cav. */
-static void terrimpi_simp_split_triangle(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                         int32_t v)
-{
-    int32_t e1 = terrimpi_simp_next(e), e2 = terrimpi_simp_prev(e), fresh = s->edge_count;
-    int32_t a = s->origin[e], b = s->origin[e1], c = s->origin[e2];
-    s->origin[t] = b;
-    s->origin[t + 1] = c;
-    s->origin[u] = c;
-    s->origin[u + 1] = a;
-    s->origin[e2] = s->origin[t + 2] = s->origin[u + 2] = v;
-    terrimpi_simp_link(s, t, s->twin[e1], s->edge[e1]);
-    terrimpi_simp_link(s, u, s->twin[e2], s->edge[e2]);
-    terrimpi_simp_link(s, e1, t + 2, fresh);
-    terrimpi_simp_link(s, t + 1, u + 2, fresh + 1);
-    terrimpi_simp_link(s, u + 1, e2, fresh + 2);
-    s->out_edge[v] = e2;
-    s->out_edge[a] = e;
-    s->out_edge[b] = t;
-    s->out_edge[c] = u;
-    terrimpi_simp_update_edge(s, e1);
-    terrimpi_simp_update_edge(s, t + 1);
-    terrimpi_simp_update_edge(s, u + 1);
-    s->square[e >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
-}
-
-/* Puts vertex v on the edge ab of triangles abc (half-edge e) and bad, which leaves avc, vbc, bvd
-   and vad. */
-static void terrimpi_simp_split_edge(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                     int32_t v)
-{
-    int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f), fresh =
-        s->edge_count;
-    int32_t a = s->origin[e], b = s->origin[f];
-    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
-    s->origin[t] = s->origin[u] = v;
-    s->origin[t + 1] = b;
-    s->origin[t + 2] = c;
-    s->origin[u + 1] = a;
-    s->origin[u + 2] = d;
-    terrimpi_simp_link(s, t + 1, s->twin[bc], s->edge[bc]);
-    terrimpi_simp_link(s, u + 1, s->twin[ad], s->edge[ad]);
-    s->origin[bc] = s->origin[ad] = v; /* vc and vd now */
-    terrimpi_simp_link(s, e, u, s->edge[e]);
-    terrimpi_simp_link(s, f, t, fresh);
-    terrimpi_simp_link(s, bc, t + 2, fresh + 1);
-    terrimpi_simp_link(s, ad, u + 2, fresh + 2);
-    s->out_edge[v] = bc;
-    s->out_edge[a] = e;
-    s->out_edge[b] = f;
-    s->out_edge[c] = t + 2;
-    s->out_edge[d] = u + 2;
-    terrimpi_simp_update_edge(s, e);
-    terrimpi_simp_update_edge(s, f);
-    terrimpi_simp_update_edge(s, bc);
-    terrimpi_simp_update_edge(s, ad);
-    s->square[e >> 2] = s->square[f >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
-}
-
-/* Inserts a vertex; takes the places of one that was collapsed. Returns it. */
-static int32_t terrimpi_simp_insert(terrimpi_simplifier *s, const terrimpi_simp_candidate *spot)
-{
-    int32_t v = s->border_count, e = spot->e, k;
-    int32_t t = terrimpi_simp_free_triangle(s, 0), u = terrimpi_simp_free_triangle(s, t + 4);
-    const terrimpi_simp_row_prefix *at = s->row_sums + spot->z * s->cols + spot->x;
-    while (s->out_edge[v] >= 0)
-        v++;
-    s->x[v] = spot->x;
-    s->z[v] = spot->z;
-    s->height[v] = (float)(at[1].h - at[0].h);
-    for (k = 0; k < 3; k++, e = terrimpi_simp_next(e))
-        if (terrimpi_simp_area(s, s->origin[e], s->origin[terrimpi_simp_next(e)], v) == 0)
-            break;
-    if (k < 3)
-        terrimpi_simp_split_edge(s, e, t, u, v);
-    else
-        terrimpi_simp_split_triangle(s, e, t, u, v);
-    s->edge_count += 3;
-    s->triangle_count += 2;
-    return v;
-}
-
-/* Inserts vertices at the worst samples while the budget lasts. */
-static void terrimpi_simp_insert_all(terrimpi_simplifier *s, int32_t budget)
-{
-    while (s->triangle_count + 2 <= budget) {
-        terrimpi_simp_candidate spot = terrimpi_simp_worst_sample(s);
-        terrimpi_simp_ring ring;
-        int32_t v, i;
-        if (spot.e < 0)
-            return;
-        v = terrimpi_simp_insert(s, &spot);
-        terrimpi_simp_find_ring(s, v, &ring);
-        for (i = 0; i < ring.count; i++)
-            terrimpi_simp_try_flip(s, terrimpi_simp_next(ring.spoke[i]));
-        terrimpi_simp_fit_height(s, v);
-        terrimpi_simp_find_ring(s, v, &ring);
-        for (i = 0; i < ring.count; i++)
-            if (ring.vertex[i] >= s->border_count)
-                terrimpi_simp_fit_height(s, ring.vertex[i]);
-    }
-}
+/* --- moves at the end --- */
 
 /* Flips and moves on the mesh of the final size, then the last fit of the heights. */
 static void terrimpi_simp_polish(terrimpi_simplifier *s)
@@ -12599,8 +12443,8 @@ static int32_t terrimpi_simp_middle_along(const terrimpi_simplifier *s,
 static void terrimpi_simp_zip(terrimpi_simplifier *s, const terrimpi_simp_chain *outer,
                               const terrimpi_simp_chain *inner)
 {
-    int32_t first = terrimpi_simp_chain_at(outer, 0), last =
-        terrimpi_simp_chain_at(outer, outer->count - 1);
+    int32_t first = terrimpi_simp_chain_at(outer, 0);
+    int32_t last = terrimpi_simp_chain_at(outer, outer->count - 1);
     int32_t dx = s->x[last] - s->x[first], dz = s->z[last] - s->z[first], i = 0, j = 0;
     while (i + 1 < outer->count || j + 1 < inner->count) {
         int32_t o = terrimpi_simp_chain_at(outer, i), n = terrimpi_simp_chain_at(inner, j);
@@ -12918,7 +12762,7 @@ static size_t terrimpi_simp_layout(terrimpi_simplifier *s, const terrimpi_simp_p
     terrimpi_arena b = terrimpi_arena_at(base);
     size_t vertices = plan->lattice + plan->border, samples = (size_t)plan->cols * plan->rows;
     size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_SIMP_MAX_DEGREE;
-    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
+    size_t edges = 3 * plan->lattice + 2 * plan->border;
     s->sums = (terrimpi_simp_moments *)terrimpi_take(&b, edges, sizeof *s->sums);
     s->spare = (terrimpi_simp_moments *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
     s->row_sums = (terrimpi_simp_row_prefix *)terrimpi_take(&b, samples, sizeof *s->row_sums);
@@ -13040,20 +12884,20 @@ static void terrimpi_simp_emit(const terrimpi_simplifier *s, const float *exact_
     mesh->index_count = mesh->surface_index_count = (uint32_t)indices;
 }
 
-/* Makes the mesh between its borders: collapses, insertions, moves. On a squeezed tile a collapse
-   can be barred on every side: then the start mesh is made anew, so coarse that it needs none. */
+/* Makes the mesh between its borders: collapses, then flips and moves. On a squeezed tile a
+   collapse can be barred on every side: then the start mesh is made anew, so coarse that it
+   needs none. */
 static void terrimpi_simp_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
                                  const terrimpi_simp_plan *plan, terrimp_mesh_vertex *loop)
 {
     int32_t budget = (int32_t)plan->budget;
-    int32_t inserted = (int32_t)plan->inner / TERRIMPI_SIMP_INSERT_SHARE;
     terrimpi_simp_fit_all(s);
-    terrimpi_simp_collapse_to(s, budget - 2 * inserted);
+    terrimpi_simp_seek_extremes(s);
+    terrimpi_simp_collapse_to(s, budget);
     if (s->triangle_count > budget) {
         terrimpi_simp_start(s, desc, (int32_t)plan->inner, loop);
         terrimpi_simp_fit_all(s);
     }
-    terrimpi_simp_insert_all(s, budget);
     terrimpi_simp_polish(s);
 }
 
