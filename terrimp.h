@@ -56,7 +56,7 @@
        >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
-       >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>builder      filling of voids, errors of the ground, coarse meshes, edits, materials, bakes
        >>page-builder pages of a terrain from samples that are larger than memory
        >>visible-sets what a horizon is made of, and what can be seen from where
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest;
@@ -2238,6 +2238,35 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
                                                   terrimp_terrain **terrain);
 
 #endif /* TERRIMP_NO_MALLOC */
+
+/* --- materials --- */
+
+/* Where a material lies: weights over the whole terrain, as a texture that is clamped at its edges
+   and read bilinearly. */
+typedef struct terrimp_weights {
+    const uint8_t *texels; /* (required) */
+    uint32_t width, depth; /* in texels [Limits: 1..65536] */
+    size_t texel_bytes;    /* from one to the next [Default 0 -> 1] */
+    size_t row_bytes;      /* from row to row [Default 0 -> width * texel_bytes] */
+    int centred;           /* nonzero: the middles of the first and the last texel lie on the first
+                              and the last sample; else their outer edges do */
+} terrimp_weights;
+
+/* Finds which materials lie on each node: bit k of masks[node] for weights k. A pass that lacks its
+   bit has no weight on any pixel of the node and need not be drawn: every command says its node, on
+   the screen and in captures.
+
+   weights    [count]
+   count      [Limits: 1..32]
+   reach      [texels] of a read to both sides: 1 when it is bilinear; with mipmaps up to level m
+              1.5 times 2^m, so let the texture have no more of them [Limits: 1..65536]
+   masks      [node_count] out
+   Errors     E_NULL, E_RANGE, E_NOT_FINITE; nothing is written
+   Cost       O(count * texels)
+   Source     Wagner 2003, "Materials" */
+TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
+                                                  const terrimp_weights *weights, uint32_t count,
+                                                  float reach, uint32_t *masks);
 
 /* --- bake --- */
 
@@ -15666,6 +15695,64 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 }
 
 #endif /* TERRIMP_NO_MALLOC */
+
+/* ---- materials ---- */
+
+/* The texels that columns or rows of samples from `from` to `to` may read, of `count` over `last`
+   quads; with the 1 / 64 that machines round places by. */
+static void terrimpi_material_range(uint32_t from, uint32_t to, uint32_t last, uint32_t count,
+                                    int centred, float reach, uint32_t range[2])
+{
+    float scale = (float)(centred ? count - 1u : count) / (float)last;
+    float shift = centred ? 0.5f : 0.0f, most = (float)(count - 1u), slack = reach - 0.484375f;
+    range[0] = (uint32_t)terrimpi_clamp((float)from * scale + shift - slack, 0.0f, most);
+    range[1] = (uint32_t)terrimpi_clamp((float)to * scale + shift + slack, 0.0f, most);
+}
+
+/* Whether a material has any weight on a node of level 0. */
+static int terrimpi_material_on(const terrimp_quadtree *tree, const terrimp_node *n,
+                                const terrimp_weights *w, float reach)
+{
+    uint32_t last_x = tree->field.width - 1u, last_z = tree->field.depth - 1u;
+    uint32_t x = n->x * tree->chunk_quads, z = n->z * tree->chunk_quads, u[2], v[2], i, j;
+    size_t step = w->texel_bytes ? w->texel_bytes : 1u;
+    size_t row = w->row_bytes ? w->row_bytes : w->width * step;
+    terrimpi_material_range(x, terrimpi_min_u32(x + tree->chunk_quads, last_x), last_x, w->width,
+                            w->centred, reach, u);
+    terrimpi_material_range(z, terrimpi_min_u32(z + tree->chunk_quads, last_z), last_z, w->depth,
+                            w->centred, reach, v);
+    for (j = v[0]; j <= v[1]; j++)
+        for (i = u[0]; i <= u[1]; i++)
+            if (w->texels[j * row + i * step])
+                return 1;
+    return 0;
+}
+
+TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
+                                                  const terrimp_weights *weights, uint32_t count,
+                                                  float reach, uint32_t *masks)
+{
+    uint32_t i, k;
+    TERRIMPI_REFUSE(!tree || !weights || !masks, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(reach), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(count, 1u, 32u) || !terrimpi_within(reach, 1.0f, 65536.0f),
+                    TERRIMP_E_RANGE);
+    for (k = 0; k < count; k++) {
+        TERRIMPI_REFUSE(!weights[k].texels, TERRIMP_E_NULL);
+        TERRIMPI_REFUSE(!terrimpi_within_u32(weights[k].width, 1u, 65536u) ||
+                        !terrimpi_within_u32(weights[k].depth, 1u, 65536u), TERRIMP_E_RANGE);
+    }
+    memset(masks, 0, tree->node_count * sizeof *masks);
+    for (i = 0; i < tree->node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i);
+        for (k = 0; k < count && n.level == 0; k++)
+            if (terrimpi_material_on(tree, &n, &weights[k], reach))
+                masks[i] |= 1u << k;
+        if (n.level + 1u < tree->level_count)
+            masks[terrimpi_tree_parent(tree, &n).number] |= masks[i];
+    }
+    return TERRIMP_OK;
+}
 
 /* ---- the bake ---- */
 

@@ -678,6 +678,100 @@ static void views_leave_out_what_is_hidden(void)
     CHECK(hidden > 1000);
 }
 
+/* ---- materials ---- */
+
+/* The weight that a bilinear read finds at a place in quads. */
+static double material_weight(const terrimp_heightfield *f, const terrimp_weights *w, double x,
+                              double z)
+{
+    double at[2], weight = 0.0;
+    uint32_t size[2], quads[2], k;
+    size[0] = w->width;
+    size[1] = w->depth;
+    quads[0] = f->width - 1u;
+    quads[1] = f->depth - 1u;
+    for (k = 0; k < 2; k++) {
+        double part = (k == 0 ? x : z) / (double)quads[k];
+        at[k] = w->centred ? part * (double)(size[k] - 1u) : part * (double)size[k] - 0.5;
+    }
+    for (k = 0; k < 4; k++) {
+        double u = floor(at[0]) + (double)(k % 2u), v = floor(at[1]) + (double)(k / 2u);
+        double share = (1.0 - fabs(at[0] - u)) * (1.0 - fabs(at[1] - v));
+        size_t i = u < 0.0 ? 0u : u > (double)(size[0] - 1u) ? size[0] - 1u : (size_t)u;
+        size_t j = v < 0.0 ? 0u : v > (double)(size[1] - 1u) ? size[1] - 1u : (size_t)v;
+        weight += share * (double)w->texels[j * w->row_bytes + i * w->texel_bytes];
+    }
+    return weight;
+}
+
+/* No place on a node has a weight whose bit is missing; and a bit has a weight on the node or, by
+   the rounding that is allowed for, right beside it. Parents have the bits of their children. */
+static void masks_have_the_materials_that_lie_on_a_node(void)
+{
+    uint32_t round, set = 0, clear = 0;
+    for (round = 0; round < 60; round++) {
+        visible_scene s;
+        terrimp_weights w[3];
+        uint8_t texels[3][40 * 40];
+        uint32_t k, n, i, *masks;
+        visible_make_any(&s);
+        masks = (uint32_t *)malloc(s.tree.node_count * sizeof *masks);
+        memset(texels, 0, sizeof texels);
+        memset(w, 0, sizeof w);
+        for (k = 0; k < 3; k++) {
+            w[k].texels = texels[k];
+            w[k].texel_bytes = random_range(1, 2);
+            w[k].width = random_range(1, 20);
+            w[k].depth = random_range(1, 40);
+            w[k].row_bytes = 40;
+            w[k].centred = (int)random_range(0, 1);
+            for (i = random_range(0, 5); i > 0; i--)
+                texels[k][random_range(0, w[k].depth - 1u) * 40u +
+                          random_range(0, w[k].width - 1u) * w[k].texel_bytes] = 255;
+        }
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 1.0f, masks) == TERRIMP_OK);
+        for (n = 0; n < s.tree.node_count; n++) {
+            terrimp_node node = terrimpi_tree_node(&s.tree, n);
+            double quads = (double)(s.tree.chunk_quads << node.level);
+            double last_x = (double)(s.tree.field.width - 1u);
+            double last_z = (double)(s.tree.field.depth - 1u);
+            if (n + 1u < s.tree.node_count)
+                CHECK((masks[n] & ~masks[terrimpi_tree_parent_number(&s.tree, n)]) == 0);
+            for (k = 0; k < 3; k++) {
+                double near_by = 0.02 * last_x / (double)w[k].width +
+                                 0.02 * last_z / (double)w[k].depth, found = 0.0;
+                for (i = 0; i < 81; i++) { /* from side to side, and a little beyond */
+                    double x = ((double)node.x + (double)(i % 9u) / 8.0) * quads;
+                    double z = ((double)node.z + (double)(i / 9u) / 8.0) * quads;
+                    x = x > last_x ? last_x : x;
+                    z = z > last_z ? last_z : z;
+                    if (!(masks[n] >> k & 1u))
+                        CHECK(material_weight(&s.tree.field, &w[k], x, z) == 0.0);
+                    x += (double)((int)(i % 9u) - 4) * near_by;
+                    z += (double)((int)(i / 9u) - 4) * near_by;
+                    x = x < 0.0 ? 0.0 : x > last_x ? last_x : x;
+                    z = z < 0.0 ? 0.0 : z > last_z ? last_z : z;
+                    found += material_weight(&s.tree.field, &w[k], x, z);
+                }
+                if (quads * (double)w[k].width < 4.0 * last_x &&
+                    quads * (double)w[k].depth < 4.0 * last_z)
+                    CHECK(!(masks[n] >> k & 1u) || found > 0.0);
+                set += masks[n] >> k & 1u;
+                clear += !(masks[n] >> k & 1u);
+            }
+        }
+        CHECK(terrimp_material_masks(&s.tree, w, 33, 1.0f, masks) == TERRIMP_E_RANGE);
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 0.5f, masks) == TERRIMP_E_RANGE);
+        CHECK(terrimp_material_masks(&s.tree, w, 3, NAN, masks) == TERRIMP_E_NOT_FINITE);
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 1.0f, NULL) == TERRIMP_E_NULL);
+        w[2].texels = NULL;
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 1.0f, masks) == TERRIMP_E_NULL);
+        free(masks);
+        visible_free(&s);
+    }
+    CHECK(set > 1000 && clear > 1000);
+}
+
 static void visibility_refuses_what_makes_no_sense(void)
 {
     static terrimp_horizon h;
@@ -754,6 +848,7 @@ static void visibility_tests(void)
     RUN(walls_are_rebuilt_where_samples_change);
     RUN(visibility_of_a_wall);
     RUN(views_leave_out_what_is_hidden);
+    RUN(masks_have_the_materials_that_lie_on_a_node);
     RUN(visibility_refuses_what_makes_no_sense);
 }
 
