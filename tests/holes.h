@@ -32,10 +32,10 @@ static const char *const holes_ways[HOLES_WAYS] = { "auto", "auto eager", "impos
    holes   true ones, but for those that follow
    slits   true ones of which each has sky of the full mesh beside it: a skyline within a pixel of
            its place closes what the full mesh leaves open by less than that
-   shreds  true ones of which each looks under the terrain, where the full mesh shows slopes from
-           behind through slopes, by its sky; or at the picture's edge, whose sky may be outside
+   shreds  true ones of which each comes from below, see holes_from_below; or at the picture's edge,
+           whose sky may be outside
    torn    sky, though the full mesh has none within the tolerance and 2 pixels, with or without a
-           way to the real sky: the skyline is cut off
+           way to the real sky, and none that comes from below: the skyline is cut off
    added   terrain, though the full mesh has none as close as that */
 typedef struct holes_sum {
     unsigned frames, frames_with_holes, frames_with_slits, frames_with_torn, frames_with_added;
@@ -445,32 +445,16 @@ static int holes_smaller(int a, int b)
     return a < b ? a : b;
 }
 
-/* Where a ray comes to be over or under the terrain, as a multiple of its direction; 0: it starts
-   there, or never does. */
-static float holes_entry(const terrimp_box *box, const float eye[3], const float way[3])
-{
-    float from = 0.0f;
-    int i;
-    for (i = 0; i < 3; i += 2) {
-        float side = eye[i] < box->min[i] ? box->min[i] : box->max[i];
-        if (eye[i] < box->min[i] || eye[i] > box->max[i])
-            from = fmaxf(from, (side - eye[i]) / way[i]);
-    }
-    return from;
-}
-
-/* Whether a pixel looks under the terrain, or over its outer border by no more than `reach` pixels:
-   there it is seen from below, and the full mesh shows shreds of slopes, seen through others from
-   behind. */
-static int holes_looks_under(const holes_scene *s, const holes_path *p, const holes_frame *f,
-                             size_t pixel, int reach)
+/* Whether a pixel's ray comes from below: the first of the surface that it meets, it meets from
+   behind. What the full mesh shows there are shreds, of slopes seen through slopes. */
+static int holes_from_below(const holes_scene *s, const holes_path *p, const holes_frame *f,
+                            size_t pixel)
 {
     terrimp_camera camera = tour_camera_at(&p->poses[f->pose], &s->info.box, p->fov,
                                            (uint32_t)f->width, (uint32_t)f->height);
-    float way[3], at[3], tan_up, right, up, from;
+    float way[3], along = 0.0f, tan_up, right, up;
+    terrimp_ray_hit hit;
     int i;
-    if (f->place < HOLES_BESIDE || f->place == HOLES_UNDER)
-        return f->place == HOLES_UNDER;
     memcpy(camera.up, p->up, sizeof camera.up);
     holes_need_ok(terrimp_camera_resolve(&camera, &camera));
     tan_up = tanf(0.5f * p->fov) / (0.5f * (float)f->height);
@@ -481,12 +465,11 @@ static int holes_looks_under(const holes_scene *s, const holes_path *p, const ho
         way[i] = camera.forward[i] + up * camera.up[i]
                  + right * (camera.forward[j] * camera.up[k] - camera.forward[k] * camera.up[j]);
     }
-    from = holes_entry(&s->info.box, camera.eye, way);
+    if (terrimp_heightfield_raycast(&s->field, camera.eye, way, 1e30f, &hit) != TERRIMP_OK)
+        return 0;
     for (i = 0; i < 3; i++)
-        at[i] = camera.eye[i] + from * way[i];
-    at[0] = fminf(fmaxf(at[0], s->info.box.min[0]), s->info.box.max[0]);
-    at[2] = fminf(fmaxf(at[2], s->info.box.min[2]), s->info.box.max[2]);
-    return at[1] < holes_ground(s, at) + (float)reach * tan_up * from;
+        along += way[i] * hit.normal[i];
+    return along > 0.0f;
 }
 
 /* Whether the full mesh shows sky within r columns and rows of a pixel. */
@@ -502,8 +485,7 @@ static int holes_sky_by(const holes_frame *f, int x, int y, int r)
 
 /* Takes the lost pixels that touch one another, from `pixel` on, marks them as terrain, and counts
    them as what they are: nothing when they touch the real sky. */
-static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f, size_t pixel,
-                       int reach)
+static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f, size_t pixel)
 {
     int is_hole = 1, over = 0, wide = 0, at_edge = 0, deep = 0, i, j;
     size_t depth = 0, count = 0;
@@ -517,7 +499,7 @@ static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f
         at_edge |= edge == 0;
         deep |= edge >= HOLES_EDGE;
         wide |= !holes_sky_by(f, x, y, 1);
-        over |= !holes_looks_under(s, p, f, at, reach) || !holes_sky_by(f, x, y, reach);
+        over |= !holes_from_below(s, p, f, at);
         count++;
         for (j = y > 0 ? y - 1 : 0; j <= y + 1 && j < f->height; j++)
             for (i = x > 0 ? x - 1 : 0; i <= x + 1 && i < f->width; i++) {
@@ -551,14 +533,14 @@ static void holes_count(const holes_scene *s, const holes_path *p, holes_frame *
         s->marks[i] = !holes_is_sky(f->rgb + i * 3) ? HOLES_TERRAIN
                       : holes_is_sky(f->full + i * 3) ? HOLES_REAL_SKY : HOLES_LOST;
         if (s->marks[i] != HOLES_LOST || holes_sky_by(f, x, y, reach) || x < reach || y < reach
-            || x + reach >= f->width || y + reach >= f->height)
+            || x + reach >= f->width || y + reach >= f->height || holes_from_below(s, p, f, i))
             continue;
         torn = f->torn++ ? torn : i;
     }
     f->first = torn;
     for (i = 0; i < count; i++)
         if (s->marks[i] == HOLES_LOST)
-            holes_take(s, p, f, i, reach);
+            holes_take(s, p, f, i);
 }
 
 /* Whether the full mesh has terrain within r columns and rows of a pixel, or the edge is there. */
