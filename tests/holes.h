@@ -30,8 +30,8 @@ static const char *const holes_ways[HOLES_WAYS] = { "auto", "auto eager", "impos
 
 /* What came of a frame, or of many. Pixels:
    holes   true ones, but for those that follow
-   slits   true ones of which each has sky of the full mesh beside it: a skyline within a pixel of
-           its place closes what the full mesh leaves open by less than that
+   slits   true ones of which each has sky of the full mesh within two pixels: skylines that are as
+           close to their places as a filter of textures keeps them, but meet where it is narrow
    shreds  true ones of which each comes from below, see holes_from_below; or at the picture's edge,
            whose sky may be outside
    torn    sky, though the full mesh has none within the tolerance and 2 pixels, with or without a
@@ -210,11 +210,9 @@ static void holes_close(holes_scene *s)
     free(s->stack);
 }
 
-static void holes_show(holes_scene *s)
+/* Opens pictures of a size and an atlas. */
+static void holes_show(holes_scene *s, const int size[2], uint32_t atlas)
 {
-    static const int sizes[][2] = { { 128, 96 }, { 160, 128 }, { 200, 120 }, { 320, 256 } };
-    static const uint32_t atlases[] = { 256, 512, 1024, 2048, 4096 };
-    const int *size = sizes[random_range(0, 3)];
     size_t pixels = (size_t)size[0] * (size_t)size[1];
     gl_terrain_desc desc;
     memset(&desc, 0, sizeof desc);
@@ -229,8 +227,24 @@ static void holes_show(holes_scene *s)
     desc.terrain = s->terrain;
     desc.field = &s->field;
     desc.lightmap = s->lightmap;
-    desc.atlas_size = atlases[random_range(0, 4)];
+    desc.atlas_size = atlas;
     holes_need(gl_terrain_open(&s->gl, &desc));
+}
+
+/* Builds the terrain of samples that are there. */
+static void holes_build(holes_scene *s, uint32_t chunk_quads, uint32_t triangle_budget)
+{
+    terrimp_terrain_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.field = s->field;
+    desc.chunk_quads = chunk_quads;
+    desc.triangle_budget = triangle_budget;
+    holes_need_ok(terrimp_terrain_create(&desc, NULL, &s->terrain));
+    holes_need_ok(terrimp_terrain_get_info(s->terrain, &s->info));
+    holes_need_ok(terrimp_heightfield_bounds(&s->field, 0, 0, s->field.width, s->field.depth,
+                                             &s->low, &s->high));
+    snprintf(s->name + strlen(s->name), sizeof s->name - strlen(s->name), ", chunks of %u",
+             (unsigned)chunk_quads);
 }
 
 /* A chunk side that makes at least two chunks. */
@@ -243,10 +257,11 @@ static uint32_t holes_chunk(const terrimp_heightfield *f)
 
 static void holes_open(holes_scene *s, uint32_t seed)
 {
-    terrimp_terrain_desc desc;
-    uint32_t kind;
+    static const int sizes[][2] = { { 128, 96 }, { 160, 128 }, { 200, 120 }, { 320, 256 } };
+    static const uint32_t atlases[] = { 256, 512, 1024, 2048, 4096 };
+    uint32_t kind, chunk_quads;
+    const int *size;
     memset(s, 0, sizeof *s);
-    memset(&desc, 0, sizeof desc);
     s->seed = seed;
     check_state = seed * 2654435761u + 12345u;
     check_state = check_state ? check_state : 1u;
@@ -255,16 +270,10 @@ static void holes_open(holes_scene *s, uint32_t seed)
     kind = random_range(0, 5);
     if (kind > 1 || !holes_load_samples(s))
         holes_make_samples(s, kind > 3);
-    desc.field = s->field;
-    desc.chunk_quads = holes_chunk(&s->field);
-    desc.triangle_budget = holes_one_in(4) ? random_range(32, 200) : 0;
-    holes_need_ok(terrimp_terrain_create(&desc, NULL, &s->terrain));
-    holes_need_ok(terrimp_terrain_get_info(s->terrain, &s->info));
-    holes_need_ok(terrimp_heightfield_bounds(&s->field, 0, 0, s->field.width, s->field.depth,
-                                             &s->low, &s->high));
-    snprintf(s->name + strlen(s->name), sizeof s->name - strlen(s->name), ", chunks of %u",
-             (unsigned)desc.chunk_quads);
-    holes_show(s);
+    chunk_quads = holes_chunk(&s->field);
+    holes_build(s, chunk_quads, holes_one_in(4) ? random_range(32, 200) : 0);
+    size = sizes[random_range(0, 3)];
+    holes_show(s, size, atlases[random_range(0, 4)]);
 }
 
 /* ---- Paths -------------------------------------------------------------- */
@@ -438,7 +447,7 @@ static int holes_is_sky(const uint8_t *rgb)
 }
 
 /* Marks of pixels, and how far a skyline outside of the frame may reach into it. */
-enum { HOLES_TERRAIN, HOLES_LOST, HOLES_REAL_SKY, HOLES_EDGE = 3 };
+enum { HOLES_TERRAIN, HOLES_LOST, HOLES_REAL_SKY, HOLES_EDGE = 3, HOLES_SLIT = 2 };
 
 static int holes_smaller(int a, int b)
 {
@@ -498,7 +507,7 @@ static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f
                                  holes_smaller(y, f->height - 1 - y));
         at_edge |= edge == 0;
         deep |= edge >= HOLES_EDGE;
-        wide |= !holes_sky_by(f, x, y, 1);
+        wide |= !holes_sky_by(f, x, y, HOLES_SLIT);
         over |= !holes_from_below(s, p, f, at);
         count++;
         for (j = y > 0 ? y - 1 : 0; j <= y + 1 && j < f->height; j++)
