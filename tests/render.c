@@ -1609,13 +1609,17 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
 
 #include "render_hidden.h"
 #include "render_scene.h"
+#include "render_holes.h"
 
-int main(void)
+int main(int argc, char **argv)
 {
+    check_only = argc > 1 ? argv[1] : NULL;
     setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
     RUN(no_hole_in_hills);
     RUN(no_hole_in_rough_terrain);
     RUN(no_hole_in_a_real_tile);
+    RUN(no_hole_in_random_flights);
+    RUN(inputs_that_once_had_holes_have_none);
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);
