@@ -14790,8 +14790,8 @@ static float terrimpi_cover_extent_add(const terrimpi_cover *c, terrimpi_cover_e
     return area * area;
 }
 
-/* The cut between `count` columns or rows whose two parts have the least sum of squared areas, which
-   is returned: so that it does not merely take a sliver off. */
+/* The cut between `count` columns or rows whose two parts have the least sum of squared areas, and
+   that sum: so that it does not merely take a sliver off. */
 static float terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
 {
     terrimpi_cover_extent e = {1, 0, 0, 0};
@@ -16039,8 +16039,11 @@ static void terrimpi_depth_write_sheets(terrimpi_depth *d, terrimp_depth_mesh *m
     for (i = 0; i < d->cell_count; i++) {
         const terrimpi_depth_cell *c = &d->cells[i];
         const terrimp_depth_sheet *s = &m->sheets[c->sheet];
+        uint32_t k = c->k0;
+        while (k < c->k1 && !terrimpi_depth_set(d->desc, d->desc->visible, c->x, c->y, k))
+            k++;
         m->texel_layers[s->first_texel + (c->y - s->texels.y) * s->texels.width + c->x -
-                        s->texels.x] = (uint16_t)((c->k0 + c->k1) / 2u);
+                        s->texels.x] = (uint16_t)k;
     }
 }
 
