@@ -206,6 +206,7 @@ if [ -x build/geomip ]; then
 fi
 check "software draws its frames without a GPU, close to the full mesh" host_runs software
 check "sorted draws the same frames without and with a depth buffer" host_runs sorted
+check "prepared draws pictures from memory, close to the full mesh" host_runs prepared
 if [ -x build/town ]; then
     check "town keeps to its budget of triangles and shows no hole" host_runs town
 fi
