@@ -13991,8 +13991,10 @@ TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper,
    error of 10.3, 7.2 and 5.5 % of the terrain's range; pictures in flight are best at 0.5. */
 #define TERRIMPI_RAISE_LEAST_HOLD 0.5f
 
-/* Passes of lowering. Each takes away about a third of what is too high. */
-#define TERRIMPI_RAISE_LOWER_PASSES 12
+/* Passes of lowering. Each takes away about a third of what is too high. 12 passes would make the
+   error of meshes 0.6 % less in rms and the same in the largest, and no picture better by more than
+   0.05 dB, for a fifth of the time of building. */
+#define TERRIMPI_RAISE_LOWER_PASSES 4
 
 /* Raise of a sample's free vertices, of weight `hold` together, that lifts the surface by `rest`,
    what is left of the sample's first shortfall. */
