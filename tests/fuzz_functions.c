@@ -1,5 +1,6 @@
-/* Fuzzes the plain functions: each input is a list of calls, of every room up to the atlas, over
-   one heightfield, one box and one camera that calls may change. See tests/fuzz.h. */
+/* Fuzzes the plain functions: each input is a list of calls, of every room up to the atlas, of
+   layers and of placement, over one heightfield, one box and one camera that calls may change. See
+   tests/fuzz.h. */
 #define TERRIMP_ASSERT(condition) FUZZ_CHECK(condition)
 #include "fuzz.h"
 
@@ -447,10 +448,166 @@ static void use_packer(void)
 
 /* ---- the calls ---- */
 
+/* All that is opaque is covered, and nothing twice. */
+static void cover_layer(const uint32_t *mask, uint32_t width, uint32_t height)
+{
+    static uint8_t held[20][70];
+    terrimp_rect rects[40];
+    terrimp_cover_desc d;
+    uint32_t i, x, y, count;
+    size_t bytes;
+    void *scratch;
+    memset(&d, 0, sizeof d), memset(held, 0, sizeof held);
+    d.mask = mask, d.width = width, d.height = height;
+    d.quad_cost = fuzz_below(100), d.gutter = fuzz_below(3);
+    bytes = terrimp_cover_scratch_bytes(&d, 40);
+    scratch = fuzz_take(bytes);
+    if (terrimp_cover(&d, scratch, bytes, rects, 40, &count) == TERRIMP_OK) {
+        for (i = 0; i < count; i++)
+            for (y = rects[i].y; y < rects[i].y + rects[i].height; y++)
+                for (x = rects[i].x; x < rects[i].x + rects[i].width; x++)
+                    FUZZ_CHECK(x < width && y < height && !held[y][x]++);
+        for (y = 0; y < height; y++)
+            for (x = 0; x < width; x++)
+                FUZZ_CHECK(held[y][x] ||
+                           !(mask[y * TERRIMP_MASK_WORDS(width) + x / 32u] >> x % 32u & 1u));
+    }
+    free(scratch);
+}
+
+static void mesh_layers(const uint32_t *opaque, const uint32_t *visible,
+                        const terrimp_layer_record *r)
+{
+    enum { MOST = 3000 };
+    static terrimp_depth_vertex vertices[MOST];
+    static uint32_t indices[3 * MOST];
+    static terrimp_depth_sheet sheets[MOST];
+    static uint16_t texels[20 * MOST];
+    static float xyz[3 * MOST];
+    terrimp_depth_mesh_desc d;
+    terrimp_depth_mesh m;
+    uint32_t i;
+    size_t bytes;
+    void *scratch;
+    memset(&d, 0, sizeof d), memset(&m, 0, sizeof m);
+    d.opaque = opaque, d.visible = visible, d.width = r->width, d.height = r->height;
+    d.layers = r->layers->count, d.tolerance = fuzz_good(0.75f, 3.0f);
+    m.vertices = vertices, m.indices = indices, m.sheets = sheets, m.texel_layers = texels;
+    m.vertex_capacity = m.sheet_capacity = MOST, m.index_capacity = 3 * MOST;
+    m.texel_capacity = 20 * MOST;
+    bytes = terrimp_depth_mesh_scratch_bytes(&d);
+    scratch = fuzz_take(bytes);
+    if (bytes && terrimp_depth_mesh_make(&d, scratch, bytes, &m) == TERRIMP_OK) {
+        for (i = 0; i < m.index_count; i++)
+            FUZZ_CHECK(m.indices[i] < m.vertex_count);
+        FUZZ_CHECK(m.index_count % 3u == 0);
+        FUZZ_CHECK(terrimp_depth_points(r->layers, r->picture, vertices, m.vertex_count, xyz) ==
+                   TERRIMP_OK);
+    }
+    free(scratch);
+}
+
+/* Layers of some triangles, wherever they stand: what can be seen of them, what covers that, and
+   their mesh. */
+static void use_layers(void)
+{
+    enum { MOST = 64 };
+    terrimp_layers_desc d;
+    terrimp_layers layers;
+    terrimp_capture capture;
+    terrimp_layer_record r;
+    uint32_t words, i, k, count, *visible, *state;
+    memset(&d, 0, sizeof d), memset(&r, 0, sizeof r), memset(&capture, 0, sizeof capture);
+    d.distance = fuzz_good(20.0f, 90.0f), d.depth = fuzz_good(0.0f, 60.0f);
+    d.cell_size[0] = fuzz_good(0.0f, 10.0f), d.cell_size[1] = fuzz_good(0.0f, 10.0f);
+    d.cell_depth = fuzz_good(0.0f, 10.0f), d.texel = fuzz_good(0.005f, 0.05f);
+    d.view_tan[0] = d.view_tan[1] = fuzz_good(0.05f, 1.0f), d.even = (int)fuzz_below(2);
+    switch (fuzz_below(8)) { /* half of the time as it is */
+    case 0: d.distance = fuzz_float(100.0f); break;
+    case 1: d.depth = fuzz_float(100.0f), d.cell_depth = fuzz_float(20.0f); break;
+    case 2: d.cell_tan[0] = fuzz_float(1.0f), d.view_tan[1] = fuzz_float(1.0f); break;
+    case 3: d.texel = fuzz_float(0.05f), d.tolerance_rad = fuzz_float(0.1f); break;
+    default: break;
+    }
+    if (terrimp_layers_plan(&d, &layers) != TERRIMP_OK)
+        return;
+    for (i = 1; i < 30; i++) {
+        k = i * (layers.count / 30u + 1u);
+        FUZZ_CHECK(k >= layers.count || terrimp_layer_depth(&layers, k) >=
+                                            terrimp_layer_depth(&layers, k - 1u));
+    }
+    if (layers.count > MOST)
+        return;
+    capture.right[0] = -1.0f, capture.up[1] = capture.forward[2] = 1.0f;
+    r.width = 1 + fuzz_below(70), r.height = 1 + fuzz_below(20);
+    capture.tan_left = -0.5f * layers.texel * (float)r.width;
+    capture.tan_down = -0.5f * layers.texel * (float)r.height;
+    words = TERRIMP_MASK_WORDS(r.width) * r.height;
+    r.layers = &layers, r.picture = &capture, r.no_outline = (int)fuzz_below(2);
+    r.masks = fuzz_take((size_t)layers.count * words * 4);
+    visible = fuzz_take((size_t)layers.count * words * 4);
+    state = fuzz_take((size_t)words * 16);
+    memset(r.masks, 0, (size_t)layers.count * words * 4), memset(state, 0, (size_t)words * 16);
+    for (count = fuzz_below(12); count > 0; count--) {
+        float xyz[9];
+        for (i = 0; i < 9; i++)
+            xyz[i] = i % 3 == 2 ? fuzz_good(20.0f, 150.0f) : fuzz_good(-60.0f, 60.0f);
+        if (fuzz_below(8) == 0)
+            xyz[fuzz_below(9)] = fuzz_float(100.0f);
+        terrimp_layer_triangle(&r, xyz);
+    }
+    for (k = 0; k < layers.count; k++)
+        FUZZ_CHECK(terrimp_layer_cull(r.masks + (size_t)k * words, r.width, r.height, 0, state,
+                                      visible + (size_t)k * words) == TERRIMP_OK);
+    cover_layer(visible, r.width, r.height);
+    mesh_layers(r.masks, visible, &r);
+    free(r.masks), free(visible), free(state);
+}
+
+/* Candidates for random views of seven clusters; numbers may point anywhere. */
+static void use_placement(void)
+{
+    static const uint32_t parents[7] = { 4, 4, 5, 5, 6, 6, 6 };
+    terrimp_place_candidate candidates[16];
+    terrimp_place_gain gains[64];
+    float costs[8], left[8], sum = 0.0f;
+    uint8_t shown[64];
+    terrimp_place_desc d;
+    terrimp_placement placed;
+    uint32_t i;
+    void *scratch;
+    memset(&d, 0, sizeof d);
+    d.candidates = candidates, d.gains = gains, d.parents = parents, d.costs = costs;
+    d.cluster_count = 7, d.view_count = 1 + fuzz_below(8), d.budget = fuzz_float(10.0f);
+    for (i = 0; i < d.view_count; i++)
+        costs[i] = fuzz_good(0.0f, 30.0f);
+    for (i = fuzz_below(17); i > 0; i--) {
+        terrimp_place_candidate *c = &candidates[d.candidate_count++];
+        c->cluster = fuzz_u8() < 250 ? fuzz_below(7) : 7;
+        c->memory = fuzz_good(0.1f, 3.0f), c->first_gain = d.gain_count;
+        for (c->gain_count = 0; c->gain_count < 4 && c->gain_count < d.view_count; d.gain_count++) {
+            gains[d.gain_count].view = fuzz_u8() < 250 ? c->gain_count : fuzz_u8();
+            gains[d.gain_count].saved = fuzz_good(-2.0f, 10.0f), c->gain_count++;
+        }
+    }
+    scratch = fuzz_take(terrimp_place_scratch_bytes(&d));
+    if (terrimp_place(&d, scratch, terrimp_place_scratch_bytes(&d), shown, left, &placed) ==
+        TERRIMP_OK) {
+        for (i = 0; i < d.candidate_count; i++)
+            if (candidates[i].gain_count &&
+                memchr(shown + candidates[i].first_gain, 1, candidates[i].gain_count))
+                sum += candidates[i].memory;
+        FUZZ_CHECK(placed.unsolved <= placed.problems && placed.chosen <= d.candidate_count);
+        FUZZ_CHECK(!(placed.memory < sum * 0.999f) && !(placed.memory > sum * 1.001f));
+    }
+    free(scratch);
+}
+
 static void (*const calls[])(void) = {
     change_field, change_place_of_field, refuse_field, change_camera, change_box,   query_field,
     read_field,   fill_field,            cast_ray,     use_camera,    use_capture,  judge_picture,
     use_patterns, use_geomip,            use_packer,   use_simplifier,
+    use_layers, use_placement,
 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
