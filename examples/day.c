@@ -2,8 +2,8 @@
    colours without light and normals, and are lit when they are drawn, so that none is made anew for
    the sun's sake.
    Build:  make day
-   Expect: build/day_morning.png, day_noon.png, day_evening.png; and how many pictures were made, all
-           of them in the first frames. Exit code 1 if the sun made more necessary. */
+   Expect: build/day_morning.png, day_noon.png, day_evening.png; and how many pictures were made:
+           all of them in the first frames. Exit code 1 if the sun made more necessary. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
