@@ -20,9 +20,10 @@ static const char prop_vertex[] =
 
 static const char prop_fragment[] =
     "#version 330 core\n"
+    "uniform vec3 light = vec3(1.0);\n"
     "in vec3 shade;\n"
     "out vec4 colour;\n"
-    "void main() { colour = vec4(shade, 1.0); }\n";
+    "void main() { colour = vec4(shade * light, 1.0); }\n";
 
 /* A house in units of its side: four walls from below the ground up, and a roof with two gables. */
 static const float corners[CORNERS][3] = {

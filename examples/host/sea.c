@@ -14,11 +14,12 @@ static const char vertex[] = GL_SHADER_HEAD
 
 /* Seen from above it is clear, at a low angle it shines like the sky. */
 static const char fragment[] = GL_SHADER_HEAD
+    "uniform vec3 light;\n"
     "in vec3 towards;\n"
     "out vec4 colour;\n"
     "void main() {\n"
     "    float flat_on = abs(normalize(towards).y), shine = pow(1.0 - flat_on, 4.0);\n"
-    "    colour = vec4(mix(vec3(0.10, 0.25, 0.36), vec3(0.60, 0.72, 0.84), shine),\n"
+    "    colour = vec4(light * mix(vec3(0.10, 0.25, 0.36), vec3(0.60, 0.72, 0.84), shine),\n"
     "                  0.70 + 0.25 * shine);\n"
     "}\n";
 
@@ -35,6 +36,8 @@ const char *sea_open(sea *s, const terrimp_box *box, float height)
     s->program = gl_program_make(vertex, fragment);
     if (!s->program.id)
         return "a shader does not compile";
+    glUseProgram(s->program.id);
+    glUniform3f(glGetUniformLocation(s->program.id, "light"), 1.0f, 1.0f, 1.0f);
     glGenVertexArrays(1, &s->array);
     glBindVertexArray(s->array);
     glGenBuffers(1, &s->vertices);
