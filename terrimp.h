@@ -383,7 +383,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 /* ==== Camera ============================================================= >>camera */
 
-/* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
+/* The eye of a frame; or the direction from which a shadow map, or a map, shows the terrain. */
 typedef struct terrimp_camera {
     float eye[3];           /* [wu] [Limits: -1e18..1e18] */
     float forward[3];       /* (required) viewing direction, any length > 0 */
@@ -391,10 +391,20 @@ typedef struct terrimp_camera {
     float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
     uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
     uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
-    float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
-                               ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
+    float z_near;           /* (required) [wu] clip distance along forward
+                               [Limits: > 0; orthographic: any] */
+    float z_far;            /* [wu] clip distance along forward [Limits: > z_near]
+                               [Default 0, or more than 1e18 -> an infinite far plane;
+                               orthographic: required] */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
+    int orthographic;       /* nonzero: all rays run along forward, and sides are required */
+    float sides[4];         /* where the viewport ends to the left, right, below, above: tangents
+                               from forward, or [wu] from the eye when it is orthographic.
+                               Off-centre for the eyes of a headset, tiles of a large picture,
+                               jitter [Limits: rising, -1e4..1e4; orthographic: -1e18..1e18]
+                               [Default all 0 -> by fov_y_rad, symmetric, pixels square] */
+    float reach;            /* [wu] what is decided holds for all eyes so close to this one: half
+                               the distance of two that share an update [Limits: 0..1e18] */
 } terrimp_camera;
 
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
@@ -410,7 +420,8 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
                                                    float projection[16]);
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
-   height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
+   height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels. Orthographic:
+   at any distance. Where pixels are not square, the larger of two.
    Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
@@ -427,7 +438,7 @@ enum {
     TERRIMP_PLANES_OUTSIDE = -1
 };
 
-/* The planes of a camera. */
+/* The planes of a camera, moved out by its reach. */
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum);
 
@@ -447,13 +458,15 @@ TERRIMP_API int terrimp_frustum_test(const terrimp_frustum *frustum, const terri
 TERRIMP_API float terrimp_box_distance(const terrimp_box *box, const float point[3]);
 TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point[3]);
 
-/* A perspective frustum fitted to a box: the camera of a capture. Its sides are tangents, that is
-   offsets along right and up at distance 1 along forward; left and down are the smaller ones. */
+/* A frustum fitted to a box: the camera of a capture. Its sides are tangents, that is offsets along
+   right and up at distance 1 along forward; left and down are the smaller ones. Of an orthographic
+   one they are [wu], and z_near may be below 0. */
 typedef struct terrimp_capture {
     float eye[3];
     float right[3], up[3], forward[3]; /* orthonormal */
     float z_near, z_far;               /* [wu] along forward */
     float tan_left, tan_right, tan_down, tan_up;
+    int orthographic;
 } terrimp_capture;
 
 /* Fits a frustum with its apex at the eye and its axis through the middle of the box around the
@@ -466,6 +479,14 @@ typedef struct terrimp_capture {
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture);
+
+/* Fits an orthographic frustum around a box's eight corners.
+
+   eye, forward   what its sides and places are relative to; where it looks, any length > 0
+   Errors         E_RANGE as above */
+TERRIMP_API terrimp_result terrimp_capture_fit_along(const terrimp_box *box, const float eye[3],
+                                                     const float forward[3],
+                                                     terrimp_capture *capture);
 
 /* Narrows a fitted capture to points, for instance the vertices that its picture is drawn on: its
    sides touch their projections. The clip distances stay.
@@ -800,7 +821,8 @@ typedef struct terrimp_split {
               [Limits: > 0]
    overlap    [wu] by which each part goes beyond the place of the split, since the mesh is not the
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
-   Errors     E_RANGE, also for an index beyond the vertices or a count not of triangles
+   Errors     E_RANGE, also for an index beyond the vertices, a count not of triangles, and an
+              orthographic capture
    Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
@@ -1139,7 +1161,8 @@ typedef struct terrimp_horizon {
 } terrimp_horizon;
 
 /* Begins the horizon of a camera. Ground that z_near clips hides nothing. An eye below the ground
-   or beside the terrain has no horizon: nothing is hidden from it, and that is no error.
+   or beside the terrain has no horizon, nor have an orthographic camera or one with a reach:
+   nothing is hidden from these, and that is no error.
 
    tree     built
    walls    [terrimp_walls_bytes] built, aligned to 4
@@ -1355,8 +1378,8 @@ typedef struct terrimp_stats {
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
-                                    drawn: update with a camera that sees far enough, then draw with
-                                    these; z_near is 0 within a box */
+                                    drawn, for a host that wants to draw with these; z_near is 0
+                                    within a box */
 } terrimp_stats;
 
 /* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
@@ -1386,7 +1409,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
 
-/* Decides the frame: what is visible, what is drawn how, which pictures are made.
+/* Decides the frame: what is visible, what is drawn how, which pictures are made. A view serves
+   perspective or orthographic cameras, and forgets its pictures from one kind to the other.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
               more nodes in GEOMIP and AUTO even at 1000 px. The frame before stays
@@ -1395,6 +1419,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
+   An update may be rendered any number of times: captures come with the first one, all other
+   commands are the same again. They serve every eye within the camera's reach that looks through
+   its sides, each with matrices of its own; a place_matrix is relative to the update's eye. An
+   update that is never rendered makes no picture, and loses none.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate and touch until the next one */
@@ -1571,7 +1599,8 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
 
    Errors     E_RANGE also when the eye is more than 2^23 samples from the origin, or when z_far
               reaches over more than 1024 pages, with TERRIMP_FIXED also 2048 quads less three
-              pages. After any error next returns 0
+              pages; or for a camera that is orthographic, or without a far plane. After any error
+              next returns 0
    Cost       about 2 us; with max_triangles one to two thirds of what next takes for the whole
               frame, more for the first
    Source     Finch and Bishop 1998, sections 4.3 and 4.10 */
@@ -3396,6 +3425,28 @@ static int terrimpi_orthonormal(const float a[3], const float b[3])
            terrimpi_abs(terrimpi_dot(a, b)) < 2e-6f;
 }
 
+static int terrimpi_camera_has_sides(const terrimp_camera *c)
+{
+    return c->sides[0] != 0.0f || c->sides[1] != 0.0f || c->sides[2] != 0.0f ||
+           c->sides[3] != 0.0f;
+}
+
+/* Whether a camera's sides are within their limits, with some size for a float to tell. */
+static int terrimpi_camera_sides_fit(const terrimp_camera *c)
+{
+    float most = c->orthographic ? TERRIMPI_FARTHEST : 1e4f;
+    int i;
+    if (!terrimpi_camera_has_sides(c))
+        return !c->orthographic;
+    for (i = 0; i < 4; i += 2) {
+        const float *s = c->sides + i;
+        float larger = terrimpi_max(terrimpi_abs(s[0]), terrimpi_abs(s[1]));
+        if (larger > most || !(s[1] - s[0] > 1e-5f * larger))
+            return 0;
+    }
+    return 1;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
 {
     terrimp_camera c;
@@ -3404,14 +3455,19 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     c = *camera;
     TERRIMPI_REFUSE(!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) ||
                     !terrimpi_finite3(c.up) || !terrimpi_finite2(c.z_near, c.z_far) ||
+                    !terrimpi_finite3(c.sides) || !terrimpi_finite2(c.sides[3], c.reach) ||
                     !terrimpi_finite(c.fov_y_rad), TERRIMP_E_NOT_FINITE);
     TERRIMPI_DEFAULT(c.fov_y_rad, 1.0471976f);
+    if (!c.orthographic && (c.z_far == 0.0f || c.z_far > TERRIMPI_FARTHEST))
+        c.z_far = TERRIMPI_FLOAT_MAX;
     if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
         c.up[1] = 1.0f;
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
-                    !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || c.z_far > TERRIMPI_FARTHEST ||
+                    !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_far <= c.z_near ||
+                    (c.orthographic ? c.z_far > TERRIMPI_FARTHEST || c.z_near < -TERRIMPI_FARTHEST
+                                    : c.z_near <= 0.0f) || !terrimpi_camera_sides_fit(&c) ||
+                    !terrimpi_within(c.reach, 0.0f, TERRIMPI_FARTHEST) ||
                     terrimpi_largest(c.eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
     if (!terrimpi_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
         TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
@@ -3421,25 +3477,43 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     return TERRIMP_OK;
 }
 
-/* Half the height and width of a resolved camera's screen at distance 1. */
+/* The sides of a resolved camera's screen at distance 1: left, right, down, up. */
+static void terrimpi_camera_sides(const terrimp_camera *camera, float sides[4])
+{
+    memcpy(sides, camera->sides, sizeof camera->sides);
+    if (terrimpi_camera_has_sides(camera))
+        return;
+    sides[3] = TERRIMP_TANF(camera->fov_y_rad * 0.5f);
+    sides[1] = sides[3] * (float)camera->width_px / (float)camera->height_px;
+    sides[0] = -sides[1];
+    sides[2] = -sides[3];
+}
+
+/* How far the screen reaches to either side of forward, up or down from it, at distance 1. */
 static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x, float *tan_y)
 {
-    *tan_y = TERRIMP_TANF(camera->fov_y_rad * 0.5f);
-    *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
+    float sides[4];
+    terrimpi_camera_sides(camera, sides);
+    *tan_x = terrimpi_max(-sides[0], sides[1]);
+    *tan_y = terrimpi_max(-sides[2], sides[3]);
 }
 
 /* The frustum of a resolved camera, as that of a capture. */
 static void terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
 {
+    float sides[4];
     memcpy(out->eye, camera->eye, sizeof out->eye);
     memcpy(out->up, camera->up, sizeof out->up);
     memcpy(out->forward, camera->forward, sizeof out->forward);
     terrimpi_cross(camera->forward, camera->up, out->right);
     out->z_near = camera->z_near;
     out->z_far = camera->z_far;
-    terrimpi_camera_tangents(camera, &out->tan_right, &out->tan_up);
-    out->tan_left = -out->tan_right;
-    out->tan_down = -out->tan_up;
+    terrimpi_camera_sides(camera, sides);
+    out->tan_left = sides[0];
+    out->tan_right = sides[1];
+    out->tan_down = sides[2];
+    out->tan_up = sides[3];
+    out->orthographic = camera->orthographic != 0;
 }
 
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
@@ -3456,9 +3530,12 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
 /* terrimp_camera_pixel_factor of a resolved camera. */
 static float terrimpi_camera_pixel_factor(const terrimp_camera *camera)
 {
-    float tan_x, tan_y;
-    terrimpi_camera_tangents(camera, &tan_x, &tan_y);
-    return (float)camera->height_px / (2.0f * tan_y);
+    float sides[4], factor;
+    terrimpi_camera_sides(camera, sides);
+    factor = (float)camera->height_px / (sides[3] - sides[2]);
+    return terrimpi_camera_has_sides(camera)
+               ? terrimpi_max(factor, (float)camera->width_px / (sides[1] - sides[0]))
+               : factor;
 }
 
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
@@ -3470,24 +3547,51 @@ TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *cam
     return TERRIMP_OK;
 }
 
-/* terrimp_camera_frustum of a resolved camera. */
+/* terrimp_camera_frustum of a resolved camera. A side's plane holds the eye, or runs along forward
+   beside it. */
 static void terrimpi_camera_frustum(const terrimp_camera *camera, terrimp_frustum *frustum)
 {
     terrimp_capture c;
-    int i;
+    float sides[4], along;
+    int i, k;
     terrimpi_camera_capture(camera, &c);
+    terrimpi_camera_sides(camera, sides);
     memset(frustum, 0, sizeof *frustum);
+    along = c.orthographic ? 0.0f : 1.0f;
     for (i = 0; i < 3; i++) {
         frustum->eye[i] = c.eye[i];
-        frustum->plane[0][i] = c.right[i] - c.forward[i] * c.tan_left;
-        frustum->plane[1][i] = c.forward[i] * c.tan_right - c.right[i];
-        frustum->plane[2][i] = c.up[i] - c.forward[i] * c.tan_down;
-        frustum->plane[3][i] = c.forward[i] * c.tan_up - c.up[i];
         frustum->plane[4][i] = c.forward[i];
         frustum->plane[5][i] = -c.forward[i];
     }
     frustum->plane[4][3] = -c.z_near;
     frustum->plane[5][3] = c.z_far;
+    for (k = 0; k < 4; k++) {
+        const float *axis = k < 2 ? c.right : c.up;
+        float sign = k & 1 ? -1.0f : 1.0f, *plane = frustum->plane[k];
+        for (i = 0; i < 3; i++)
+            plane[i] = sign * (axis[i] - c.forward[i] * (along * sides[k]));
+        plane[3] = (along - 1.0f) * sign * sides[k];
+    }
+    for (k = 0; k < 6 && camera->reach > 0.0f; k++)
+        frustum->plane[k][3] += camera->reach * terrimpi_length(frustum->plane[k]);
+}
+
+/* Where decisions about a resolved camera's picture of a box are made from; returns K there. About
+   an orthographic one they are made from so far away that all directions to the box are alike to
+   2^-16, and nothing in it, or about it by half its size, is farther than K counts with. */
+static float terrimpi_camera_stand(const terrimp_camera *camera, const terrimp_box *all,
+                                   float eye[3])
+{
+    float factor = terrimpi_camera_pixel_factor(camera), size, away;
+    int i;
+    memcpy(eye, camera->eye, sizeof camera->eye);
+    if (!camera->orthographic)
+        return factor;
+    size = terrimp_box_farthest(all, all->min);
+    away = terrimpi_min(65536.0f * size, 0.1f * TERRIMPI_FARTHEST);
+    for (i = 0; i < 3; i++)
+        eye[i] = all->min[i] + (all->max[i] - all->min[i]) * 0.5f - camera->forward[i] * away;
+    return factor * (away + size);
 }
 
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
@@ -3542,6 +3646,29 @@ TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point
     return terrimpi_length(d);
 }
 
+/* Moves the sides of a box out. */
+static void terrimpi_grow(terrimp_box *box, float by)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        box->min[i] -= by;
+        box->max[i] += by;
+    }
+}
+
+/* From the least to the largest depth of a box along a direction from an eye. */
+static void terrimpi_box_depths(const terrimp_box *box, const float eye[3], const float forward[3],
+                                float *first, float *last)
+{
+    int i;
+    *first = *last = 0.0f;
+    for (i = 0; i < 3; i++) {
+        float f = forward[i];
+        *first += f * ((f > 0.0f ? box->min[i] : box->max[i]) - eye[i]);
+        *last += f * ((f > 0.0f ? box->max[i] : box->min[i]) - eye[i]);
+    }
+}
+
 /* Corner i of a box (bit k of i: the maximum along axis k), relative to a point. */
 static void terrimpi_box_corner(const terrimp_box *box, int i, const float point[3],
                                 float corner[3])
@@ -3553,7 +3680,7 @@ static void terrimpi_box_corner(const terrimp_box *box, int i, const float point
 
 /* Fits the sides and clip distances of a capture to points, with a hair's breadth more, so that
    rounding leaves none outside and a flat box has a volume. Returns 0 when the cosine between
-   forward and the way to one of them is not above `least`. */
+   forward and the way to one of them is not above `least`, unless the capture is orthographic. */
 static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t count, float least)
 {
     float slope = 1.0f; /* of the steepest ray: its length over its depth */
@@ -3564,12 +3691,18 @@ static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t cou
         float p[3], length, z, x, y;
         terrimpi_sub(xyz + 3u * i, c->eye, p);
         z = terrimpi_dot(c->forward, p);
+        x = terrimpi_dot(c->right, p);
+        y = terrimpi_dot(c->up, p);
         length = terrimpi_length(p);
-        if (!(z > least * length))
-            return 0;
-        slope = terrimpi_max(slope, length / z);
-        x = terrimpi_dot(c->right, p) / z;
-        y = terrimpi_dot(c->up, p) / z;
+        if (c->orthographic) {
+            slope = terrimpi_max(slope, length);
+        } else {
+            if (!(z > least * length))
+                return 0;
+            slope = terrimpi_max(slope, length / z);
+            x /= z;
+            y /= z;
+        }
         c->z_near = terrimpi_min(c->z_near, z);
         c->z_far = terrimpi_max(c->z_far, z);
         c->tan_left = terrimpi_min(c->tan_left, x);
@@ -3577,27 +3710,35 @@ static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t cou
         c->tan_down = terrimpi_min(c->tan_down, y);
         c->tan_up = terrimpi_max(c->tan_up, y);
     }
-    c->z_near *= 1.0f - 1e-6f * slope;
-    c->z_far *= 1.0f + 1e-6f * slope;
+    if (c->orthographic) { /* of a flat box, too, there is a volume */
+        c->z_near -= 1e-6f * slope;
+        c->z_far += 1e-6f * slope;
+    } else {
+        c->z_near *= 1.0f - 1e-6f * slope;
+        c->z_far *= 1.0f + 1e-6f * slope;
+    }
     terrimpi_widen(&c->tan_left, &c->tan_right, slope);
     terrimpi_widen(&c->tan_down, &c->tan_up, slope);
     return 1;
 }
 
-/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error. */
+/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error; orthographic,
+   as terrimp_capture_fit_along, where forward is not NULL. */
 static terrimp_result terrimpi_capture_fit(const terrimp_box *box, const float eye[3],
-                                           terrimp_capture *c)
+                                           const float forward[3], terrimp_capture *c)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
     static const float origin[3] = {0.0f, 0.0f, 0.0f};
     float corners[8][3];
     int i;
-    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
+    TERRIMPI_REFUSE(!forward && terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
+    c->orthographic = forward ? 1 : 0;
     for (i = 0; i < 3; i++) {
         c->eye[i] = eye[i];
-        c->forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
+        c->forward[i] = forward ? forward[i] : (box->min[i] - eye[i]) * 0.5f +
+                                                   (box->max[i] - eye[i]) * 0.5f;
     }
-    TERRIMPI_REFUSE(!terrimpi_normalize(c->forward), TERRIMP_E_INSIDE);
+    TERRIMPI_REFUSE(!terrimpi_normalize(c->forward), forward ? TERRIMP_E_RANGE : TERRIMP_E_INSIDE);
     memcpy(c->up, c->forward[1] * c->forward[1] > 0.9999f ? minus_z : y_axis, sizeof c->up);
     terrimpi_basis(c->forward, c->up, c->right);
     for (i = 0; i < 8; i++)
@@ -3606,19 +3747,35 @@ static terrimp_result terrimpi_capture_fit(const terrimp_box *box, const float e
     return terrimpi_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture)
+static terrimp_result terrimpi_capture_fit_checked(const terrimp_box *box, const float eye[3],
+                                                   const float forward[3],
+                                                   terrimp_capture *capture)
 {
     terrimp_capture c;
     TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-                    !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite3(eye) || (forward && !terrimpi_finite3(forward)),
+                    TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
                     box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_FARTHEST ||
                     terrimp_box_farthest(box, eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
-    TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
+    TERRIMPI_TRY(terrimpi_capture_fit(box, eye, forward, &c));
     *capture = c;
     return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture)
+{
+    return terrimpi_capture_fit_checked(box, eye, NULL, capture);
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit_along(const terrimp_box *box, const float eye[3],
+                                                     const float forward[3],
+                                                     terrimp_capture *capture)
+{
+    TERRIMPI_REFUSE(!forward, TERRIMP_E_NULL);
+    return terrimpi_capture_fit_checked(box, eye, forward, capture);
 }
 
 /* Fits the sides alone. */
@@ -3667,10 +3824,23 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     memset(projection, 0, 16 * sizeof *projection);
     projection[0] = 2.0f / width;
     projection[5] = 2.0f / height;
+    if (c->orthographic) {
+        projection[10] = (depth_zero_to_one ? -1.0f : -2.0f) / depth;
+        projection[12] = -(c->tan_right + c->tan_left) / width;
+        projection[13] = -(c->tan_up + c->tan_down) / height;
+        projection[14] = -(depth_zero_to_one ? c->z_near : c->z_far + c->z_near) / depth;
+        projection[15] = 1.0f;
+        return TERRIMP_OK;
+    }
     projection[8] = (c->tan_right + c->tan_left) / width;
     projection[9] = (c->tan_up + c->tan_down) / height;
     projection[10] = -(depth_zero_to_one ? c->z_far : c->z_far + c->z_near) / depth;
     projection[11] = -1.0f;
+    if (c->z_far > TERRIMPI_FARTHEST) { /* without a far plane */
+        projection[10] = -1.0f;
+        projection[14] = (depth_zero_to_one ? -1.0f : -2.0f) * c->z_near;
+        return TERRIMP_OK;
+    }
     projection[14] = (depth_zero_to_one ? -c->z_far : -2.0f * c->z_far) * c->z_near / depth;
     return TERRIMP_OK;
 }
@@ -4194,6 +4364,7 @@ typedef struct terrimpi_mip_frame {
     terrimp_geomip_view *view;
     terrimp_frustum frustum;
     float eye[3], forward[3];
+    float reach;               /* of the camera */
     float heading[2];          /* x, z; unit length */
     float level, steep;
     float along, across;       /* largest tangents on the screen, in the direction in which y is
@@ -4208,12 +4379,15 @@ typedef struct terrimpi_mip_frame {
    at its edge may be drawn that far outside. */
 static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera, float margin)
 {
-    float right[3], seen[3], aside[3], tan_x, tan_y;
+    float right[3], seen[3], aside[3], tan_x = 0.0f, tan_y = 0.0f;
     terrimpi_cross(camera->forward, camera->up, right);
-    terrimpi_camera_tangents(camera, &tan_x, &tan_y);
+    if (camera->orthographic)
+        margin = 1.0f / 65536.0f; /* see terrimpi_camera_stand */
+    else
+        terrimpi_camera_tangents(camera, &tan_x, &tan_y);
     tan_x += margin;
     tan_y += margin;
-    memcpy(f->eye, camera->eye, sizeof f->eye);
+    f->reach = camera->reach;
     f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
     if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
         return;
@@ -4307,6 +4481,7 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_nod
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    terrimpi_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
     measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
@@ -4495,8 +4670,12 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
 static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tree,
                               terrimp_geomip_view *view, const terrimp_camera *camera, float scale)
 {
-    float pixel_factor = terrimpi_camera_pixel_factor(camera);
+    terrimp_node root = terrimpi_tree_root(tree);
+    float pixel_factor;
+    terrimp_box all;
     uint32_t level;
+    terrimpi_mip_box(tree, &root, &all);
+    pixel_factor = terrimpi_camera_stand(camera, &all, f->eye);
     terrimpi_camera_frustum(camera, &f->frustum);
     f->tree = tree;
     f->view = view;
@@ -4745,10 +4924,10 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     offset[1] = (float)slot->y / (float)atlas_height + scale[1];
     offset[2] = 0.5f;
     /* Row i of the result: scale[i] * row i of P V + offset[i] * row 3 of P V, where row 3 is the
-       distance along forward: the q that s and t are divided by. */
+       distance along forward, or 1: the q that s and t are divided by. */
     for (column = 0; column < 4; column++) {
         const float *v = view + column * 4;
-        float q = -v[2];
+        float q = capture->orthographic ? v[3] : -v[2];
         for (row = 0; row < 3; row++) {
             float clip = projection[row] * v[0] + projection[4 + row] * v[1] +
                          projection[8 + row] * v[2] + projection[12 + row] * v[3];
@@ -4776,23 +4955,25 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
 
 /* A place at the distance z along forward is z (forward + x right + y up) from the capture's eye,
    with tangents x and y that grow with s and t; and 1 / z grows with the depth, from 1 / z_near to
-   1 / z_far. So (place, 1) / z is linear in all three. */
+   1 / z_far. So (place, 1) / z is linear in all three. Of an orthographic capture the place is. */
 static void terrimpi_place_matrix(const terrimp_capture *c, const terrimp_rect *slot,
                                   uint32_t atlas_width, uint32_t atlas_height, float matrix[16])
 {
     float across = (c->tan_right - c->tan_left) / (float)slot->width;
     float upward = (c->tan_up - c->tan_down) / (float)slot->height;
     float x = c->tan_left - across * (float)slot->x, y = c->tan_down - upward * (float)slot->y;
+    float depth = c->orthographic ? c->z_far - c->z_near : 0.0f;
+    float ahead = c->orthographic ? c->z_near : 1.0f;
     int i;
     for (i = 0; i < 3; i++) {
         matrix[i] = c->right[i] * across * (float)atlas_width;
         matrix[4 + i] = c->up[i] * upward * (float)atlas_height;
-        matrix[8 + i] = 0.0f;
-        matrix[12 + i] = c->forward[i] + c->right[i] * x + c->up[i] * y;
+        matrix[8 + i] = c->forward[i] * depth;
+        matrix[12 + i] = c->forward[i] * ahead + c->right[i] * x + c->up[i] * y;
     }
     matrix[3] = matrix[7] = 0.0f;
-    matrix[11] = 1.0f / c->z_far - 1.0f / c->z_near;
-    matrix[15] = 1.0f / c->z_near;
+    matrix[11] = c->orthographic ? 0.0f : 1.0f / c->z_far - 1.0f / c->z_near;
+    matrix[15] = c->orthographic ? 1.0f : 1.0f / c->z_near;
 }
 
 /* From places relative to one eye to those relative to another. */
@@ -4904,22 +5085,26 @@ static float terrimpi_largest_sine(const terrimp_box *box, const float eye[3], c
    whose sine is |PQ| sin(APB) / |QB|, and in the triangle ABP the law of sines gives
    sin(APB) = |AB| sin(BAP) / |BP|. With d the distance from B to the box, which holds P:
    |BP| >= d, |QB| >= d - error. The tangent of that angle times K is the distance in pixels at the
-   middle of the screen. */
+   middle of the screen. For all eyes within `reach` of B: d shrinks by that, and the angle APB
+   grows by one whose sine is at most reach / d. */
 static float terrimpi_parallax_error(const terrimp_box *box, float error,
-                                     const float captured_eye[3], const float eye[3],
+                                     const float captured_eye[3], const float eye[3], float reach,
                                      float pixel_factor)
 {
     float move[3], move_length, distance, sine;
     terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
-    if (!(move_length > 0.0f) || !(error > 0.0f))
+    if (!(move_length + reach > 0.0f) || !(error > 0.0f))
         return 0.0f;
-    distance = terrimp_box_distance(box, eye);
+    distance = terrimp_box_distance(box, eye) - reach;
     sine = 1.0f;
-    if (distance > error)
-        sine = error / (distance - error) *
-               terrimpi_min(1.0f, move_length / distance *
-                                      terrimpi_largest_sine(box, captured_eye, move, move_length));
+    if (distance > error) {
+        float turn = reach / distance;
+        if (move_length > 0.0f)
+            turn += move_length / distance *
+                    terrimpi_largest_sine(box, captured_eye, move, move_length);
+        sine = error / (distance - error) * terrimpi_min(1.0f, turn);
+    }
     return sine < 0.999f ? pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine)
                          : TERRIMPI_INFINITY;
 }
@@ -4931,7 +5116,7 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
     TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
     TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
-    *error_px = terrimpi_parallax_error(box, error, captured_eye, eye, pixel_factor);
+    *error_px = terrimpi_parallax_error(box, error, captured_eye, eye, 0.0f, pixel_factor);
     return TERRIMP_OK;
 }
 
@@ -5167,7 +5352,7 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
     TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite(reach) || !terrimpi_finite(overlap), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f || capture->orthographic, TERRIMP_E_RANGE);
     for (i = 0; i < index_count; i++)
         TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
     terrimpi_capture_split(capture, xyz, vertex_count, indices, index_count, reach, overlap, split);
@@ -7171,7 +7356,8 @@ static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *t
     h->spread = TERRIMP_SQRTF(tree->field.spacing_x * tree->field.spacing_x +
                               tree->field.spacing_z * tree->field.spacing_z);
     terrimpi_camera_capture(camera, &capture);
-    h->blind = !terrimpi_horizon_stand(h, camera->eye) ||
+    h->blind = camera->orthographic || camera->reach > 0.0f ||
+               !terrimpi_horizon_stand(h, camera->eye) ||
                terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) !=
                    TERRIMP_OK || h->eye <= ground + h->low || !terrimpi_horizon_clip(h, &capture);
     if (h->blind)
@@ -7297,6 +7483,7 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 typedef struct terrimpi_capture_plan {
     terrimp_node node;
     terrimp_box box;
+    float eye[3];           /* it is made from, or from far along it: see terrimpi_camera_stand */
     terrimp_capture camera; /* of all layers: they differ in their clip distances */
     float z_near[TERRIMPI_CAPTURE_LAYERS], z_far[TERRIMPI_CAPTURE_LAYERS];
     uint32_t layer_count;
@@ -7312,14 +7499,25 @@ typedef struct terrimpi_capture_draw {
 
 /* ---- the camera ---- */
 
+/* What the places of an orthographic picture of a node are relative to. */
+static void terrimpi_capture_origin(const terrimp_terrain *t, const terrimp_node *node,
+                                    float origin[3])
+{
+    terrimp_box box;
+    float height = 0.5f * (t->desc.height_low + t->desc.height_high);
+    terrimpi_tree_box(&t->tree, node, height, height, &box);
+    memcpy(origin, box.min, sizeof box.min);
+}
+
 /* Fits the camera around a node's mesh, which is in xyz, and says how many texels the picture needs
-   at so many for a unit of size at distance 1. Returns 0 when no camera fits. */
-static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], const float *xyz,
-                                uint32_t vertex_count, float density, uint32_t largest,
-                                terrimp_capture *camera, uint32_t size[2])
+   at so many for a unit of size at distance 1. It looks along forward, if that is not NULL. Returns
+   0 when no camera fits. */
+static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], const float *forward,
+                                const float *xyz, uint32_t vertex_count, float density,
+                                uint32_t largest, terrimp_capture *camera, uint32_t size[2])
 {
     float width, height;
-    if (terrimpi_capture_fit(box, eye, camera) != TERRIMP_OK ||
+    if (terrimpi_capture_fit(box, eye, forward, camera) != TERRIMP_OK ||
         !terrimpi_capture_tighten(camera, xyz, vertex_count))
         return 0;
     width = (camera->tan_right - camera->tan_left) * density;
@@ -7359,6 +7557,14 @@ static uint32_t terrimpi_capture_source(const terrimp_quadtree *tree, const terr
     return level;
 }
 
+/* The sine of the angle at which a picture's camera looks down on its node, about. */
+static float terrimpi_capture_sine(const terrimpi_capture_plan *plan)
+{
+    const terrimp_capture *c = &plan->camera;
+    float drop = c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]);
+    return terrimpi_abs(c->orthographic ? c->forward[1] : drop / c->z_far);
+}
+
 /* The border of neighbours that a picture needs: so many texels, in world units. At a grazing angle
    a texel is as many times longer on the ground as the sine of that angle is smaller. */
 static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
@@ -7369,9 +7575,9 @@ static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi
     uint32_t quads = t->desc.chunk_quads, width = 0, widths = terrimpi_strip_count(quads);
     float per_texel_x = (c->tan_right - c->tan_left) / (float)size[0];
     float per_texel_y = (c->tan_up - c->tan_down) / (float)size[1];
-    float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
-    float sine = terrimpi_max(drop / c->z_far, 0.1f);
-    float reach = texels * c->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
+    float sine = terrimpi_max(terrimpi_capture_sine(plan), 0.1f);
+    float reach = texels * (c->orthographic ? 1.0f : c->z_far) *
+                  terrimpi_max(per_texel_x, per_texel_y / sine);
     float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << plan->source);
     while (width < widths && (float)terrimpi_strip_quads(quads, width) * step < reach)
         width++;
@@ -7398,7 +7604,8 @@ static void terrimpi_capture_spread(const terrimp_terrain *t, terrimpi_capture_p
     plan->border = terrimpi_capture_border(t, plan, size, texels);
     border = 1.5f * terrimpi_capture_reach(t, plan) *
              terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
-    c->z_near = terrimpi_max(c->z_near * 0.5f, c->z_near - border);
+    c->z_near = c->orthographic ? c->z_near - border
+                                : terrimpi_max(c->z_near * 0.5f, c->z_near - border);
     c->z_far += border;
     plan->z_near[0] = c->z_near;
     plan->z_far[0] = c->z_far;
@@ -7447,19 +7654,14 @@ static float terrimpi_capture_end(const terrimpi_capture_plan *plan, uint32_t la
 static int terrimpi_capture_in_layer(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                      uint32_t node, uint32_t layer)
 {
-    const float *f = plan->camera.forward, *eye = plan->camera.eye;
     terrimp_node place;
     terrimp_box box;
-    float first = 0.0f, last = 0.0f;
-    int i;
+    float first, last;
     if (plan->layer_count == 1u)
         return 1;
     place = terrimpi_tree_node(&t->tree, node);
     terrimpi_node_box(t, &place, &box);
-    for (i = 0; i < 3; i++) {
-        first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - eye[i]);
-        last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - eye[i]);
-    }
+    terrimpi_box_depths(&box, plan->camera.eye, plan->camera.forward, &first, &last);
     return first < terrimpi_capture_end(plan, layer) && last > plan->z_near[layer];
 }
 
@@ -7498,7 +7700,7 @@ static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_c
                                       terrimpi_capture_draw draws[TERRIMPI_CAPTURE_DRAWS])
 {
     const terrimp_heightfield *field = &t->desc.field;
-    const float *eye = plan->camera.eye;
+    const float *eye = plan->eye;
     uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
     uint32_t i, j, k, count = 0;
     float step = (float)(quads << plan->source);
@@ -7681,11 +7883,19 @@ typedef struct terrimpi_frame {
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
     terrimp_camera camera;         /* resolved */
+    float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
+    float pixel_factor;            /* K from there */
+    float side_px;                 /* pixels of a unit of a fitted frustum's side: K, too, or */
     int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
-    float pixel_factor;
     terrimpi_motion motion;
 } terrimpi_frame;
+
+/* From the closest of a frame's eyes to a box. */
+static float terrimpi_view_distance(const terrimpi_frame *f, const terrimp_box *box)
+{
+    return terrimpi_max(0.0f, terrimp_box_distance(box, f->eye) - f->camera.reach);
+}
 
 #ifndef TERRIMP_NO_HORIZON
 #define TERRIMPI_CULL_HAS_HORIZON 1
@@ -7812,7 +8022,7 @@ typedef struct terrimpi_picture {
     uint32_t layer_count;     /* 0: not made yet */
     uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
-    float eye[3];             /* of the capture */
+    float eye[3];             /* of the capture's plan */
     float angle_rad, parallax_px, urgency;
     float sharpness;          /* texels per unit of size at distance 1 */
     float cost;               /* of the capture */
@@ -7981,6 +8191,25 @@ static int terrimpi_cache_shows(const terrimpi_picture *picture, uint32_t chunk_
 
 /* ---- what is in sight ---- */
 
+/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
+   of the mean square, which 95 of 100 samples keep to. */
+static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
+{
+    const terrimpi_mesh *mesh = &f->terrain->meshes[node];
+    return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
+               ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
+               : mesh->error;
+}
+
+/* The sine of the view angle up to which a picture may be used, by both limits. */
+static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float closest)
+{
+    float sine = TERRIMP_SINF(f->desc->max_angle_rad), error = terrimpi_view_mesh_error(f, node);
+    sine = terrimpi_min(sine, f->desc->tolerance_px * terrimpi_max(closest - error, 0.0f) /
+                                  terrimpi_max(error * f->pixel_factor, 1e-20f));
+    return f->camera.reach > 0.0f ? terrimpi_max(sine - f->camera.reach / closest, 0.0f) : sine;
+}
+
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
     TERRIMPI_CULL_IMPOSTOR = 2  /* the impostor cut does */
@@ -8031,6 +8260,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_IMPOSTORS_NEVER || closest < f->desc->fade_start)
         return 0;
+    if (f->camera.reach > 0.0f &&
+        f->camera.reach > terrimpi_view_sine(f, node->number, closest) * closest)
+        return 0; /* too much of what a picture may be off goes to how far eyes are apart */
     if (node->level == 0)
         return 1;
     if (impostors == TERRIMPI_IMPOSTORS_ALWAYS)
@@ -8110,7 +8342,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     cull->count = cull->ground_count = cull->impostor_count = cull->hidden_count = 0;
-    terrimpi_tree_begin(&walk, &f->terrain->tree, f->camera.eye, TERRIMP_PLANES_ALL);
+    terrimpi_tree_begin(&walk, &f->terrain->tree, f->eye, TERRIMP_PLANES_ALL);
     while (terrimpi_tree_next(&walk, &v)) {
         terrimpi_cull_node *n = &cull->nodes[cull->count];
         int planes = v.planes % below, done = v.planes / below;
@@ -8124,7 +8356,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         n->number = v.node.number;
         n->level = (uint8_t)v.node.level;
         n->planes = (uint8_t)planes;
-        n->closest = terrimp_box_distance(&box, f->camera.eye);
+        n->closest = terrimpi_view_distance(f, &box);
         n->cuts = (uint8_t)terrimpi_cull_cuts(f, cache, mip, &v.node, planes, n->closest, &done);
         cull->ground_count += n->cuts & TERRIMPI_CULL_GROUND;
         cull->impostor_count += n->cuts & TERRIMPI_CULL_IMPOSTOR ? 1u : 0u;
@@ -8199,24 +8431,6 @@ static float terrimpi_cost_capture(const terrimp_costs *c, float texels, float t
 
 /* ---- how good pictures are, and how long they last ---- */
 
-/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
-   of the mean square, which 95 of 100 samples keep to. */
-static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
-{
-    const terrimpi_mesh *mesh = &f->terrain->meshes[node];
-    return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
-               ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
-               : mesh->error;
-}
-
-/* The sine of the view angle up to which a picture may be used, by both limits. */
-static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float closest)
-{
-    float sine = TERRIMP_SINF(f->desc->max_angle_rad), error = terrimpi_view_mesh_error(f, node);
-    return terrimpi_min(sine, f->desc->tolerance_px * terrimpi_max(closest - error, 0.0f) /
-                                  terrimpi_max(error * f->pixel_factor, 1e-20f));
-}
-
 /* How many frames a new picture of a node would last. */
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
@@ -8251,7 +8465,7 @@ static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *nod
     const float *way = f->motion.away[0];
     float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
-    memcpy(eye, f->camera.eye, sizeof f->camera.eye);
+    memcpy(eye, f->eye, sizeof f->eye);
     if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
     ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
@@ -8259,7 +8473,18 @@ static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *nod
     for (i = 0; i < 3u; i++)
         eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
-        memcpy(eye, f->camera.eye, sizeof f->camera.eye);
+        memcpy(eye, f->eye, sizeof f->eye);
+}
+
+/* The direction of an orthographic picture that is made from far along `eye`. */
+static void terrimpi_view_along(const terrimpi_frame *f, const float eye[3], float forward[3])
+{
+    float away = f->pixel_factor / f->side_px, step;
+    int i;
+    for (i = 0; i < 3; i++) {
+        step = eye[i] - f->eye[i];
+        forward[i] = f->camera.forward[i] - step / away;
+    }
 }
 
 /* How good a picture made from an eye is from the present one: its view angle and parallax error;
@@ -8269,9 +8494,12 @@ static float terrimpi_view_error(const terrimpi_frame *f, const terrimp_node *no
 {
     terrimp_box box;
     terrimpi_node_box(f->terrain, node, &box);
-    *angle_rad = terrimpi_view_angle(&box, captured_eye, f->camera.eye);
+    *angle_rad = terrimpi_view_angle(&box, captured_eye, f->eye);
+    if (f->camera.reach > 0.0f)
+        *angle_rad += TERRIMP_ASINF(terrimpi_min(
+            1.0f, f->camera.reach / terrimpi_max(terrimp_box_distance(&box, f->eye), 1e-20f)));
     *parallax_px = terrimpi_parallax_error(&box, terrimpi_view_mesh_error(f, node->number),
-                                           captured_eye, f->camera.eye, f->pixel_factor);
+                                           captured_eye, f->eye, f->camera.reach, f->pixel_factor);
     return terrimpi_max(*angle_rad / f->desc->max_angle_rad,
                         *parallax_px / f->desc->tolerance_px);
 }
@@ -8688,13 +8916,15 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
                                        terrimpi_candidate *c)
 {
     const terrimp_costs *costs = &f->desc->costs;
-    float k = f->pixel_factor, density = f->desc->texels_per_px;
+    float k = f->side_px, density = f->desc->texels_per_px;
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
     uint32_t quads;
     terrimpi_node_box(f->terrain, &c->node, &box);
-    if (terrimpi_capture_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
+    if (terrimpi_capture_fit(&box, f->camera.eye,
+                             f->camera.orthographic ? f->camera.forward : NULL, &camera) !=
+        TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
@@ -8821,7 +9051,7 @@ static int terrimpi_impostor_add_children(terrimp_view *v, const terrimp_node *n
     uint32_t i, count;
     if (node->level == 0)
         return 0;
-    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.camera.eye, children);
+    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.eye, children);
     for (i = 0; i < count; i++) {
         const terrimpi_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
         if (!p || p->layer_count == 0)
@@ -8851,7 +9081,7 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
         terrimpi_node_box(v->terrain, &node, &box);
-        if (terrimp_box_distance(&box, v->frame.camera.eye) >= v->desc.fade_start &&
+        if (terrimpi_view_distance(&v->frame, &box) >= v->desc.fade_start &&
             terrimpi_impostor_add(v, &node, TERRIMPI_VIEW_STALE_OTHER))
             return 1;
     }
@@ -8926,6 +9156,8 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
     memcpy(command.eye, picture->eye, sizeof command.eye);
+    if (v->frame.camera.orthographic)
+        terrimpi_capture_origin(v->terrain, &picture->node, command.eye);
     picture->drawn_count++;
     for (layer = 0; layer < picture->layer_count; layer++) {
         command.part = layer;
@@ -8935,7 +9167,7 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_place_from(command.place_matrix, picture->eye, v->frame.camera.eye);
+            terrimpi_place_from(command.place_matrix, command.eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
@@ -9021,7 +9253,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
-    if (f->desc->no_splits || terrimpi_view_impostors(f->desc) != TERRIMPI_IMPOSTORS_CHEAPER ||
+    if (f->desc->no_splits || f->camera.orthographic || terrimpi_view_impostors(f->desc) != TERRIMPI_IMPOSTORS_CHEAPER ||
         !(sine * closest > 0.0f) ||
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
@@ -9058,7 +9290,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     const terrimpi_frame *f = &v->frame;
     const terrimp_costs *costs = &f->desc->costs;
     terrimpi_capture_plan *plan = &job->plan;
-    float eye[3], distance, split = 0.0f;
+    float origin[3], forward[3], distance, split = 0.0f;
+    int parallel = f->camera.orthographic;
     float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
     uint32_t size[2], i, largest = terrimpi_max_u32(
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
@@ -9070,18 +9303,23 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->node = c->node;
     plan->layer_count = 1;
     terrimpi_node_box(f->terrain, &c->node, &plan->box);
-    terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, eye);
+    terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, plan->eye);
+    memcpy(origin, plan->eye, sizeof origin);
+    if (parallel) {
+        terrimpi_capture_origin(f->terrain, &c->node, origin);
+        terrimpi_view_along(f, plan->eye, forward);
+    }
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     terrimpi_fill_mesh(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
-    if (!terrimpi_capture_aim(&plan->box, eye, v->mesh_xyz, mesh.vertex_count,
-                              f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
-                              size))
+    if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->mesh_xyz,
+                              mesh.vertex_count, f->side_px * f->desc->texels_per_px, largest,
+                              &plan->camera, size))
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    distance = terrimp_box_distance(&plan->box, eye);
+    distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
@@ -9218,8 +9456,7 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
         return;
     p->judged = f->number;
     p->layers_now = job->plan.layer_count;
-    p->urgency = terrimpi_view_error(f, &p->node, job->plan.camera.eye, &p->angle_rad,
-                                     &p->parallax_px);
+    p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
@@ -9255,7 +9492,7 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
     terrimpi_job *job = &v->jobs[0];
     float angle, parallax;
-    if (terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
+    if (terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
         v->open = 0;
@@ -9301,6 +9538,33 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- a frame ---- */
 
+/* Whether all rays of an orthographic camera come in through the top of the terrain's box, and go
+   out through its bottom. */
+static int terrimpi_view_through(const terrimpi_frame *f)
+{
+    const float *forward = f->camera.forward;
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
+    terrimp_capture c;
+    terrimp_box box;
+    int corner, top, k;
+    if (!(forward[1] < 0.0f))
+        return 0;
+    terrimpi_camera_capture(&f->camera, &c);
+    terrimpi_node_box(f->terrain, &root, &box);
+    for (corner = 0; corner < 4; corner++)
+        for (top = 0; top < 2; top++) {
+            float at[3], way;
+            for (k = 0; k < 3; k++)
+                at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
+                        c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
+            way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
+            for (k = 0; k < 3; k += 2)
+                if (!terrimpi_within(at[k] + forward[k] * way, box.min[k], box.max[k]))
+                    return 0;
+        }
+    return 1;
+}
+
 /* Whether the floor is to be drawn: where pictures are, while the eye is on or over the ground. A
    ray that starts there passes through the ground before it meets the floor or a wall, which are
    below the ground everywhere; one that comes in below the terrain's outer border, or starts under
@@ -9309,9 +9573,11 @@ static int terrimpi_view_over(const terrimpi_frame *f)
 {
     const float *eye = f->camera.eye;
     float ground;
+    if (f->camera.orthographic)
+        return terrimpi_view_through(f);
     return terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
                TERRIMP_OK &&
-           eye[1] >= ground;
+           eye[1] - f->camera.reach >= ground;
 }
 
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
@@ -9360,7 +9626,8 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_draw 
 static void terrimpi_view_count_frame(terrimp_view *v)
 {
     terrimp_stats *s = &v->stats;
-    float tan_x, tan_y;
+    const terrimp_camera *c = &v->frame.camera;
+    float tan_x, tan_y, first, last;
     uint32_t i;
     for (i = 0; i < v->draw_count; i++)
         terrimpi_view_count_draw(v, &v->draws[i], s);
@@ -9371,13 +9638,19 @@ static void terrimpi_view_count_frame(terrimp_view *v)
         terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
         terrimp_box box;
         terrimpi_node_box(v->terrain, &node, &box);
-        if (i == 0 || v->regions[i].closest < s->z_near)
-            s->z_near = v->regions[i].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->frame.camera.eye));
+        first = v->regions[i].closest;
+        last = terrimp_box_farthest(&box, c->eye);
+        if (c->orthographic) {
+            terrimpi_box_depths(&box, c->eye, c->forward, &first, &last);
+            first -= c->reach;
+        }
+        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
+        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(&v->frame.camera, &tan_x, &tan_y);
-    s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
+    terrimpi_camera_tangents(c, &tan_x, &tan_y);
+    if (!c->orthographic)
+        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
         s->texels_used += v->cache.atlases[i].texels_used;
     s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
@@ -9389,20 +9662,26 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
                                           const terrimp_camera *camera)
 {
     terrimpi_frame f = *before;
+    terrimp_node root = terrimpi_tree_root(&f.terrain->tree);
+    terrimp_box all;
     float step[3];
     uint32_t i;
     f.number++;
     f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
-    f.pixel_factor = terrimpi_camera_pixel_factor(camera);
+    terrimpi_node_box(f.terrain, &root, &all);
+    f.pixel_factor = terrimpi_camera_stand(camera, &all, f.eye);
+    f.side_px = terrimpi_camera_pixel_factor(camera);
     if (f.number == 1u) {
         terrimpi_motion_begin(&f.motion);
         return f;
     }
     for (i = 0; i < 3u; i++)
-        step[i] = camera->eye[i] - before->camera.eye[i];
-    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
+        step[i] = f.eye[i] - before->eye[i];
+    terrimpi_motion_step(&f.motion, step,
+                         TERRIMPI_VIEW_JUMP * (camera->orthographic ? f.pixel_factor / f.side_px
+                                                                    : f.desc->fade_start));
     return f;
 }
 
@@ -9416,6 +9695,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     frame = terrimpi_frame_next(&view->frame, &resolved);
     TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
+    if (!frame.camera.orthographic != !view->frame.camera.orthographic)
+        terrimp_view_invalidate(view); /* no picture is of use to a camera of the other kind */
     view->frame = frame;
     view->cache.frame = frame.number;
     view->outdated = 0;
@@ -9450,7 +9731,7 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
     p->drawn_count = 0;
     p->sharpness = job->sharpness;
     p->cost = job->cost;
-    memcpy(p->eye, job->plan.camera.eye, sizeof p->eye);
+    memcpy(p->eye, job->plan.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
@@ -10570,6 +10851,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     sorted->depth = -1;
     sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    TERRIMPI_REFUSE(c.orthographic || c.z_far > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
     for (k = 0; k < 3; k++) {
         const terrimp_heightfield *f = &sorted->desc.field;
         float quads = (float)sorted->desc.page_quads;
