@@ -1607,11 +1607,13 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
     scene_close(&s);
 }
 
+#include "render_camera.h"
 #include "render_hidden.h"
 #include "render_scene.h"
 
-int main(void)
+int main(int argc, char **argv)
 {
+    check_only = argc > 1 ? argv[1] : NULL;
     setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
     RUN(no_hole_in_hills);
     RUN(no_hole_in_rough_terrain);
@@ -1621,6 +1623,7 @@ int main(void)
     RUN(a_real_tile_looks_like_the_full_mesh);
     RUN(houses_and_seas_meet_the_terrain);
     RUN(what_ridges_hide_shows_no_pixel);
+    RUN(no_camera_sees_a_hole);
     RUN(pictures_in_two_parts_show_what_ridges_hide);
     RUN(pictures_in_pieces_are_like_whole_ones);
     RUN(frames_change_no_more_than_those_of_the_full_mesh);
