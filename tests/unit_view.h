@@ -2289,6 +2289,64 @@ static void an_orthographic_camera_that_only_moves_captures_nothing(void)
     land_free(&l);
 }
 
+/* After an edit and a touch ground is as fine as a new view would have it, at once and after all
+   slices; and what the edit does not touch keeps its picture. */
+static void edits_reach_the_ground_of_views(void)
+{
+    land l;
+    flight *f = &flight_room;
+    terrimp_view_desc d = eager_settings();
+    terrimp_camera camera;
+    terrimp_rect rect = {20, 24, 9, 9};
+    size_t scratch_bytes;
+    void *scratch;
+    uint32_t x, z, before, done, mode, node, kept;
+    make_hills(&l);
+    l.desc.height_low = -100.0f;
+    l.desc.height_high = 400.0f;
+    if (!land_build(&l)) {
+        land_free(&l);
+        return;
+    }
+    scratch_bytes = terrimp_terrain_scratch_bytes(&l.desc);
+    scratch = malloc(scratch_bytes);
+    camera = camera_beside(&l);
+    for (mode = TERRIMP_MODE_GEOMIP; mode <= TERRIMP_MODE_AUTO; mode += 2u) {
+        d.mode = (int)mode;
+        d.ground_tolerance_px = mode == TERRIMP_MODE_GEOMIP ? 60.0f : 0.1f;
+        if (!flight_open(f, &l, &d))
+            break;
+        CHECK(rest(f, &camera) < REST_FRAMES);
+        before = f->ground_count;
+        for (z = 0; z < 9u; z++)
+            for (x = 0; x < 9u; x++)
+                l.samples[(24u + z) * 97u + 20u + x] += (x + z) % 2u ? 3.0f : -3.0f;
+        CHECK(terrimp_terrain_edit(l.terrain, &rect) == TERRIMP_OK);
+        flight_touch(f, rect.x, rect.y, rect.width, rect.height);
+        flight_update(f, &camera);
+        flight_render(f);
+        CHECK(f->ground_count > before);
+        for (node = kept = 0; node < l.info.node_count; node++)
+            kept += f->latest[node * FLIGHT_PARTS].alive ? 1u : 0u;
+        CHECK(kept > 3u || mode == TERRIMP_MODE_GEOMIP);
+        CHECK(terrimp_terrain_refine(l.terrain, NULL, l.info.node_count, &done, scratch,
+                                     scratch_bytes) == TERRIMP_OK);
+        CHECK(done > 2u);
+        CHECK(terrimp_terrain_fill_meshes(l.terrain, l.xyz, l.info.mesh_vertex_count * 3u,
+                                          l.indices, l.info.mesh_index_count) == TERRIMP_OK);
+        before = f->frame;
+        CHECK(rest(f, &camera) < REST_FRAMES);
+        for (node = 0; node < l.info.node_count; node++) {
+            const flight_picture *p = &f->latest[node * FLIGHT_PARTS];
+            kept -= p->alive && p->begun <= before ? 1u : 0u;
+        }
+        CHECK(kept == 0);
+        flight_close(f);
+    }
+    free(scratch);
+    land_free(&l);
+}
+
 static void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
@@ -2308,6 +2366,7 @@ static void view_tests(void)
     RUN(nothing_waits_after_some_frames_of_rest);
     RUN(touch_forgets_what_shows_the_samples_and_little_else);
     RUN(settings_change_without_a_loss);
+    RUN(edits_reach_the_ground_of_views);
     RUN(invalidate_forgets_every_picture);
     RUN(what_was_forgotten_since_the_update_is_not_drawn);
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);
