@@ -1301,6 +1301,8 @@ typedef struct terrimp_view_desc {
                                would show a ridge smeared over the slope behind it is */
     int no_spreading;       /* nonzero: a picture is renewed when it is due; else some frames before
                                or after that, so that the load of frames is even */
+    int sorted;             /* nonzero: draws come in painter's order, for hosts without a depth
+                               buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
     const void *walls;      /* of the terrain's quadtree, aligned to 4, built, outliving the view:
@@ -1420,6 +1422,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
+   With `sorted`: captures, the floor, then ground and impostors as they come, farthest first, and
+   of a picture in two parts the back part first.
    An update may be rendered any number of times: captures come with the first one, all other
    commands are the same again. They serve every eye within the camera's reach that looks through
    its sides, each with matrices of its own; a place_matrix is relative to the update's eye. An
@@ -1643,6 +1647,38 @@ TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float tar
 TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t width,
                                                 uint32_t height, uint32_t channels, int wrap,
                                                 uint8_t *out);
+
+/* The indices of a ground node, or of the strip of one that a capture draws, in exact painter's
+   order for an eye: for the draws of a view, which come in that order when its settings say
+   `sorted`. Nothing but the eye's place within or beside the node counts.
+
+   first_index  of its command
+   eye          of the frame; for the ground of a capture, that of the capture's command [wu]
+   indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
+                pattern's triangles, but none of no area
+   count        out. Never more than the command's index_count
+   Cost         O(quads); 15 cycles a triangle */
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
+                                                 uint32_t first_index, const float eye[3],
+                                                 uint16_t *indices, size_t capacity,
+                                                 uint32_t *count);
+
+/* Puts the triangles of a coarse mesh into painter's order for an eye, in place: walls that face
+   away from it, the surface, which has to be convex as seen from above, and the walls that face the
+   eye, below the surface's closest borders. Where triangles hide each other in a circle there is no
+   such order: then the farthest of them comes first.
+
+   xyz         [vertex_count][3] as terrimp_terrain_fill_mesh writes them, floats
+   eye         of the frame [wu]
+   indices     [index_count] in, out [Limits: of index_count: a multiple of 3, < 65536]
+   scratch     [vertex_count + 3 * index_count] of the caller
+   circles     out: how often there was no order; NULL: not wanted
+   Errors      E_RANGE also for an index that is too large
+   Cost        O(index_count) */
+TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex_count,
+                                               const float eye[3], uint16_t *indices,
+                                               uint32_t index_count, uint16_t *scratch,
+                                               uint32_t *circles);
 
 /* The world position of a vertex [wu]. No pointer may be null. */
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
@@ -1973,8 +2009,8 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
 TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
                                                 const terrimp_rect *samples);
 
-/* Builds some of the nodes anew that edits have left, from the finest level up; between frames. When
-   none is left all is as if everything had been built anew, bit for bit, with the same range.
+/* Builds some of the nodes anew that edits have left, from the finest level up; between frames.
+   When none is left all is as if everything had been built anew, bit for bit, with the same range.
 
    nodes      [count] out: which ones; their coarse meshes are to be filled anew. NULL: not wanted
    count      how many at most
@@ -2428,6 +2464,10 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 /* ==== stop here if you only want the API ================================= */
 
+/* Private names are terrimpi_ROOM_...: field, camera, tree, mip, impostor and split, atlas and
+   pack, terrain with mesh and floor, bake, horizon and walls, capture, view with cull, candidate,
+   region, cache and job, sorted, layer; simp and raise, build and fill, layers with mask, cover,
+   record and depth, place and prepare. Those without a room are of Basics. */
 #ifdef TERRIMP_IMPLEMENTATION
 #ifndef TERRIMP_IMPLEMENTATION_ONCE
 #define TERRIMP_IMPLEMENTATION_ONCE
@@ -3675,7 +3715,7 @@ TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point
 }
 
 /* Moves the sides of a box out. */
-static void terrimpi_grow(terrimp_box *box, float by)
+static void terrimpi_camera_grow(terrimp_box *box, float by)
 {
     int i;
     for (i = 0; i < 3; i++) {
@@ -3685,8 +3725,8 @@ static void terrimpi_grow(terrimp_box *box, float by)
 }
 
 /* From the least to the largest depth of a box along a direction from an eye. */
-static void terrimpi_box_depths(const terrimp_box *box, const float eye[3], const float forward[3],
-                                float *first, float *last)
+static void terrimpi_camera_depths(const terrimp_box *box, const float eye[3],
+                                   const float forward[3], float *first, float *last)
 {
     int i;
     *first = *last = 0.0f;
@@ -4514,7 +4554,7 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
-    terrimpi_grow(&box, f->reach);
+    terrimpi_camera_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
     measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
@@ -4892,7 +4932,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
 
 #define TERRIMPI_SPLIT_COUNT 24u /* places of a split that are tried */
 #define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
-#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
+#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: beyond, its neighbour hides it */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
 static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
@@ -6161,12 +6201,12 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
 
 /* ---- edits ---- */
 
-static uint32_t terrimpi_stale_words(const terrimp_terrain *t)
+static uint32_t terrimpi_terrain_stale_words(const terrimp_terrain *t)
 {
     return t->tree.node_count / 32u + 1u;
 }
 
-static int terrimpi_node_stale(const terrimp_terrain *t, uint32_t node)
+static int terrimpi_terrain_stale(const terrimp_terrain *t, uint32_t node)
 {
     return t->stale && (t->stale[node / 32u] >> node % 32u & 1u) != 0;
 }
@@ -6499,9 +6539,9 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
    it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
    beside it would end below that. So the line of feet is below every sample, and no neighbour
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
-   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
-   there. When one of them is within D of L, both end at L <= s; else each hangs by D or, since then
-   L is deeper, by more, and the line is <= s + e - D <= s - e.
+   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most
+   s + e there. When one of them is within D of L, both end at L <= s; else each hangs by D or,
+   since then L is deeper, by more, and the line is <= s + e - D <= s - e.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
 static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
@@ -7740,7 +7780,7 @@ static int terrimpi_capture_in_layer(const terrimp_terrain *t, const terrimpi_ca
         return 1;
     place = terrimpi_tree_node(&t->tree, node);
     terrimpi_terrain_node_box(t, &place, &box);
-    terrimpi_box_depths(&box, plan->camera.eye, plan->camera.forward, &first, &last);
+    terrimpi_camera_depths(&box, plan->camera.eye, plan->camera.forward, &first, &last);
     return first < terrimpi_capture_end(plan, layer) && last > plan->z_near[layer];
 }
 
@@ -9007,7 +9047,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     terrimp_box box;
     uint32_t quads;
     terrimpi_terrain_node_box(f->terrain, &c->node, &box);
-    if (terrimpi_node_stale(f->terrain, c->node.number)) /* its mesh is not of this ground */
+    if (terrimpi_terrain_stale(f->terrain, c->node.number)) /* its mesh is not of this ground */
         return 0;
     if (terrimpi_camera_fit(&box, f->camera.eye,
                             f->camera.orthographic ? f->camera.forward : NULL, &camera) !=
@@ -9151,7 +9191,8 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
 }
 
 /* Lists a candidate, or in its place what shows the same: its children, of which it was put
-   together, or its parents, of which it is a part. Returns 0 when there is no picture. */
+   together, or its parents, of which it is a part; but these show more than the region, which in
+   painter's order would cover what is before it. Returns 0 when there is no picture. */
 static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
 {
     const terrimp_quadtree *tree = &v->terrain->tree;
@@ -9164,7 +9205,7 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
         return 0;
     if (terrimpi_view_impostor_add_children(v, &node))
         return 1;
-    for (up = 0; up < 2u && node.level + 1u < tree->level_count; up++) {
+    for (up = v->desc.sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
         terrimpi_terrain_node_box(v->terrain, &node, &box);
@@ -9231,7 +9272,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
-    uint32_t layer;
+    uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
     command.node = picture->node.number;
@@ -9247,7 +9288,8 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     if (v->frame.camera.orthographic)
         terrimpi_capture_origin(v->terrain, &picture->node, command.eye);
     picture->drawn_count++;
-    for (layer = 0; layer < picture->layer_count; layer++) {
+    for (k = 0; k < picture->layer_count; k++) {
+        layer = v->desc.sorted ? picture->layer_count - 1u - k : k;
         command.part = layer;
         command.atlas = picture->slots[layer].atlas;
         memcpy(command.texture_matrix, picture->texture_matrix[layer],
@@ -9289,7 +9331,8 @@ typedef struct terrimpi_view_kind {
 } terrimpi_view_kind;
 
 static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = {
-    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list, terrimpi_view_ground_emit},
+    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list,
+     terrimpi_view_ground_emit},
     {terrimpi_view_impostor_estimate, terrimpi_view_impostor_ready, terrimpi_view_impostor_list,
      terrimpi_view_impostor_emit},
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
@@ -9731,7 +9774,7 @@ static void terrimpi_view_count_frame(terrimp_view *v)
         first = v->regions[i].closest;
         last = terrimp_box_farthest(&box, c->eye);
         if (c->orthographic) {
-            terrimpi_box_depths(&box, c->eye, c->forward, &first, &last);
+            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
             first -= c->reach;
         }
         s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
@@ -9871,7 +9914,9 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     for (i = 0; i < view->job_count; i++)
         terrimpi_view_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
-    for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT; kind++)
+    for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
+        terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
+    for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
         for (i = 0; i < view->draw_count; i++)
             if (view->draws[i].kind == kind)
                 terrimpi_view_kinds[kind].emit(view, &view->draws[i], callbacks);
@@ -10975,6 +11020,312 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     return TERRIMP_OK;
 }
 
+/* ---- the draws of a view ---- */
+
+/* A node is a triangulation of a rectangle: what may hide what across an inner edge is told by the
+   side of the edge's plane that the eye is on, and what is in order across each edge is in order.
+   Blocks of 2 x 2 quads hold whole triangles even where a coarser neighbour makes them merge, so
+   rows and columns of blocks come from both ends towards the eye's. Within a block four edges meet
+   at its middle, along x and z, and a diagonal where a side has merged; they tell which of the four
+   quads comes first. The last edge is a quad's own diagonal. */
+typedef struct terrimpi_sorted_block {
+    terrimpi_mip_writer out;
+    terrimpi_terrain_pattern part; /* quads that are drawn */
+    float x[3], z[3];      /* of the columns and rows of vertices, from the eye on */
+} terrimpi_sorted_block;
+
+/* The quads of a block, two bits each, first one lowest; by which of these is closer than the one
+   before it: bit 0 the second of the first row, 1 of the second row, 2 of the first column, 3 of
+   the second one. Two of them, 6 and 9, cannot be. */
+static const uint8_t terrimpi_sorted_quads[16] = {
+    0x27, 0x4b, 0x1e, 0x72, 0x87, 0x9c, 0x78, 0x78, 0x2d, 0xb4, 0xc9, 0xd2, 0xb1, 0xb4, 0xe1, 0xe4
+};
+
+/* Below 0: the eye, at the origin, is where +x and -z are of the line from vertex (i, j) to (k, l),
+   which lies at +x of it; above 0: it is on the other side. */
+static float terrimpi_sorted_cross(const terrimpi_sorted_block *b, int i, int j, int k, int l)
+{
+    return (b->z[l] - b->z[j]) * b->x[i] - (b->x[k] - b->x[i]) * b->z[j];
+}
+
+static void terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t x, uint32_t z,
+                                        uint32_t *order)
+{
+    uint32_t last = b->out.quads - 2u, coarse = b->out.pattern;
+    uint32_t right = b->x[1] < 0.0f ? 1u : 0u, below = b->z[1] < 0.0f ? 1u : 0u;
+    uint32_t bits = right * 3u + below * 12u;
+    coarse &= (z == 0 ? 1u : 0u) | (z == last ? 2u : 0u) | (x == 0 ? 4u : 0u) |
+              (x == last ? 8u : 0u);
+    if (coarse & 9u) /* merged with the quad at the corner of +x, -z */
+        right = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? 1u : 0u;
+    if (coarse & 6u)
+        below = terrimpi_sorted_cross(b, 0, 2, 1, 1) > 0.0f ? 1u : 0u;
+    bits = coarse & 1u ? (bits & ~1u) | right : bits;
+    bits = coarse & 8u ? (bits & ~8u) | right << 3 : bits;
+    bits = coarse & 2u ? (bits & ~2u) | below << 1 : bits;
+    bits = coarse & 4u ? (bits & ~4u) | below << 2 : bits;
+    *order = terrimpi_sorted_quads[bits];
+}
+
+static void terrimpi_sorted_write_block(terrimpi_sorted_block *b, uint32_t x, uint32_t z)
+{
+    uint32_t order, k;
+    terrimpi_sorted_block_order(b, x, z, &order);
+    for (k = 0; k < 4u; k++, order >>= 2) {
+        uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz;
+        int first = terrimpi_sorted_cross(b, (int)dx, (int)dz, (int)dx + 1, (int)dz + 1) < 0.0f;
+        uint16_t v[4];
+        if (i < b->part.x0 || i >= b->part.x1 || j < b->part.z0 || j >= b->part.z1)
+            continue;
+        v[0] = terrimpi_mip_index(&b->out, i, j);
+        v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
+        v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
+        v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+        if (first)
+            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
+        terrimpi_mip_triangle(&b->out, v[0], v[2], v[3]);
+        if (!first)
+            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
+    }
+}
+
+/* The next of the blocks at *low to *high along an axis: from both ends towards the eye's. `past`
+   says that the eye lies behind the end of the block at *low. */
+static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
+{
+    uint32_t at = past ? *low : *high - 2u;
+    *low += past ? 2u : 0u;
+    *high -= past ? 0u : 2u;
+    return at;
+}
+
+static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtree *tree,
+                                  const terrimp_node *n, const float eye[3])
+{
+    uint32_t i0 = n->x * tree->chunk_quads, j0 = n->z * tree->chunk_quads;
+    uint32_t rows[2], cols[2], k, x, z;
+    rows[0] = b->part.z0 & ~1u;
+    rows[1] = (b->part.z1 + 1u) & ~1u;
+    while (rows[0] < rows[1]) {
+        z = terrimpi_sorted_turn(&rows[0], &rows[1],
+                                 terrimpi_tree_z(tree, n->level, j0 + rows[0] + 2u) <= eye[2]);
+        for (k = 0; k < 3u; k++)
+            b->z[k] = terrimpi_tree_z(tree, n->level, j0 + z + k) - eye[2];
+        cols[0] = b->part.x0 & ~1u;
+        cols[1] = (b->part.x1 + 1u) & ~1u;
+        while (cols[0] < cols[1]) {
+            x = terrimpi_sorted_turn(&cols[0], &cols[1],
+                                     terrimpi_tree_x(tree, n->level, i0 + cols[0] + 2u) <= eye[0]);
+            for (k = 0; k < 3u; k++)
+                b->x[k] = terrimpi_tree_x(tree, n->level, i0 + x + k) - eye[0];
+            terrimpi_sorted_write_block(b, x, z);
+        }
+    }
+}
+
+/* The pattern that begins at an index of the shared buffer, and its coarse sides. */
+static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index,
+                                terrimpi_terrain_pattern *part, uint32_t *coarse)
+{
+    uint32_t i, strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
+    terrimp_pattern pattern;
+    *coarse = 0;
+    *part = terrimpi_terrain_pattern_of(quads, 0);
+    for (i = 0; i < TERRIMP_PATTERN_COUNT; i++)
+        if (terrimp_pattern_find(quads, TERRIMP_FORM_LIST, i, &pattern) == TERRIMP_OK &&
+            pattern.first_index == first_index) {
+            part->triangle_count = pattern.triangle_count;
+            *coarse = i;
+            return 1;
+        }
+    for (i = 1; i <= strips; i++) {
+        *part = terrimpi_terrain_pattern_of(quads, i);
+        if (part->first_index == first_index)
+            return 1;
+    }
+    return 0;
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
+                                                 uint32_t first_index, const float eye[3],
+                                                 uint16_t *indices, size_t capacity,
+                                                 uint32_t *count)
+{
+    terrimpi_sorted_block b;
+    terrimp_node n;
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, indices));
+    TERRIMPI_REFUSE(!eye || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(eye[0], eye[2]), TERRIMP_E_NOT_FINITE);
+    b.out.quads = terrain->desc.chunk_quads;
+    b.out.form = TERRIMP_FORM_LIST;
+    b.out.start = b.out.out = indices;
+    TERRIMPI_REFUSE(!terrimpi_sorted_find(b.out.quads, first_index, &b.part, &b.out.pattern),
+                    TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(capacity / 3u < b.part.triangle_count, TERRIMP_E_CAPACITY);
+    n = terrimpi_tree_node(&terrain->tree, node);
+    terrimpi_sorted_write(&b, &terrain->tree, &n, eye);
+    *count = (uint32_t)(b.out.out - indices);
+    return TERRIMP_OK;
+}
+
+#define TERRIMPI_SORTED_WALL 0xfffeu
+
+/* The surface of a mesh: its half-edges in lists by the vertex that they start from, and how many
+   triangles beside a triangle are to be drawn before it. */
+typedef struct terrimpi_sorted_net {
+    const float *xyz, *eye;
+    uint16_t *first, *next;   /* of a vertex, of a half-edge; 0xffff: none */
+    uint16_t *corners;        /* the indices as they were */
+    uint16_t *waits, *queue;  /* of a triangle: 0xffff when it is queued; triangles */
+    uint32_t queued, surface; /* triangles of the surface */
+} terrimpi_sorted_net;
+
+static uint16_t terrimpi_sorted_end(const terrimpi_sorted_net *net, uint32_t edge)
+{
+    return net->corners[edge % 3u == 2u ? edge - 2u : edge + 1u];
+}
+
+/* Above 0 if the third vertex, or the eye, lies on the side of an edge on which its triangle is;
+   the same number with the other sign for the half-edge that runs the other way. */
+static float terrimpi_sorted_within(const terrimpi_sorted_net *net, uint32_t edge,
+                                    const float at[3])
+{
+    uint16_t from = net->corners[edge], to = terrimpi_sorted_end(net, edge);
+    const float *a = net->xyz + 3u * terrimpi_min_u32(from, to);
+    const float *b = net->xyz + 3u * terrimpi_max_u32(from, to);
+    float side = (b[2] - a[2]) * (at[0] - a[0]) - (b[0] - a[0]) * (at[2] - a[2]);
+    return from < to ? side : -side;
+}
+
+/* The triangle beyond a half-edge, if the eye is (not: is not) beyond it too; else 0xffff. */
+static uint32_t terrimpi_sorted_beyond(const terrimpi_sorted_net *net, uint32_t edge, int eye)
+{
+    float side = terrimpi_sorted_within(net, edge, net->eye);
+    uint16_t from = net->corners[edge];
+    uint32_t other = net->first[terrimpi_sorted_end(net, edge)];
+    if (eye ? !(side < 0.0f) : !(side > 0.0f))
+        return 0xffffu;
+    while (other != 0xffffu && terrimpi_sorted_end(net, other) != from)
+        other = net->next[other];
+    return other == 0xffffu ? other : other / 3u;
+}
+
+static void terrimpi_sorted_push(terrimpi_sorted_net *net, uint32_t triangle)
+{
+    net->waits[triangle] = 0xffffu;
+    net->queue[net->queued++] = (uint16_t)triangle;
+}
+
+/* The farthest triangle that waits, by its corners. */
+static uint32_t terrimpi_sorted_farthest(const terrimpi_sorted_net *net, uint32_t count)
+{
+    uint32_t t, k, best = 0;
+    float most = -1.0f;
+    for (t = 0; t < count; t++) {
+        float sum = 0.0f;
+        for (k = 0; k < 3u && net->waits[t] < TERRIMPI_SORTED_WALL; k++) {
+            const float *p = net->xyz + 3u * net->corners[3u * t + k];
+            sum += (p[0] - net->eye[0]) * (p[0] - net->eye[0]) +
+                   (p[2] - net->eye[2]) * (p[2] - net->eye[2]);
+        }
+        if (net->waits[t] < TERRIMPI_SORTED_WALL && sum > most) {
+            most = sum;
+            best = t;
+        }
+    }
+    return best;
+}
+
+/* Whether the eye is before a triangle's face. */
+static int terrimpi_sorted_faces(const terrimpi_sorted_net *net, uint32_t triangle)
+{
+    const uint16_t *corner = net->corners + 3u * triangle;
+    float ab[3], ac[3], to[3], normal[3];
+    terrimpi_sub(net->xyz + 3u * corner[1], net->xyz + 3u * corner[0], ab);
+    terrimpi_sub(net->xyz + 3u * corner[2], net->xyz + 3u * corner[0], ac);
+    terrimpi_sub(net->eye, net->xyz + 3u * corner[0], to);
+    terrimpi_cross(ab, ac, normal);
+    return terrimpi_dot(normal, to) > 0.0f;
+}
+
+/* Enters the half-edges of the surface. Walls, which have no area as seen from above, wait until
+   the end if the eye is before them; the others come first. */
+static void terrimpi_sorted_net_begin(terrimpi_sorted_net *net, uint32_t vertex_count,
+                                      uint32_t count)
+{
+    uint32_t t, e, k;
+    memset(net->first, 0xff, vertex_count * sizeof *net->first);
+    for (t = 0; t < count; t++) {
+        net->waits[t] = 0;
+        if (!(terrimpi_sorted_within(net, 3u * t, net->xyz + 3u * net->corners[3u * t + 2u]) >
+              0.0f)) {
+            net->waits[t] = TERRIMPI_SORTED_WALL;
+            if (!terrimpi_sorted_faces(net, t))
+                terrimpi_sorted_push(net, t);
+            continue;
+        }
+        net->surface++;
+        for (e = 3u * t; e < 3u * t + 3u; e++) {
+            net->next[e] = net->first[net->corners[e]];
+            net->first[net->corners[e]] = (uint16_t)e;
+        }
+    }
+    for (t = 0; t < count; t++)
+        for (k = 0; k < 3u && net->waits[t] < TERRIMPI_SORTED_WALL; k++)
+            net->waits[t] = (uint16_t)(net->waits[t] +
+                (terrimpi_sorted_beyond(net, 3u * t + k, 0) != 0xffffu ? 1u : 0u));
+}
+
+TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex_count,
+                                               const float eye[3], uint16_t *indices,
+                                               uint32_t index_count, uint16_t *scratch,
+                                               uint32_t *circles)
+{
+    terrimpi_sorted_net net;
+    uint32_t count = index_count / 3u, walls, done = 0, i, faults = 0;
+    TERRIMPI_REFUSE(!xyz || !eye || !indices || !scratch, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(index_count % 3u != 0 || index_count > 65535u || vertex_count > 65535u,
+                    TERRIMP_E_RANGE);
+    for (i = 0; i < index_count; i++)
+        TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
+    net.xyz = xyz;
+    net.eye = eye;
+    net.first = scratch;
+    net.next = net.first + vertex_count;
+    net.corners = net.next + index_count;
+    net.waits = net.corners + index_count;
+    net.queue = net.waits + count;
+    net.queued = net.surface = 0;
+    memcpy(net.corners, indices, index_count * sizeof *indices);
+    terrimpi_sorted_net_begin(&net, vertex_count, count);
+    walls = net.queued;
+    for (i = 0; i < count; i++)
+        if (net.waits[i] == 0)
+            terrimpi_sorted_push(&net, i);
+    for (; done < count; done++) {
+        uint32_t t, k;
+        if (done == net.queued && done < walls + net.surface) {
+            terrimpi_sorted_push(&net, terrimpi_sorted_farthest(&net, count));
+            faults++;
+        }
+        for (t = 0; done == net.queued; t++)
+            if (net.waits[t] == TERRIMPI_SORTED_WALL)
+                terrimpi_sorted_push(&net, t);
+        t = net.queue[done];
+        memcpy(indices + 3u * done, net.corners + 3u * t, 3u * sizeof *indices);
+        for (k = 0; k < 3u && done >= walls && done < walls + net.surface; k++) {
+            uint32_t closer = terrimpi_sorted_beyond(&net, 3u * t + k, 1);
+            if (closer != 0xffffu && net.waits[closer] < TERRIMPI_SORTED_WALL &&
+                --net.waits[closer] == 0)
+                terrimpi_sorted_push(&net, closer);
+        }
+    }
+    if (circles)
+        *circles = faults;
+    return TERRIMP_OK;
+}
+
 /* ==== Layers ============================================================= >>impl-layers */
 /* Based on: Jeschke 2004, chapter 3. With the reference point on the cell's near side each of his
    spacings is an affine step of 1 / depth, so that the n-th layer needs no sum over those before
@@ -11111,7 +11462,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
    those left of its edges, added and subtracted. An edge costs one step a row, thanks to running
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
-/* Heights are worked with in steps, -TERRIMPI_SIMP_STEPS to +TERRIMPI_SIMP_STEPS over the tile's range: few
+/* Heights are worked with in steps, of which a tile's range has twice TERRIMPI_SIMP_STEPS: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
 #define TERRIMPI_SIMP_STEPS 2047
 
@@ -11130,8 +11481,8 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
 #define TERRIMPI_SIMP_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
-#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
-#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
+#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that changes */
+#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height: all sums stay within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
 typedef struct terrimpi_simp_row_prefix {
@@ -11458,9 +11809,9 @@ static void terrimpi_simp_forget_errors(terrimpi_simplifier *s, const terrimpi_s
 }
 
 /* Squared error round v as a function of its height, and what it is made of, by triangle. */
-static terrimpi_simp_quadric terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                                      const terrimpi_simp_ring *ring, int32_t ref,
-                                                      terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
+static terrimpi_simp_quadric
+terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
+                         int32_t ref, terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
 {
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     int32_t i;
@@ -13661,10 +14012,9 @@ static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
         uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        TERRIMPI_TRY(terrimp_border_simplify(line, count,
-                                             terrimpi_terrain_border_points(t->desc.triangle_budget),
-                                             points[side], 16,
-                                             &desc.borders[side].point_count));
+        TERRIMPI_TRY(terrimp_border_simplify(
+            line, count, terrimpi_terrain_border_points(t->desc.triangle_budget), points[side], 16,
+            &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
@@ -13778,10 +14128,10 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
-   that is coarser than by one level could leave one, of less than its tolerance; to lift borders
-   over all of it would double the errors of meshes where ridges are steep. Neighbours of a level
-   still share what lies between the corners. */
+   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a
+   mesh that is coarser than by one level could leave one, of less than its tolerance; to lift
+   borders over all of it would double the errors of meshes where ridges are steep. Neighbours of a
+   level still share what lies between the corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {
@@ -13959,7 +14309,7 @@ TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
     arrays = terrimpi_terrain_layout(&t, NULL);
     terrimpi_place(&at, 1, sizeof t, &ok);
     at = terrimpi_add(at, arrays, &ok);
-    at = terrimpi_add(at, terrimpi_stale_words(&t) * sizeof *t.stale, &ok);
+    at = terrimpi_add(at, terrimpi_terrain_stale_words(&t) * sizeof *t.stale, &ok);
     return ok && arrays ? at : 0;
 }
 
@@ -13993,7 +14343,7 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
     return TERRIMP_OK;
 }
 
-#define TERRIMPI_EDIT_STEP 128u /* coarser levels take a node's heights for those round an edit */
+#define TERRIMPI_BUILD_EDIT_STEP 128u /* above it a node's heights stand for those of a part */
 
 /* The room that vertices get below and above the samples, as a part of their range: heights fitted
    to one side of a ridge swing over on the other. */
@@ -14083,9 +14433,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
 /* ---- edits ---- */
 
 /* Widens what is known of a node's ground for samples of a rectangle that have changed. A sample is
-   as far from its triangle as heights within two of the level's steps differ, at most; and it counts
+   as far from its triangle as heights within two of the level's steps differ, at most; it counts
    for the root mean square once, or twice on a row of vertices. */
-static void terrimpi_edit_ground(terrimp_terrain *t, const terrimpi_terrain_tile *p,
+static void terrimpi_build_edit_ground(terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                  uint32_t number, const terrimp_rect *rect, float low, float high)
 {
     terrimp_geomip_node *n = &t->tree.nodes[number];
@@ -14097,7 +14447,7 @@ static void terrimpi_edit_ground(terrimp_terrain *t, const terrimpi_terrain_tile
     if (p->level == 0)
         return;
     off = n->high - n->low;
-    if (step <= TERRIMPI_EDIT_STEP &&
+    if (step <= TERRIMPI_BUILD_EDIT_STEP &&
         terrimpi_field_range(&t->desc.field,
                              terrimpi_rect(x, z, rect->x - x + rect->width + 2u * step,
                                            rect->y - z + rect->height + 2u * step),
@@ -14110,8 +14460,9 @@ static void terrimpi_edit_ground(terrimp_terrain *t, const terrimpi_terrain_tile
 }
 
 /* The same for its coarse mesh, of which the triangles over the rectangle count. */
-static void terrimpi_edit_mesh(terrimp_terrain *t, const terrimpi_terrain_tile *p, uint32_t number,
-                               const terrimp_rect *rect, float low, float high)
+static void terrimpi_build_edit_mesh(terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                     uint32_t number, const terrimp_rect *rect, float low,
+                                     float high)
 {
     terrimpi_mesh *mesh = &t->meshes[number];
     float least = TERRIMPI_FLOAT_MAX, most = -TERRIMPI_FLOAT_MAX, off, share;
@@ -14120,10 +14471,8 @@ static void terrimpi_edit_mesh(terrimp_terrain *t, const terrimpi_terrain_tile *
         uint32_t x0 = 0xffffffffu, z0 = x0, x1 = 0, z1 = 0;
         float heights[3];
         for (k = 0; k < 3u; k++) {
-            terrimpi_mesh_point_steps v = terrimpi_mesh_point(t, p, number,
-                                                              terrimpi_mesh_corner(t, number,
-                                                                                                 i +
-                                                                                                     k));
+            uint32_t corner = terrimpi_mesh_corner(t, number, i + k);
+            terrimpi_mesh_point_steps v = terrimpi_mesh_point(t, p, number, corner);
             uint32_t x = p->x + terrimpi_lattice(v.x, p->level, p->span_x);
             uint32_t z = p->z + terrimpi_lattice(v.z, p->level, p->span_z);
             x0 = terrimpi_min_u32(x0, x);
@@ -14170,8 +14519,8 @@ TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
             for (x = in.x0; x <= in.x1; x++) {
                 uint32_t node = terrimpi_tree_at(&terrain->tree, level, x, z).number;
                 terrimpi_terrain_tile p = terrimpi_terrain_tile_of(terrain, node);
-                terrimpi_edit_ground(terrain, &p, node, &rect, low, high);
-                terrimpi_edit_mesh(terrain, &p, node, &rect, low, high);
+                terrimpi_build_edit_ground(terrain, &p, node, &rect, low, high);
+                terrimpi_build_edit_mesh(terrain, &p, node, &rect, low, high);
                 terrimpi_build_hold(&terrain->meshes[node], low, high);
                 terrain->stale[node / 32u] |= 1u << node % 32u;
             }
@@ -14180,7 +14529,7 @@ TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
 }
 
 /* Notes that a node and its coarse mesh hold what another one holds. */
-static void terrimpi_hold_node(terrimp_terrain *t, uint32_t node, uint32_t held)
+static void terrimpi_build_hold_node(terrimp_terrain *t, uint32_t node, uint32_t held)
 {
     terrimp_geomip_node *n = &t->tree.nodes[node];
     const terrimp_geomip_node *h = &t->tree.nodes[held];
@@ -14192,7 +14541,7 @@ static void terrimpi_hold_node(terrimp_terrain *t, uint32_t node, uint32_t held)
 
 /* Builds a node anew whose children are as they should be. Those above it are wide enough until it
    is their turn. */
-static terrimp_result terrimpi_refine_node(terrimp_terrain *t, uint32_t number, void *scratch,
+static terrimp_result terrimpi_build_refine(terrimp_terrain *t, uint32_t number, void *scratch,
                                            size_t bytes)
 {
     static const float nowhere[3] = {0.0f, 0.0f, 0.0f};
@@ -14204,10 +14553,10 @@ static terrimp_result terrimpi_refine_node(terrimp_terrain *t, uint32_t number, 
     if (node.level > 0)
         count = terrimpi_tree_children(&t->tree, &node, nowhere, children);
     for (i = 0; i < count; i++)
-        terrimpi_hold_node(t, number, children[i].number);
+        terrimpi_build_hold_node(t, number, children[i].number);
     terrimpi_build_hold(&t->meshes[number], t->tree.nodes[number].low, t->tree.nodes[number].high);
     for (i = number; i + 1u < t->tree.node_count; i = terrimpi_tree_parent_number(&t->tree, i))
-        terrimpi_hold_node(t, terrimpi_tree_parent_number(&t->tree, i), i);
+        terrimpi_build_hold_node(t, terrimpi_tree_parent_number(&t->tree, i), i);
     t->stale[number / 32u] &= ~(1u << number % 32u);
     return TERRIMP_OK;
 }
@@ -14227,9 +14576,9 @@ TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint
     for (node = 0; node < terrain->tree.node_count && *done < count; node++) {
         if (terrain->stale[node / 32u] == 0)
             node |= 31u;
-        if (node >= terrain->tree.node_count || !terrimpi_node_stale(terrain, node))
+        if (node >= terrain->tree.node_count || !terrimpi_terrain_stale(terrain, node))
             continue;
-        TERRIMPI_TRY(terrimpi_refine_node(terrain, node, scratch, bytes));
+        TERRIMPI_TRY(terrimpi_build_refine(terrain, node, scratch, bytes));
         if (nodes)
             nodes[*done] = node;
         ++*done;
@@ -14237,10 +14586,10 @@ TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint
     return TERRIMP_OK;
 }
 
-static int terrimpi_any_stale(const terrimp_terrain *t)
+static int terrimpi_build_any_stale(const terrimp_terrain *t)
 {
     uint32_t i, any = 0;
-    for (i = 0; t->stale && i < terrimpi_stale_words(t); i++)
+    for (i = 0; t->stale && i < terrimpi_terrain_stale_words(t); i++)
         any |= t->stale[i];
     return any != 0;
 }
@@ -14334,7 +14683,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     terrimpi_bake bake;
     size_t arrays;
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrain->built || terrimpi_any_stale(terrain), TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrain->built || terrimpi_build_any_stale(terrain), TERRIMP_E_STATE);
     arrays = terrimpi_bake_array_bytes(terrain);
     TERRIMPI_REFUSE(arrays == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_REFUSE(bytes < sizeof bake + arrays, TERRIMP_E_CAPACITY);

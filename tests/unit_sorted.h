@@ -3,7 +3,7 @@
 #define UNIT_SORTED_H
 
 #include "check.h"
-#include "unit_oracle.h"
+#include "unit_terrain.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -150,46 +150,83 @@ static void order_fill(const double a[3], const double b[3], const double c[3], 
         }
 }
 
-/* Draws the frame that was made and returns the pixels that show what is not nearest. */
-static int order_faults(const terrimp_sorted *s, const terrimp_camera *camera)
+/* What is drawn, and from where. */
+typedef struct order_picture {
+    float view[16], projection[16], eye[3];
+    int reversed, hides_back; /* front to back; only counter-clockwise triangles show */
+} order_picture;
+
+static void order_begin(void)
 {
-    double scale = ORDER_HIGH / (2.0 * tan((double)camera->fov_y_rad / 2.0));
-    float view[16], projection[16];
-    uint32_t i;
-    int t, k, faults = 0;
-    CHECK(terrimp_camera_matrices(camera, view, projection) == TERRIMP_OK);
+    int k;
     for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
         order_nearest[k] = order_shown[k] = 0.0;
+}
+
+static void order_triangle(const order_picture *p, const float *corners[3])
+{
+    double eyes[3][3], cut[4][3];
+    int n, j, k;
+    for (k = 0; k < 3; k++) {
+        double d[3];
+        for (j = 0; j < 3; j++)
+            d[j] = (double)corners[k][j] - (double)p->eye[j];
+        for (j = 0; j < 3; j++)
+            eyes[k][j] = (double)p->view[j] * d[0] + (double)p->view[4 + j] * d[1] +
+                         (double)p->view[8 + j] * d[2];
+        eyes[k][2] = -eyes[k][2];
+    }
+    n = order_clip(eyes, cut, 0.05);
+    for (k = 0; k < n; k++) {
+        double w = cut[k][2];
+        cut[k][0] = ORDER_WIDE / 2 *
+                    (1.0 + (double)p->projection[0] * cut[k][0] / w - (double)p->projection[8]);
+        cut[k][1] = ORDER_HIGH / 2 *
+                    (1.0 - (double)p->projection[5] * cut[k][1] / w + (double)p->projection[9]);
+        cut[k][2] = 1.0 / w;
+    }
+    if (n > 2 && p->hides_back &&
+        (cut[1][0] - cut[0][0]) * (cut[2][1] - cut[0][1]) >=
+            (cut[1][1] - cut[0][1]) * (cut[2][0] - cut[0][0]))
+        return;
+    for (k = 2; k < n; k++)
+        order_fill(cut[0], cut[k - 1], cut[k], p->reversed);
+}
+
+/* Returns the pixels that show what is not nearest. */
+static int order_end(int *seen)
+{
+    int k, faults = 0;
+    for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++) {
+        faults += order_shown[k] < order_nearest[k] * (1.0 - 1e-7);
+        *seen += order_shown[k] > 0.0;
+    }
+    return faults;
+}
+
+/* Draws the frame that was made and returns its faults. */
+static int order_faults(const terrimp_sorted *s, const terrimp_camera *camera, int *seen)
+{
+    order_picture p;
+    uint32_t i;
+    int t, k;
+    memset(&p, 0, sizeof p);
+    CHECK(terrimp_camera_matrices(camera, p.view, p.projection) == TERRIMP_OK);
+    memcpy(p.eye, camera->eye, sizeof p.eye);
+    p.reversed = s->desc.front_to_back;
+    order_begin();
     for (i = 0; i < sorted_count; i++)
         for (t = 0; t < sorted_squares[i].triangle_count; t++) {
-            double eyes[3][3], cut[4][3];
-            int n, j;
+            float at[3][3];
+            const float *corners[3];
             for (k = 0; k < 3; k++) {
-                float at[3];
-                double d[3];
                 terrimp_sorted_position(s, &sorted_squares[i].vertices
-                                               [sorted_squares[i].indices[3 * t + k]], at);
-                for (j = 0; j < 3; j++)
-                    d[j] = (double)at[j] - (double)camera->eye[j];
-                eyes[k][0] = (double)view[0] * d[0] + (double)view[4] * d[1] +
-                             (double)view[8] * d[2];
-                eyes[k][1] = (double)view[1] * d[0] + (double)view[5] * d[1] +
-                             (double)view[9] * d[2];
-                eyes[k][2] = -((double)view[2] * d[0] + (double)view[6] * d[1] +
-                               (double)view[10] * d[2]);
+                                               [sorted_squares[i].indices[3 * t + k]], at[k]);
+                corners[k] = at[k];
             }
-            n = order_clip(eyes, cut, 0.05);
-            for (k = 0; k < n; k++) {
-                cut[k][0] = ORDER_WIDE / 2 + scale * cut[k][0] / cut[k][2];
-                cut[k][1] = ORDER_HIGH / 2 - scale * cut[k][1] / cut[k][2];
-                cut[k][2] = 1.0 / cut[k][2];
-            }
-            for (k = 2; k < n; k++)
-                order_fill(cut[0], cut[k - 1], cut[k], s->desc.front_to_back);
+            order_triangle(&p, corners);
         }
-    for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
-        faults += order_shown[k] < order_nearest[k] * (1.0 - 1e-7);
-    return faults;
+    return order_end(seen);
 }
 
 static void sorted_needs_no_depth_buffer(void)
@@ -200,15 +237,12 @@ static void sorted_needs_no_depth_buffer(void)
         terrimp_sorted_desc desc = i % 2 ? sorted_hills() : sorted_piece();
         terrimp_sorted s;
         terrimp_camera camera;
-        int k;
         desc.front_to_back = i % 3 == 0;
         desc.scale = random_float(2.0f, 12.0f);
         CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
         camera = sorted_camera(&s.desc);
         sorted_frame(&s, &camera);
-        faults += order_faults(&s, &camera);
-        for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
-            seen += order_shown[k] > 0.0;
+        faults += order_faults(&s, &camera, &seen);
     }
     CHECK(faults == 0);
     CHECK(seen > 1000 * ORDER_WIDE * ORDER_HIGH / 10);
@@ -226,7 +260,7 @@ static void sorted_needs_no_depth_buffer_over_tile(const char *name)
     char path[512];
     FILE *file;
     size_t i, got;
-    int faults = 0, seen = 0, k;
+    int faults = 0, seen = 0;
     snprintf(path, sizeof path, "%s/%s", folder ? folder : "../shared/data", name);
     file = fopen(path, "rb");
     if (!file) {
@@ -256,9 +290,7 @@ static void sorted_needs_no_depth_buffer_over_tile(const char *name)
         s.desc.scale = random_float(2.0f, 8.0f);
         s.desc.front_to_back = (int)(i & 1u);
         sorted_frame(&s, &camera);
-        faults += order_faults(&s, &camera);
-        for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
-            seen += order_shown[k] > 0.0;
+        faults += order_faults(&s, &camera, &seen);
     }
     CHECK(faults == 0);
     CHECK(seen > 500 * ORDER_WIDE * ORDER_HIGH / 10);
@@ -272,6 +304,292 @@ static void sorted_needs_no_depth_buffer_over_mountains(void)
 static void sorted_needs_no_depth_buffer_over_hills(void)
 {
     sorted_needs_no_depth_buffer_over_tile("N49E011.hgt");
+}
+
+/* ---- the order of views ---- */
+
+/* A host without a depth buffer. */
+typedef struct order_host {
+    const land *l;
+    order_picture screen, capture;
+    const order_picture *target; /* NULL: of a capture that is not looked at */
+    float xyz[3 * 129 * 129];
+    terrimp_geomip_vertex morph[129 * 129];
+    uint16_t indices[6 * 129 * 129], scratch[4096];
+    int captures, looked_at;
+    int seen, faults, capture_seen, capture_faults;
+    uint32_t circles, meshes;
+} order_host;
+
+static void order_draw(order_host *h, const float *xyz, uint32_t count)
+{
+    uint32_t i, k;
+    for (i = 0; h->target && i < count; i += 3u) {
+        const float *corners[3];
+        for (k = 0; k < 3u; k++)
+            corners[k] = xyz + 3u * h->indices[i + k];
+        order_triangle(h->target, corners);
+    }
+}
+
+static void order_draw_ground(void *user, const terrimp_ground_command *c)
+{
+    order_host *h = (order_host *)user;
+    uint32_t count = 0, vertices = h->l->info.ground_vertex_count;
+    terrimp_geomip_draw draw;
+    if (!h->target)
+        return;
+    memset(&draw, 0, sizeof draw);
+    draw.morph = c->morph;
+    memcpy(draw.side, c->side, sizeof draw.side);
+    memcpy(draw.side_coarse, c->side_coarse, sizeof draw.side_coarse);
+    CHECK(terrimp_terrain_fill_ground(h->l->terrain, c->node, h->xyz, 3u * vertices) == TERRIMP_OK);
+    CHECK(terrimp_terrain_fill_morph(h->l->terrain, c->node, h->morph, vertices) == TERRIMP_OK);
+    CHECK(terrimp_geomip_morph(h->l->info.chunk_quads, &draw, h->morph, h->xyz + 1, 3) ==
+          TERRIMP_OK);
+    CHECK(terrimp_sorted_ground(h->l->terrain, c->node, c->first_index, h->target->eye, h->indices,
+                                c->index_count, &count) == TERRIMP_OK);
+    order_draw(h, h->xyz, count);
+}
+
+/* One picture in ten is looked at, which is drawn with nothing else. */
+static void order_begin_capture(void *user, const terrimp_capture_command *c)
+{
+    order_host *h = (order_host *)user;
+    h->looked_at = h->captures++ % 10 == 0 && c->clear && c->complete;
+    h->target = NULL;
+    if (!h->looked_at)
+        return;
+    h->target = &h->capture;
+    memcpy(h->capture.view, c->view, sizeof c->view);
+    memcpy(h->capture.projection, c->projection, sizeof c->projection);
+    memcpy(h->capture.eye, c->eye, sizeof c->eye);
+    order_begin();
+}
+
+static void order_end_capture(void *user, const terrimp_capture_command *c)
+{
+    order_host *h = (order_host *)user;
+    (void)c;
+    if (h->looked_at)
+        h->capture_faults += order_end(&h->capture_seen);
+    h->target = &h->screen;
+    order_begin();
+}
+
+static void order_draw_impostor(void *user, const terrimp_impostor_command *c)
+{
+    order_host *h = (order_host *)user;
+    const float *xyz = h->l->xyz + 3u * c->base_vertex;
+    uint32_t circles = 0;
+    terrimp_mesh_info mesh;
+    if (c->alpha < 1.0f)
+        return; /* its ground is drawn, too */
+    CHECK(terrimp_terrain_get_mesh(h->l->terrain, c->node, &mesh) == TERRIMP_OK);
+    memcpy(h->indices, h->l->indices + c->first_index, c->index_count * sizeof *h->indices);
+    CHECK(terrimp_sorted_mesh(xyz, mesh.vertex_count, h->screen.eye, h->indices, c->index_count,
+                              h->scratch, &circles) == TERRIMP_OK);
+    h->circles += circles;
+    h->meshes++;
+    order_draw(h, xyz, c->index_count);
+}
+
+/* Flies at random and compares each frame with and without a depth buffer. */
+static void order_fly(order_host *h, const terrimp_view_desc *desc, int frames)
+{
+    terrimp_callbacks draw;
+    terrimp_view *view = NULL;
+    int i, k;
+    memset(&draw, 0, sizeof draw);
+    draw.user = h;
+    draw.begin_capture = order_begin_capture, draw.end_capture = order_end_capture;
+    draw.draw_ground = order_draw_ground, draw.draw_impostor = order_draw_impostor;
+    CHECK(terrimp_view_create(h->l->terrain, desc, NULL, &view) == TERRIMP_OK);
+    for (i = 0; i < frames; i++) {
+        terrimp_sorted_desc place;
+        terrimp_camera camera;
+        memset(&place, 0, sizeof place);
+        place.field = h->l->desc.field;
+        camera = sorted_camera(&place);
+        camera.eye[1] = random_float(h->l->info.box.min[1], 2.0f * h->l->info.box.max[1]);
+        camera.z_far = 3000.0f;
+        if (i % 8) /* close to the one before: pictures are used again */
+            for (k = 0; k < 3; k++)
+                camera.eye[k] = h->screen.eye[k] + random_float(-1.0f, 1.0f);
+        memcpy(h->screen.eye, camera.eye, sizeof camera.eye);
+        CHECK(terrimp_camera_matrices(&camera, h->screen.view, h->screen.projection) == TERRIMP_OK);
+        CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+        h->target = &h->screen;
+        order_begin();
+        CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
+        h->faults += order_end(&h->seen);
+    }
+    terrimp_view_destroy(view);
+}
+
+static void order_land(land *l, int turn)
+{
+    static const uint32_t quads[] = {4, 6, 8, 16};
+    land_prepare(l, random_range(20, 150), random_range(20, 150), TERRIMP_FORMAT_F32,
+                 turn % 2 ? LAND_NOISE : LAND_HILLS);
+    l->desc.field.spacing_x = random_float(0.5f, 3.0f);
+    l->desc.field.spacing_z = random_float(0.5f, 3.0f);
+    l->desc.field.origin_x = random_float(-300.0f, 300.0f);
+    l->desc.field.height_scale = random_float(0.02f, 0.2f);
+    l->desc.chunk_quads = quads[turn % 4];
+}
+
+static void views_in_painters_order_need_no_depth_buffer(void)
+{
+    static order_host h;
+    static land l;
+    int turn;
+    memset(&h, 0, sizeof h);
+    for (turn = 0; turn < 12; turn++) {
+        terrimp_view_desc d;
+        order_land(&l, turn);
+        if (!land_build(&l))
+            return;
+        h.l = &l;
+        memset(&d, 0, sizeof d);
+        d.sorted = 1;
+        d.mode = TERRIMP_MODE_FULL;
+        order_fly(&h, &d, 15);
+        d.mode = TERRIMP_MODE_GEOMIP;
+        d.tolerance_px = random_float(0.3f, 4.0f);
+        d.morph_ratio = turn % 3 ? 1.0f : 2.0f;
+        order_fly(&h, &d, 30);
+        land_free(&l);
+    }
+    CHECK(h.faults == 0);
+    CHECK(h.seen > 50 * ORDER_WIDE * ORDER_HIGH);
+}
+
+static void pictures_are_made_in_painters_order(void)
+{
+    static order_host h;
+    static land l;
+    int turn;
+    memset(&h, 0, sizeof h);
+    h.screen.hides_back = 1;
+    for (turn = 0; turn < 16; turn++) {
+        terrimp_view_desc d;
+        order_land(&l, turn);
+        l.desc.chunk_quads = turn % 2 ? 8 : 16;
+        l.desc.triangle_budget = turn % 3 ? 32 : 85;
+        if (!land_build(&l))
+            return;
+        h.l = &l;
+        memset(&d, 0, sizeof d);
+        d.sorted = 1;
+        d.ground_tolerance_px = 0.1f;
+        d.costs.capture = 20.0f;
+        d.costs.triangle = 4.0f;
+        d.costs.ground_px = d.costs.impostor_px = 0.08f;
+        order_fly(&h, &d, 60);
+        land_free(&l);
+    }
+    CHECK(h.capture_faults == 0 && h.capture_seen > 10000);
+    CHECK(h.faults == 0);
+    CHECK(h.circles == 0 && h.meshes > 1000u);
+}
+
+static int order_compare(const void *a, const void *b)
+{
+    return memcmp(a, b, 3u * sizeof(uint16_t));
+}
+
+/* Brings triangles into one order, each with its smallest corner first and without those of no
+   area. Returns how many there are. */
+static uint32_t order_tidy(uint16_t *t, uint32_t index_count)
+{
+    uint32_t i, count = 0;
+    for (i = 0; i < index_count; i += 3u) {
+        uint16_t a = t[i], b = t[i + 1u], c = t[i + 2u];
+        int first = a < b && a < c ? 0 : b < c ? 1 : 2;
+        if (a == b || b == c || c == a)
+            continue;
+        t[3u * count] = first == 0 ? a : first == 1 ? b : c;
+        t[3u * count + 1u] = first == 0 ? b : first == 1 ? c : a;
+        t[3u * count++ + 2u] = first == 0 ? c : first == 1 ? a : b;
+    }
+    qsort(t, count, 3u * sizeof *t, order_compare);
+    return count;
+}
+
+static void painters_order_has_the_triangles_of_the_pattern(void)
+{
+    static uint16_t own[6 * 129 * 129], plain[6 * 129 * 129];
+    static land l;
+    uint32_t turn, first, count = 0, i, checked = 0;
+    for (turn = 0; turn < 3; turn++) {
+        order_land(&l, (int)turn);
+        if (!land_build(&l))
+            return;
+        for (first = 0; first < l.info.ground_index_count; first += 3u) {
+            uint32_t node = random_range(0, l.info.node_count - 1u), wanted = 0;
+            float eye[3];
+            terrimp_result result;
+            for (i = 0; i < 3u; i++)
+                eye[i] = random_float(l.info.box.min[i] - 50.0f, l.info.box.max[i] + 50.0f);
+            count = 0;
+            result = terrimp_sorted_ground(l.terrain, node, first, eye, own, sizeof own / 2u,
+                                           &count);
+            CHECK(result == TERRIMP_OK || result == TERRIMP_E_RANGE);
+            if (result != TERRIMP_OK)
+                continue;
+            CHECK(terrimp_sorted_ground(l.terrain, node, first, eye, own, count - 1u, &i) ==
+                  TERRIMP_E_CAPACITY);
+            for (i = 0; i < TERRIMP_PATTERN_COUNT; i++) {
+                terrimp_pattern p;
+                CHECK(terrimp_pattern_find(l.info.chunk_quads, TERRIMP_FORM_LIST, i, &p) ==
+                      TERRIMP_OK);
+                wanted = p.first_index == first ? p.index_count : wanted;
+            }
+            wanted = wanted ? wanted : count; /* strips have no triangles of no area */
+            memcpy(plain, l.patterns + first, wanted * sizeof *plain);
+            CHECK(order_tidy(own, count) == count / 3u);
+            CHECK(order_tidy(plain, wanted) == count / 3u);
+            CHECK(memcmp(own, plain, count * sizeof *own) == 0);
+            checked++;
+        }
+        land_free(&l);
+    }
+    CHECK(checked >= 3u * 16u);
+}
+
+static void painters_order_refuses_bad_input(void)
+{
+    static land l;
+    uint16_t indices[3] = {0, 1, 2}, scratch[32], *ground;
+    uint32_t count = 7;
+    float xyz[9] = {0, 0, 0, 0, 0, 1, 1, 0, 1}, eye[3] = {0, 9, 0};
+    order_land(&l, 1);
+    if (!land_build(&l))
+        return;
+    ground = (uint16_t *)malloc(l.info.ground_index_count * sizeof *ground);
+#define ORDER_GROUND(t, n, f, e, out, room, c) terrimp_sorted_ground(t, n, f, e, out, room, c)
+    CHECK(ORDER_GROUND(NULL, 0, 0, eye, ground, 99999, &count) == TERRIMP_E_NULL);
+    CHECK(ORDER_GROUND(l.terrain, 0, 0, NULL, ground, 99999, &count) == TERRIMP_E_NULL);
+    CHECK(ORDER_GROUND(l.terrain, 0, 0, eye, NULL, 99999, &count) == TERRIMP_E_NULL);
+    CHECK(ORDER_GROUND(l.terrain, 0, 0, eye, ground, 99999, NULL) == TERRIMP_E_NULL);
+    CHECK(ORDER_GROUND(l.terrain, l.info.node_count, 0, eye, ground, 99999, &count) ==
+          TERRIMP_E_RANGE);
+    CHECK(ORDER_GROUND(l.terrain, 0, 1, eye, ground, 99999, &count) == TERRIMP_E_RANGE);
+    CHECK(ORDER_GROUND(l.terrain, 0, 0, eye, ground, 3, &count) == TERRIMP_E_CAPACITY);
+    CHECK(terrimp_sorted_mesh(NULL, 3, eye, indices, 3, scratch, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_mesh(xyz, 3, NULL, indices, 3, scratch, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_mesh(xyz, 3, eye, NULL, 3, scratch, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_mesh(xyz, 3, eye, indices, 3, NULL, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sorted_mesh(xyz, 3, eye, indices, 2, scratch, NULL) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sorted_mesh(xyz, 2, eye, indices, 3, scratch, NULL) == TERRIMP_E_RANGE);
+    eye[2] = not_a_number();
+    CHECK(ORDER_GROUND(l.terrain, 0, 0, eye, ground, 99999, &count) == TERRIMP_E_NOT_FINITE);
+    CHECK(terrimp_sorted_mesh(xyz, 3, eye, indices, 3, scratch, NULL) == TERRIMP_E_NOT_FINITE);
+#undef ORDER_GROUND
+    CHECK(count == 7);
+    free(ground);
+    land_free(&l);
 }
 
 /* ---- cracks ---- */
@@ -776,7 +1094,7 @@ static void sorted_pages_may_be_coarse_or_absent(void)
 {
     static sorted_host host;
     terrimp_sorted_desc desc = sorted_hosted(&host);
-    int i, cracks = 0, faults = 0, absent = 0, own = 0, k;
+    int i, cracks = 0, faults = 0, seen = 0, absent = 0, own = 0, k;
     uint32_t q;
     sorted_make_hills(8.0f);
     for (i = 0; i < 60; i++) {
@@ -792,7 +1110,7 @@ static void sorted_pages_may_be_coarse_or_absent(void)
         sorted_frame(&s, &camera);
         absent += (int)(host.asked - host.drawn);
         cracks += sorted_count_cracks(&area);
-        faults += order_faults(&s, &camera);
+        faults += order_faults(&s, &camera, &seen);
         for (q = 0; q < sorted_count; q++)
             for (k = 0; k < sorted_squares[q].vertex_count; k++) {
                 const terrimp_sorted_vertex *v = &sorted_squares[q].vertices[k];
@@ -1129,6 +1447,10 @@ static void sorted_bears_odd_cameras(void)
 static void sorted_tests(void)
 {
     RUN(sorted_needs_no_depth_buffer);
+    RUN(views_in_painters_order_need_no_depth_buffer);
+    RUN(pictures_are_made_in_painters_order);
+    RUN(painters_order_has_the_triangles_of_the_pattern);
+    RUN(painters_order_refuses_bad_input);
     RUN(sorted_needs_no_depth_buffer_over_mountains);
     RUN(sorted_needs_no_depth_buffer_over_hills);
     RUN(sorted_squares_meet_without_cracks);

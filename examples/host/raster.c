@@ -104,12 +104,13 @@ static void fill_run(const sampler *from, run k, uint16_t *pixel, uint16_t *dept
     }
 }
 
-/* The same without a depth buffer, and of the whole picture. */
-static void cover_run(const sampler *from, run k, uint16_t *pixel, int count)
+/* The same without a depth buffer. */
+static void cover_run(const sampler *from, run k, uint16_t *pixel, int count, int share,
+                      uint32_t at)
 {
-    for (; count > 0; count--, pixel++) {
+    for (; count > 0; count--, pixel++, at += 3242174889u) {
         uint16_t texel = from->texels[(k.v >> 16 << from->log2_side) + (k.u >> 16)];
-        if (texel != RASTER_KEY)
+        if (texel != RASTER_KEY && (int)(at >> 27) < share)
             *pixel = texel;
         k.u += k.du, k.v += k.dv;
     }
@@ -125,6 +126,7 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
         int count = end - x > 16 ? 16 : end - x;
         int steps = x + count < end ? count : count - 1; /* not beyond the last pixel */
         float walked = (float)steps;
+        uint32_t at_dither;
         run k;
         k.u = u, k.v = v, k.depth = depth, k.du = k.dv = k.step = 0;
         at.depth += walked * dx->depth, at.s += walked * dx->s;
@@ -138,11 +140,12 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
             depth = to_depth(at.depth);
             k.step = (depth - k.depth) / steps;
         }
+        at_dither = (uint32_t)x * 3242174889u + (uint32_t)y * 2447445414u;
         if (r->depth)
             fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count,
-                     share, (uint32_t)x * 3242174889u + (uint32_t)y * 2447445414u);
+                     share, at_dither);
         else
-            cover_run(from, k, r->pixels + y * r->pitch + x, count);
+            cover_run(from, k, r->pixels + y * r->pitch + x, count, share, at_dither);
         x += count;
     }
 }
