@@ -1308,6 +1308,10 @@ typedef struct terrimp_view_desc {
     const void *walls;      /* of the terrain's quadtree, aligned to 4, built, outliving the view:
                                what lies behind a ridge is neither drawn nor captured. The view
                                takes 28 KiB more [Default NULL -> nothing is hidden so] */
+    uint32_t joined;        /* bit i: beyond side i (TERRIMP_SIDE_...) another terrain goes on, with
+                               this one's border samples as its own: the floor is drawn for eyes
+                               over that one, too, so that no sky shows between the two
+                               [Limits: 0..15] */
     terrimp_costs costs;
 } terrimp_view_desc;
 
@@ -8117,7 +8121,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
-                    d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
+                    d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
     *out = d;
@@ -9671,6 +9675,18 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- a frame ---- */
 
+/* Whether a point lies over the terrain, or beyond sides where another one goes on. */
+static int terrimpi_view_inside(const terrimpi_frame *f, const terrimp_box *box,
+                                const float point[3])
+{
+    uint32_t beyond = 0;
+    beyond |= point[2] < box->min[2] ? 1u << TERRIMP_SIDE_Z0 : 0u;
+    beyond |= point[2] > box->max[2] ? 1u << TERRIMP_SIDE_Z1 : 0u;
+    beyond |= point[0] < box->min[0] ? 1u << TERRIMP_SIDE_X0 : 0u;
+    beyond |= point[0] > box->max[0] ? 1u << TERRIMP_SIDE_X1 : 0u;
+    return (beyond & ~f->desc->joined) == 0;
+}
+
 /* Whether all rays of an orthographic camera come in through the top of the terrain's box, and go
    out through its bottom. */
 static int terrimpi_view_through(const terrimpi_frame *f)
@@ -9691,9 +9707,10 @@ static int terrimpi_view_through(const terrimpi_frame *f)
                 at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
                         c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
             way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
-            for (k = 0; k < 3; k += 2)
-                if (!terrimpi_within(at[k] + forward[k] * way, box.min[k], box.max[k]))
-                    return 0;
+            for (k = 0; k < 3; k++)
+                at[k] += forward[k] * way;
+            if (!terrimpi_view_inside(f, &box, at))
+                return 0;
         }
     return 1;
 }
@@ -9705,9 +9722,15 @@ static int terrimpi_view_through(const terrimpi_frame *f)
 static int terrimpi_view_over(const terrimpi_frame *f)
 {
     const float *eye = f->camera.eye;
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
+    terrimp_box box;
     float ground;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
+    terrimpi_terrain_node_box(f->terrain, &root, &box);
+    if (terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
+        TERRIMP_E_MISS)
+        return terrimpi_view_inside(f, &box, eye);
     return terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
                TERRIMP_OK &&
            eye[1] - f->camera.reach >= ground;
@@ -9725,7 +9748,8 @@ static void terrimpi_view_list(terrimp_view *v)
     }
     for (i = 0; i < v->draw_count; i++)
         impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
-    if (impostors > 0 && terrimpi_view_over(&v->frame))
+    if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+        terrimpi_view_over(&v->frame))
         terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, 0);
 }
 

@@ -1610,6 +1610,7 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
 #include "render_camera.h"
 #include "render_hidden.h"
 #include "render_scene.h"
+#include "render_tiles.h"
 
 int main(int argc, char **argv)
 {
@@ -1624,6 +1625,7 @@ int main(int argc, char **argv)
     RUN(houses_and_seas_meet_the_terrain);
     RUN(what_ridges_hide_shows_no_pixel);
     RUN(no_camera_sees_a_hole);
+    RUN(terrains_side_by_side_leave_no_gap);
     RUN(pictures_in_two_parts_show_what_ridges_hide);
     RUN(pictures_in_pieces_are_like_whole_ones);
     RUN(frames_change_no_more_than_those_of_the_full_mesh);
