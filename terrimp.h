@@ -161,6 +161,7 @@
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
          TERRIMP_NO_HORIZON    views take no walls: E_RANGE
+         TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 35 KB of code at -Os on
@@ -407,6 +408,13 @@ typedef struct terrimp_camera {
                                the distance of two that share an update [Limits: 0..1e18] */
 } terrimp_camera;
 
+#ifndef TERRIMP_NO_TROUBLE
+/* The name of a field that makes resolve refuse a descriptor, for whoever looks for a mistake; NULL
+   when there is none. Of several wrong ones it names one. */
+TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field);
+TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera);
+#endif
+
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
    camera. */
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera,
@@ -531,6 +539,14 @@ typedef struct terrimp_quadtree {
 TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
                                                  uint32_t chunk_quads, terrimp_quadtree *tree);
 
+/* The node of a level over a world position; on a border between two, the one towards +x, +z.
+
+   level    [Limits: < level_count]
+   x, z     [wu]
+   Errors   E_MISS beside the field */
+TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, uint32_t level,
+                                                 float x, float z, terrimp_node *node);
+
 /* ==== Geomipmap ========================================================== >>geomipmap */
 
 /* Geometrical mipmapping alone. A node is always drawn as chunk_quads x chunk_quads quads of every
@@ -643,6 +659,16 @@ typedef struct terrimp_geomip_view {
     float distances_for[5];       /* private: what distances was made for */
     uint32_t frame;               /* private */
 } terrimp_geomip_view;
+
+/* The bytes of a block for the arrays of a view, 0 for bad arguments; and a view whose arrays lie in
+   such a block: set what is to be other than the default, and select.
+
+   draw_capacity   [Limits: >= 1] the chunks of level 0 are enough
+   memory          [bytes] aligned to 8 bytes */
+TERRIMP_API size_t terrimp_geomip_view_bytes(const terrimp_quadtree *tree, uint32_t draw_capacity);
+TERRIMP_API terrimp_result terrimp_geomip_view_init(const terrimp_quadtree *tree,
+                                                    uint32_t draw_capacity, void *memory,
+                                                    size_t bytes, terrimp_geomip_view *view);
 
 /* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
    level, those outside of the camera's view are left out.
@@ -959,6 +985,11 @@ typedef struct terrimp_terrain_info {
 /* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
+
+#ifndef TERRIMP_NO_TROUBLE
+/* As terrimp_heightfield_trouble; a wrong field of the heightfield is named by itself. */
+TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc);
+#endif
 
 /* Lists the nodes whose vertices have to be filled anew after some samples have changed: ground and
    coarse meshes; the floor, too, may have changed.
@@ -1286,6 +1317,9 @@ typedef struct terrimp_view_desc {
     uint32_t atlas_size;    /* texels along the side of each of the host's atlas textures
                                [Limits: 64..32768] [Default 0 -> 4096] */
     uint32_t atlas_count;   /* atlas textures [Limits: 1..16] [Default 0 -> 1] */
+    uint32_t max_slot;      /* texels along a side of a picture's slot at most: what would need more
+                               is coarser [Limits: 12..atlas_size]
+                               [Default 0 -> half of atlas_size] */
     uint32_t max_impostors; /* pictures kept at most [Limits: 1..65534] [Default 0 -> 1024] */
     uint32_t max_ground;    /* ground nodes drawn at most; AUTO and GEOMIP coarsen the ground rather
                                than exceed it, FULL and IMPOSTOR need the chunks in sight
@@ -1393,6 +1427,12 @@ typedef struct terrimp_stats {
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out);
+
+#ifndef TERRIMP_NO_TROUBLE
+/* As terrimp_heightfield_trouble; `costs` stands for each of its fields. */
+TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
+                                                  const terrimp_view_desc *desc);
+#endif
 
 /* Bytes of the block that a view lives in; 0 when an argument is wrong or the size overflows. */
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
@@ -1864,6 +1904,28 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
                   a moved vertex beats a chosen one, here along y alone */
 TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, void *scratch,
                                             size_t scratch_bytes, terrimp_mesh *mesh);
+
+/* The bytes of scratch that terrimp_simplify_field wants; 0 when a number is outside its limits. */
+TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
+                                                        uint32_t triangle_budget);
+
+/* Simplifies a rectangle of a heightfield in one call. Its borders are simplified on their own, to
+   as many points as the budget asks for, so that two of them side by side meet.
+
+   samples          inside the field [Limits: width, height 2..TERRIMP_MAX_TILE_DIM]
+   triangle_budget  [Limits: 6..TERRIMP_MAX_TRIANGLES] [Default 0 -> TERRIMP_TRIANGLE_BUDGET]
+   max_error        [wu] above 0: as few triangles as are found to keep every sample within it; all
+                    of the budget when that is not enough [Limits: >= 0]
+   scratch          [bytes] as for terrimp_simplify
+   mesh             in: arrays, as terrimp_mesh_capacity says; out: in samples of the rectangle
+   error            out: [wu] the largest vertical distance of a sample; NULL: not wanted
+   Errors           E_VOID for a sample without data
+   Cost             that of terrimp_simplify; with max_error some ten times as much */
+TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
+                                                  const terrimp_rect *samples,
+                                                  uint32_t triangle_budget, float max_error,
+                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
+                                                  float *error);
 
 /* --- skirts (Hess 4.2) --- */
 
@@ -2784,6 +2846,34 @@ static void terrimpi_widen(float *low, float *high, float slope)
     *high += margin;
 }
 
+#ifndef TERRIMP_NO_TROUBLE
+
+/* A field of a descriptor. */
+typedef struct terrimpi_trouble_field {
+    const char *name;
+    size_t at, bytes;
+} terrimpi_trouble_field;
+
+#define TERRIMPI_TROUBLE(type, field) {#field, offsetof(type, field), sizeof(((type *)0)->field)}
+
+/* Takes fields of a good descriptor for those of a bad one, one after the other, until it is good:
+   the last one was wrong. NULL when none was. */
+static const char *terrimpi_trouble(void *bad, const void *good,
+                                    const terrimpi_trouble_field *fields, size_t count,
+                                    terrimp_result (*resolve)(const void *context, void *desc),
+                                    const void *context)
+{
+    const char *name = NULL;
+    size_t i;
+    for (i = 0; i < count && resolve(context, bad) != TERRIMP_OK; i++) {
+        name = fields[i].name;
+        memcpy((char *)bad + fields[i].at, (const char *)good + fields[i].at, fields[i].bytes);
+    }
+    return name;
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
+
 /* ==== Heightfield ======================================================== >>impl-heightfield */
 
 /* Based on: Bornemann and Deuflhard 1996 (voids), Amanatides and Woo 1987 (ray walk).
@@ -3483,6 +3573,44 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
     return terrimpi_field_ray_walk(&f, &ray, x, z, hit);
 }
 
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_field_try(const void *context, void *desc)
+{
+    (void)context;
+    return terrimp_heightfield_resolve((const terrimp_heightfield *)desc,
+                                       (terrimp_heightfield *)desc);
+}
+
+TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_heightfield, samples),
+        TERRIMPI_TROUBLE(terrimp_heightfield, width),
+        TERRIMPI_TROUBLE(terrimp_heightfield, depth),
+        TERRIMPI_TROUBLE(terrimp_heightfield, format),
+        TERRIMPI_TROUBLE(terrimp_heightfield, row_bytes),
+        TERRIMPI_TROUBLE(terrimp_heightfield, spacing_x),
+        TERRIMPI_TROUBLE(terrimp_heightfield, spacing_z),
+        TERRIMPI_TROUBLE(terrimp_heightfield, height_scale),
+        TERRIMPI_TROUBLE(terrimp_heightfield, height_offset),
+        TERRIMPI_TROUBLE(terrimp_heightfield, origin_x),
+        TERRIMPI_TROUBLE(terrimp_heightfield, origin_z),
+        TERRIMPI_TROUBLE(terrimp_heightfield, no_data)
+    };
+    terrimp_heightfield good, bad;
+    if (!field)
+        return "the descriptor";
+    memset(&good, 0, sizeof good);
+    good.samples = &good; /* aligned for any */
+    good.width = good.depth = 2;
+    bad = *field;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_field_try, NULL);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
+
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
@@ -3548,6 +3676,43 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     *out = c;
     return TERRIMP_OK;
 }
+
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_camera_try(const void *context, void *desc)
+{
+    (void)context;
+    return terrimp_camera_resolve((const terrimp_camera *)desc, (terrimp_camera *)desc);
+}
+
+TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_camera, eye),
+        TERRIMPI_TROUBLE(terrimp_camera, forward),
+        TERRIMPI_TROUBLE(terrimp_camera, up),
+        TERRIMPI_TROUBLE(terrimp_camera, fov_y_rad),
+        TERRIMPI_TROUBLE(terrimp_camera, width_px),
+        TERRIMPI_TROUBLE(terrimp_camera, height_px),
+        TERRIMPI_TROUBLE(terrimp_camera, z_near),
+        TERRIMPI_TROUBLE(terrimp_camera, z_far),
+        TERRIMPI_TROUBLE(terrimp_camera, orthographic),
+        TERRIMPI_TROUBLE(terrimp_camera, sides),
+        TERRIMPI_TROUBLE(terrimp_camera, reach)
+    };
+    terrimp_camera good, bad;
+    if (!camera)
+        return "the descriptor";
+    memset(&good, 0, sizeof good);
+    good.forward[2] = -1.0f;
+    good.width_px = good.height_px = 1;
+    good.z_near = 1.0f;
+    bad = *camera;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_camera_try, NULL);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
 
 /* The sides of a resolved camera's screen at distance 1: left, right, down, up. */
 static void terrimpi_camera_sides(const terrimp_camera *camera, float sides[4])
@@ -4047,6 +4212,19 @@ static void terrimpi_tree_box(const terrimp_quadtree *t, const terrimp_node *n, 
     box->max[1] = high;
     box->min[2] = terrimpi_tree_z(t, n->level, j);
     box->max[2] = terrimpi_tree_z(t, n->level, j + t->chunk_quads);
+}
+
+TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, uint32_t level,
+                                                 float x, float z, terrimp_node *node)
+{
+    uint32_t i, j;
+    TERRIMPI_REFUSE(!tree || !node, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(level >= tree->level_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_locate(&tree->field, x, z, &i, &j), TERRIMP_E_MISS);
+    *node = terrimpi_tree_at(tree, level, (i / tree->chunk_quads) >> level,
+                             (j / tree->chunk_quads) >> level);
+    return TERRIMP_OK;
 }
 
 /* ---- its children, closest first ---- */
@@ -4728,6 +4906,40 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     memcpy(v->distances_for, wanted, sizeof wanted);
     terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
                            v->distances);
+}
+
+/* The one description of a view's block. */
+static size_t terrimpi_mip_layout(const terrimp_quadtree *tree, uint32_t draw_capacity,
+                                  unsigned char *base, terrimp_geomip_view *view)
+{
+    terrimpi_arena a = terrimpi_arena_at(base);
+    size_t count = tree->node_count;
+    memset(view, 0, sizeof *view);
+    view->draw_capacity = draw_capacity;
+    view->distances = (float *)terrimpi_take(&a, count, sizeof *view->distances);
+    view->marks = (terrimp_geomip_mark *)terrimpi_take(&a, count, sizeof *view->marks);
+    view->draws = (terrimp_geomip_draw *)terrimpi_take(&a, draw_capacity, sizeof *view->draws);
+    return a.ok ? a.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_geomip_view_bytes(const terrimp_quadtree *tree, uint32_t draw_capacity)
+{
+    terrimp_geomip_view view;
+    return tree && draw_capacity ? terrimpi_mip_layout(tree, draw_capacity, NULL, &view) : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_view_init(const terrimp_quadtree *tree,
+                                                    uint32_t draw_capacity, void *memory,
+                                                    size_t bytes, terrimp_geomip_view *view)
+{
+    size_t needed = terrimp_geomip_view_bytes(tree, draw_capacity);
+    TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(draw_capacity == 0, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
+    memset(memory, 0, needed);
+    terrimpi_mip_layout(tree, draw_capacity, (unsigned char *)memory, view);
+    return TERRIMP_OK;
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
@@ -5977,6 +6189,37 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     *out = d;
     return TERRIMP_OK;
 }
+
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_terrain_try(const void *context, void *desc)
+{
+    (void)context;
+    return terrimp_terrain_desc_resolve((const terrimp_terrain_desc *)desc,
+                                        (terrimp_terrain_desc *)desc);
+}
+
+TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, chunk_quads),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, triangle_budget),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, proud),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, height_low),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, height_high)
+    };
+    terrimp_terrain_desc good, bad;
+    if (!desc)
+        return "the descriptor";
+    if (terrimp_heightfield_trouble(&desc->field))
+        return terrimp_heightfield_trouble(&desc->field);
+    memset(&good, 0, sizeof good);
+    bad = *desc;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_terrain_try, NULL);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
 
 /* Vertices and indices of the floor, and of its ground alone. */
 static uint32_t terrimpi_floor_ground_vertices(const terrimp_terrain *t)
@@ -8113,6 +8356,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         d.ground_rule = TERRIMP_GEOMIP_PICTURE;
     TERRIMPI_DEFAULT(d.atlas_size, 4096);
     TERRIMPI_DEFAULT(d.atlas_count, 1);
+    TERRIMPI_DEFAULT(d.max_slot, d.atlas_size / 2u);
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     chunks = terrain->tree.level_first[1];
@@ -8121,12 +8365,56 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
-                    d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u, TERRIMP_E_RANGE);
+                    d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
+
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_view_try(const void *context, void *desc)
+{
+    return terrimp_view_desc_resolve((const terrimp_terrain *)context,
+                                     (const terrimp_view_desc *)desc,
+                                     (terrimp_view_desc *)desc);
+}
+
+TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
+                                                  const terrimp_view_desc *desc)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_view_desc, mode),
+        TERRIMPI_TROUBLE(terrimp_view_desc, tolerance_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, ground_tolerance_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, ground_rule),
+        TERRIMPI_TROUBLE(terrimp_view_desc, morph_ratio),
+        TERRIMPI_TROUBLE(terrimp_view_desc, fade_start),
+        TERRIMPI_TROUBLE(terrimp_view_desc, fade_end),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_angle_rad),
+        TERRIMPI_TROUBLE(terrimp_view_desc, texels_per_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, impostor_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, atlas_size),
+        TERRIMPI_TROUBLE(terrimp_view_desc, atlas_count),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, walls),
+        TERRIMPI_TROUBLE(terrimp_view_desc, joined),
+        TERRIMPI_TROUBLE(terrimp_view_desc, costs)
+    };
+    terrimp_view_desc good, bad;
+    if (!terrain || !desc)
+        return "the descriptor";
+    memset(&good, 0, sizeof good);
+    bad = *desc;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_view_try, terrain);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
 
 /* ---- the pictures: a cache ---- */
 
@@ -9430,8 +9718,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
     float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
-    uint32_t size[2], i, largest = terrimpi_max_u32(
-        TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
+    uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     memset(job, 0, sizeof *job);
     job->picture = terrimpi_cache_find(&v->cache, c->node.number);
@@ -13031,6 +13318,142 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
                                             size_t scratch_bytes, terrimp_mesh *mesh)
 {
     return terrimpi_simp_run(desc, NULL, scratch, scratch_bytes, mesh);
+}
+
+/* --- a tile by one call --- */
+
+#define TERRIMPI_SIMP_POINTS 52u /* of a border of the largest budget */
+
+/* The largest vertical distance of a tile's samples to the triangles of a mesh. */
+static float terrimpi_simp_largest_error(const terrimp_simplify_desc *desc,
+                                         const terrimp_mesh *mesh)
+{
+    float most = 0.0f;
+    uint32_t i, k;
+    for (i = 0; i < mesh->surface_index_count; i += 3u) {
+        int64_t p[3][2], low[2], high[2], at[2], all;
+        float h[3];
+        for (k = 0; k < 3u; k++) {
+            const terrimp_mesh_vertex *v = &mesh->vertices[mesh->indices[i + k]];
+            p[k][0] = v->x;
+            p[k][1] = v->z;
+            h[k] = v->height;
+        }
+        for (k = 0; k < 2u; k++) {
+            low[k] = p[0][k] < p[1][k] ? p[0][k] : p[1][k];
+            low[k] = low[k] < p[2][k] ? low[k] : p[2][k];
+            high[k] = p[0][k] > p[1][k] ? p[0][k] : p[1][k];
+            high[k] = high[k] > p[2][k] ? high[k] : p[2][k];
+        }
+        all = terrimpi_twice_area(p[0], p[1], p[2]);
+        for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+            for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
+                int64_t b = terrimpi_twice_area(p[2], p[0], at);
+                int64_t c = terrimpi_twice_area(p[0], p[1], at);
+                float miss = desc->heights[at[1] * (int64_t)desc->cols + at[0]] - h[0];
+                if (b < 0 || c < 0 || b + c > all)
+                    continue;
+                miss -= ((h[1] - h[0]) * (float)b + (h[2] - h[0]) * (float)c) / (float)all;
+                most = terrimpi_max(most, terrimpi_abs(miss));
+            }
+    }
+    return most;
+}
+
+/* Simplifies the four borders of a tile. */
+static terrimp_result terrimpi_simp_borders(terrimp_simplify_desc *desc, float *line,
+                                            terrimp_border_point (*points)[TERRIMPI_SIMP_POINTS])
+{
+    uint32_t limit = terrimpi_terrain_border_points(desc->triangle_budget), k;
+    int side;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        uint32_t along = terrimpi_along_x(side) ? 1u : desc->cols;
+        uint32_t count = terrimpi_along_x(side) ? desc->cols : desc->rows;
+        uint32_t first = side == TERRIMP_SIDE_Z1   ? (desc->rows - 1u) * desc->cols
+                         : side == TERRIMP_SIDE_X1 ? desc->cols - 1u : 0u;
+        for (k = 0; k < count; k++)
+            line[k] = desc->heights[first + k * along];
+        TERRIMPI_TRY(terrimp_border_simplify(line, count, limit, points[side],
+                                             TERRIMPI_SIMP_POINTS,
+                                             &desc->borders[side].point_count));
+        desc->borders[side].points = points[side];
+    }
+    return TERRIMP_OK;
+}
+
+/* Scratch: the tile, a border of it, then that of the simplifier. */
+static size_t terrimpi_simp_field_layout(uint32_t cols, uint32_t rows, uint32_t budget, void *base,
+                                         float **tile, float **line, void **rest)
+{
+    terrimpi_arena a = terrimpi_arena_at((unsigned char *)base);
+    size_t bytes = terrimp_simplify_scratch_bytes(cols, rows, budget);
+    if (bytes == 0 || (budget > 0 && budget < 6u))
+        return 0;
+    *rest = terrimpi_take(&a, bytes, 1);
+    *tile = (float *)terrimpi_take(&a, (size_t)cols * rows, sizeof **tile);
+    *line = (float *)terrimpi_take(&a, TERRIMP_MAX_TILE_DIM, sizeof **line);
+    return a.ok ? a.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
+                                                        uint32_t triangle_budget)
+{
+    float *tile, *line;
+    void *rest;
+    return terrimpi_simp_field_layout(cols, rows, triangle_budget, NULL, &tile, &line, &rest);
+}
+
+TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
+                                                  const terrimp_rect *samples,
+                                                  uint32_t triangle_budget, float max_error,
+                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
+                                                  float *error)
+{
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][TERRIMPI_SIMP_POINTS];
+    terrimp_simplify_desc desc;
+    float *tile, *line, off;
+    uint32_t low = 2, high, border = 0;
+    size_t needed;
+    void *rest;
+    int side;
+    TERRIMPI_REFUSE(!field || !samples || !mesh, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(max_error), TERRIMP_E_NOT_FINITE);
+    needed = terrimpi_simp_field_layout(samples->width, samples->height, triangle_budget, scratch,
+                                        &tile, &line, &rest);
+    TERRIMPI_REFUSE(needed == 0 || max_error < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(samples->x > field->width - samples->width || field->width < samples->width ||
+                    samples->y > field->depth - samples->height ||
+                    field->depth < samples->height, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
+    TERRIMPI_TRY(terrimp_heightfield_read(field, samples->x, samples->y, samples->width,
+                                          samples->height, 1, tile));
+    memset(&desc, 0, sizeof desc);
+    desc.heights = tile;
+    desc.cols = samples->width;
+    desc.rows = samples->height;
+    desc.triangle_budget = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET;
+    TERRIMPI_TRY(terrimpi_simp_borders(&desc, line, points));
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        border += desc.borders[side].point_count - 1u;
+    high = desc.triangle_budget;
+    low = terrimpi_max_u32(low, border - 2u);
+    TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
+    off = terrimpi_simp_largest_error(&desc, mesh);
+    while (max_error > 0.0f && off <= max_error && low < high) { /* high is enough; is this? */
+        desc.triangle_budget = low + (high - low) / 2u;
+        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
+        if (terrimpi_simp_largest_error(&desc, mesh) <= max_error)
+            high = desc.triangle_budget;
+        else
+            low = desc.triangle_budget + 1u;
+    }
+    if (desc.triangle_budget != high) {
+        desc.triangle_budget = high;
+        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
+    }
+    if (error)
+        *error = terrimpi_simp_largest_error(&desc, mesh);
+    return TERRIMP_OK;
 }
 
 /* --- skirts (Hess 4.2) --- */

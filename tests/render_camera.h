@@ -1,5 +1,5 @@
-/* Cameras of every kind look at nothing but terrain: no pixel of the sky is left, and the picture is
-   like that of the full mesh. */
+/* Cameras of every kind look at nothing but terrain: no pixel of the sky is left, and the picture
+   is like that of the full mesh. */
 #ifndef RENDER_CAMERA_H
 #define RENDER_CAMERA_H
 

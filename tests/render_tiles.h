@@ -84,9 +84,10 @@ static size_t tiles_fly(tiles *t, scene *s, const terrimp_view_desc *desc, const
     }
     for (frame = 0; frame < TILES_FRAMES; frame++) {
         float along = (float)frame / TILES_FRAMES, turn = frame % 2 ? 180.0f : 0.0f;
-        flight_pose pose = pose_at(s, 0.3f + 0.4f * along, frame % 2 ? 0.53f : 0.47f,
+        float seam = (float)(t->field[0].depth - 1u) / (float)(s->field.depth - 1u);
+        flight_pose pose = pose_at(s, 0.3f + 0.4f * along, seam + (frame % 2 ? 0.06f : -0.06f),
                                    s->height_range * (0.2f + 0.2f * along),
-                                   90.0f + turn + 50.0f * sinf(0.7f * (float)frame), 40.0f);
+                                   90.0f + turn + 40.0f * sinf(0.7f * (float)frame), 55.0f);
         terrimp_camera camera = camera_at(s, &pose);
         size_t lost = tiles_draw(t, s, &camera, rgb);
         if (lost && joined)

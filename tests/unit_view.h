@@ -237,7 +237,8 @@ static void flight_begin_capture(void *user, const terrimp_capture_command *comm
     CHECK(command->part < FLIGHT_PARTS);
     CHECK(command->part == 0 || (!f->desc.no_splits && f->desc.mode == TERRIMP_MODE_AUTO));
     CHECK(rect_within(&command->slot, f->desc.atlas_size, f->desc.atlas_size));
-    CHECK(command->slot.width > 0 && command->slot.height > 0);
+    CHECK(command->slot.width > 0 && command->slot.width <= f->desc.max_slot);
+    CHECK(command->slot.height > 0 && command->slot.height <= f->desc.max_slot);
     for (i = 0; i < f->capture_count; i++)
         CHECK(f->slot_atlas[i] != command->atlas ||
               !rects_overlap(&f->slots[i], &command->slot, 0));
@@ -1131,6 +1132,7 @@ static terrimp_view_desc random_settings(int mode)
     d.impostor_px = maybe(30.0f, 1000.0f);
     d.atlas_size = random_range(0, 2) ? 0 : random_range(64, 512);
     d.atlas_count = maybe_u32(1, 3);
+    d.max_slot = random_range(0, 3) ? 0 : random_range(12, 64);
     d.max_impostors = random_range(0, 2) ? 0 : random_range(1, 30);
     d.max_captures = maybe_u32(1, 10);
     d.max_capture_texels = maybe_u32(100, 60000);
@@ -2347,6 +2349,56 @@ static void edits_reach_the_ground_of_views(void)
     land_free(&l);
 }
 
+/* Whatever single field of a descriptor is wrong is the one that is named. */
+static void the_field_that_is_wrong_is_named(void)
+{
+    land l;
+    const terrimp_view_desc none = {0};
+    terrimp_terrain_desc t;
+    terrimp_view_desc d;
+    terrimp_camera camera;
+    make_hills(&l);
+    if (!land_build(&l)) {
+        land_free(&l);
+        return;
+    }
+#define NAMED(desc, good, field, value, call) \
+    desc = good, desc.field = value; \
+    CHECK((call) != NULL && strcmp(call, #field) == 0)
+    CHECK(terrimp_view_desc_trouble(l.terrain, &none) == NULL);
+    NAMED(d, none, tolerance_px, -1.0f, terrimp_view_desc_trouble(l.terrain, &d));
+    NAMED(d, none, mode, 99, terrimp_view_desc_trouble(l.terrain, &d));
+    NAMED(d, none, max_slot, 8000, terrimp_view_desc_trouble(l.terrain, &d));
+    NAMED(d, none, joined, 16, terrimp_view_desc_trouble(l.terrain, &d));
+    NAMED(d, none, fade_end, 1e-9f, terrimp_view_desc_trouble(l.terrain, &d));
+    NAMED(d, none, max_captures, 4000, terrimp_view_desc_trouble(l.terrain, &d));
+    NAMED(d, none, atlas_size, 3, terrimp_view_desc_trouble(l.terrain, &d));
+    d = none, d.costs.draw = -1.0f;
+    CHECK(strcmp(terrimp_view_desc_trouble(l.terrain, &d), "costs") == 0);
+    CHECK(terrimp_terrain_desc_trouble(&l.desc) == NULL);
+    NAMED(t, l.desc, chunk_quads, 7, terrimp_terrain_desc_trouble(&t));
+    NAMED(t, l.desc, triangle_budget, 7, terrimp_terrain_desc_trouble(&t));
+    NAMED(t, l.desc, proud, 7.0f, terrimp_terrain_desc_trouble(&t));
+    NAMED(t, l.desc, height_low, 1e30f, terrimp_terrain_desc_trouble(&t));
+    t = l.desc, t.field.width = 1;
+    CHECK(strcmp(terrimp_terrain_desc_trouble(&t), "width") == 0);
+    t = l.desc, t.field.spacing_z = -2.0f;
+    CHECK(strcmp(terrimp_terrain_desc_trouble(&t), "spacing_z") == 0);
+    t = l.desc, t.field.samples = NULL;
+    CHECK(strcmp(terrimp_terrain_desc_trouble(&t), "samples") == 0);
+    CHECK(terrimp_camera_trouble(NULL) != NULL);
+    camera = camera_beside(&l);
+    CHECK(terrimp_camera_trouble(&camera) == NULL);
+    camera.height_px = 0;
+    CHECK(strcmp(terrimp_camera_trouble(&camera), "height_px") == 0);
+    camera = camera_beside(&l), camera.z_far = 0.05f;
+    CHECK(strcmp(terrimp_camera_trouble(&camera), "z_far") == 0);
+    camera = camera_beside(&l), camera.reach = -1.0f;
+    CHECK(strcmp(terrimp_camera_trouble(&camera), "reach") == 0);
+#undef NAMED
+    land_free(&l);
+}
+
 static void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
@@ -2367,6 +2419,7 @@ static void view_tests(void)
     RUN(touch_forgets_what_shows_the_samples_and_little_else);
     RUN(settings_change_without_a_loss);
     RUN(edits_reach_the_ground_of_views);
+    RUN(the_field_that_is_wrong_is_named);
     RUN(invalidate_forgets_every_picture);
     RUN(what_was_forgotten_since_the_update_is_not_drawn);
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);
