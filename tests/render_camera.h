@@ -7,7 +7,7 @@ enum { CAMERA_FRAMES = 16, CAMERA_WAYS = 4 };
 
 static const char *const camera_ways[CAMERA_WAYS] = { "above", "light", "off_centre", "eyes" };
 
-/* The camera of a frame: a map from above; a light that turns while what it shows moves; one tile of
+/* The camera of a frame: a map from above; a light that turns while what it shows moves; a tile of
    four of a flight's picture; the middle of two eyes that are some way apart. */
 static terrimp_camera camera_of(const scene *s, int way, int frame)
 {

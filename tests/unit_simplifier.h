@@ -606,8 +606,8 @@ static void simplifier_refuses_bad_input(void)
     simp_free(t);
 }
 
-/* One call gives what the steps give: neighbours meet, the error is that of brute force and keeps to
-   the one that is asked for with fewer triangles than the budget, and voids are refused. */
+/* One call gives what the steps give: neighbours meet, the error is that of brute force and keeps
+   to the one that is asked for with fewer triangles than the budget, and voids are refused. */
 static void a_rectangle_of_a_field_simplifies_by_one_call(void)
 {
     static simp_case t, whole;
