@@ -3,7 +3,7 @@
 #ifndef RENDER_TILES_H
 #define RENDER_TILES_H
 
-enum { TILES_FRAMES = 24 };
+enum { TILES_FRAMES = 40 };
 
 typedef struct tiles {
     terrimp_terrain *terrain[2];
@@ -85,9 +85,9 @@ static size_t tiles_fly(tiles *t, scene *s, const terrimp_view_desc *desc, const
     for (frame = 0; frame < TILES_FRAMES; frame++) {
         float along = (float)frame / TILES_FRAMES, turn = frame % 2 ? 180.0f : 0.0f;
         float seam = (float)(t->field[0].depth - 1u) / (float)(s->field.depth - 1u);
-        flight_pose pose = pose_at(s, 0.3f + 0.4f * along, seam + (frame % 2 ? 0.06f : -0.06f),
+        flight_pose pose = pose_at(s, 0.3f + 0.4f * along, seam + (frame % 2 ? 0.049f : -0.011f),
                                    s->height_range * (0.2f + 0.2f * along),
-                                   90.0f + turn + 40.0f * sinf(0.7f * (float)frame), 55.0f);
+                                   90.0f + turn + 50.0f * sinf(0.7f * (float)frame), 40.0f);
         terrimp_camera camera = camera_at(s, &pose);
         size_t lost = tiles_draw(t, s, &camera, rgb);
         if (lost && joined)
@@ -100,7 +100,7 @@ static size_t tiles_fly(tiles *t, scene *s, const terrimp_view_desc *desc, const
     return sky;
 }
 
-static size_t check_tiles(scene *s, float ground_tolerance_px)
+static void check_tiles(scene *s)
 {
     terrimp_view_desc full = settings_of(TERRIMP_MODE_FULL);
     manner manners[MANNERS];
@@ -112,7 +112,6 @@ static size_t check_tiles(scene *s, float ground_tolerance_px)
     CHECK(tiles_fly(&t, s, &full, "full", 0) == 0);
     for (i = 1; i < MANNERS; i++) {
         size_t without, with;
-        manners[i].settings.ground_tolerance_px = ground_tolerance_px;
         without = tiles_fly(&t, s, &manners[i].settings, manners[i].name, 0);
         with = tiles_fly(&t, s, &manners[i].settings, manners[i].name, 1);
         printf("  %s, %s: %u pixels of sky between two terrains, %u when they are joined\n",
@@ -120,21 +119,16 @@ static size_t check_tiles(scene *s, float ground_tolerance_px)
         CHECK(with == 0);
         apart += without;
     }
+    CHECK(apart > 0); /* else this shows nothing */
     tiles_close(&t);
-    return apart;
 }
 
 static void terrains_side_by_side_leave_no_gap(void)
 {
     scene s;
-    size_t apart;
     open_hills(&s, 640, 480, 40.0f);
-    apart = check_tiles(&s, 2.0f);
+    check_tiles(&s);
     scene_close(&s);
-    open_rough(&s, 640, 480, 40.0f);
-    apart += check_tiles(&s, 8.0f);
-    scene_close(&s);
-    CHECK(apart > 0); /* else this shows nothing */
 }
 
 #endif
