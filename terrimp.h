@@ -48,15 +48,17 @@
        >>atlas        first-fit decreasing height packing; an atlas whose slots come and go
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
-       >>visibility   the horizon: which nodes are hidden behind others
+       >>visibility   which nodes are hidden behind others: the horizon, visible sets
+       >>residency    terrain larger than memory: which pages are here
        >>capture      a picture to be made, and the ground that is drawn for it
        >>view         the per-frame decision, the schedule, the draw commands
        >>sorted       terrain in exact painter's order, for machines without a depth buffer
        >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
-       >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
-       >>visible-sets what a horizon is made of
+       >>builder      filling of voids, errors of the ground, coarse meshes, edits, materials, bakes
+       >>page-builder pages of a terrain from samples that are larger than memory
+       >>visible-sets what a horizon is made of, and what can be seen from where
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest;
                         depth meshes
        >>placement    which pictures to prepare so that no view costs too much
@@ -66,7 +68,8 @@
    DOES NOT
        call a graphics API, load files, print, read a clock, start threads, allocate after create;
        keep textures or vertex buffers (it fills the host's); light the terrain (the host's shader
-       does, in captures as on the screen); stream terrain that is larger than memory.
+       does, in captures as on the screen); read files: of a terrain that is larger than memory it
+       says which pages it wants.
 
    CONVENTIONS
        y is up, axes are right-handed, samples lie row by row: columns along +x, rows along +z.
@@ -114,10 +117,11 @@
        node: 690 for each 64 x 64 quads, 0.17 bytes a sample. A view takes about 470 bytes for each
        picture it may keep, 120 for each ground node it may draw and 23 for each node of the
        terrain. Samples are used where they lie; what is built can lie in read-only memory, as a
-       bake: then a terrain takes 1 KiB. Building takes 200 KiB and 4 bytes a column for each
-       thread. Outside of it, a host that keeps the ground of all nodes as floats needs 16 bytes a
-       sample, much less if it makes that as it is drawn, and for coarse meshes 103 vertices and
-       543 indices a node.
+       bake: then a terrain takes 1 KiB. Of a terrain in pages there are as many slots of 9 KiB in
+       memory as the host likes, and 2 bytes a node. Building takes 200 KiB and 4 bytes a column for
+       each thread. Outside of it, a host that keeps the ground of all nodes as floats needs 16
+       bytes a sample, much less if it makes that as it is drawn, and for coarse meshes 103 vertices
+       and 543 indices a node.
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
@@ -160,12 +164,11 @@
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
-         TERRIMP_NO_HORIZON    views take no walls: E_RANGE
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 35 KB of code at -Os on
-       a Cortex-M4, 27 KB without the four options that follow it above, if its linker drops
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 30 KB of code at -Os on
+       a Cortex-M4, 27 KB without the three options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -231,7 +234,8 @@ extern "C" {
     X(TERRIMP_E_STATE, 11, "called too early: build or update first")                             \
     X(TERRIMP_E_MISS, 12, "the ray or the point does not meet the terrain")                       \
     X(TERRIMP_E_BAKE, 13, "the block is damaged, or no bake of this version and heightfield")     \
-    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: write it swapped")
+    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: write it swapped")                 \
+    X(TERRIMP_E_PAGE, 15, "a page of the terrain that this needs is not here: fetch it first")
 
 typedef enum terrimp_result {
 #define TERRIMPI_X(name, value, text) name = value,
@@ -532,6 +536,7 @@ typedef struct terrimp_quadtree {
     uint32_t level_first[TERRIMP_QUADTREE_LEVELS + 1u]; /* number of a level's first node */
     uint32_t level_x[TERRIMP_QUADTREE_LEVELS], level_z[TERRIMP_QUADTREE_LEVELS]; /* its nodes */
     struct terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
+    struct terrimp_pages *pages; /* of a terrain in pages, which has no nodes: else NULL */
     uint32_t edits;            /* to be counted up when nodes have been built anew: views notice */
 } terrimp_quadtree;
 
@@ -1144,12 +1149,50 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 
 /* ==== Visibility ========================================================= >>visibility */
 
-/* What lies behind a ridge need be neither drawn nor captured. A horizon says which nodes do, from
-   bounds of the heights within each node, the walls: bytes that are built with the terrain (room
-   Visible sets) and lie beside it. It says so only of nodes of which nothing can be seen.
+/* What lies behind a ridge need be neither drawn nor captured. Two things say which nodes do, only
+   of nodes of which nothing can be seen: a horizon, found anew in each frame from the walls (bounds
+   of the heights within each node); and visible sets, a table of what can be seen from where. Room
+   Visible sets builds walls and table. A view asks what it is given as its `hider`:
 
-   How to use it: begin with the camera, then ask for nodes, closest first for speed; or cull the
-   draws of terrimp_geomip_select. */
+     terrimp_horizon_init(&horizon, tree, walls);
+     settings.hider = &horizon.hider; */
+
+/* Something that hides nodes, of this room or the host's own: a struct that begins with this one.
+   Its functions are called within terrimp_view_update: views that are updated one after the other
+   may share one. */
+typedef struct terrimp_hider {
+    const terrimp_quadtree *tree; /* of the terrain */
+    /* Begins a frame. What is drawn may be off its samples by `low` [wu]; and what hides may be off
+       what it hides by `error` times its distance. The camera is resolved. Returns 0 when nothing
+       is hidden in the frame. */
+    int (*begin)(struct terrimp_hider *hider, const terrimp_camera *camera, float error, float low);
+    /* Returns nonzero for a node all of which is hidden. */
+    int (*hides)(struct terrimp_hider *hider, const terrimp_node *node);
+    struct terrimp_hider *next;   /* asked of what this one does not hide: what takes more time;
+                                     NULL: none */
+    int blind;                    /* set by the view: what begin returned was 0 */
+} terrimp_hider;
+
+/* Private: walls and how they are kept. */
+typedef struct terrimp_walls {
+    const terrimp_quadtree *tree;
+    const unsigned char *codes;
+    uint32_t quads, cells; /* of a cell at level 0: 2 or 4; cells along a side of a node */
+    uint32_t stride;       /* [bytes] from node to node */
+} terrimp_walls;
+
+/* Private: where an eye is, and what may be clipped round it. */
+typedef struct terrimp_stand {
+    float eye;         /* [wu] its height */
+    uint32_t quad[2];  /* that it is over */
+    float within[2];   /* its place in that, 0..1 */
+    float error, low;  /* by which ground may be drawn off its samples: per distance, [wu] */
+    float rounding;    /* [quads] of places */
+    float clipped[2];  /* [quads] to where z_near may clip ground */
+    float steepest;    /* slope of sight lines under which ground is clipped away */
+} terrimp_stand;
+
+/* --- the horizon --- */
 
 /* Bytes of the walls of a tree: 0.18 a sample with chunks of 64 quads, 0.2 with 32, 0.3 with 16.
    0 when tree is NULL. */
@@ -1177,40 +1220,37 @@ typedef struct terrimp_horizon_bin {
     uint16_t reached, top;                /* steps that were looked at */
 } terrimp_horizon_bin;
 
-/* The horizon of one eye, about 28 KiB. Begin fills it in; it holds for the life of the tree. */
+/* The horizon of one eye, about 28 KiB. */
 typedef struct terrimp_horizon {
-    const terrimp_quadtree *tree;
-    const unsigned char *walls;
-    uint32_t quads, cells, stride; /* private, all: how the walls are kept */
-    int blind;         /* nothing can be said to be hidden */
-    float eye;         /* [wu] its height */
-    uint32_t quad[2];  /* that it is over */
-    float within[2];   /* its place in that, 0..1 */
-    float error, low;  /* by which walls may lie below what is kept: per distance, [wu] */
-    float spread;      /* [wu] longest horizontal distance of a point at distance 1 on an axis */
-    float rounding;    /* [quads] of places */
-    float clipped[2];  /* [quads] to where z_near may clip ground */
-    float steepest;    /* slope of sight lines under which ground is clipped away */
+    terrimp_hider hider; /* for a view */
+    terrimp_walls walls; /* private, all from here on */
+    terrimp_stand stand;
+    int blind;    /* nothing can be said to be hidden */
+    float spread; /* [wu] longest horizontal distance of a point at distance 1 on an axis */
     float inverse[TERRIMP_HORIZON_BINS + 1];
     uint32_t step_count[4];
     terrimp_horizon_step steps[4][TERRIMP_HORIZON_STEPS]; /* towards +x, -x, +z, -z */
     terrimp_horizon_bin bins[4][TERRIMP_HORIZON_BINS];
 } terrimp_horizon;
 
+/* Makes a horizon over a terrain's walls.
+
+   tree     built; outlives the horizon
+   walls    [terrimp_walls_bytes] built, aligned to 4; the same */
+TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls);
+
 /* Begins the horizon of a camera. Ground that z_near clips hides nothing. An eye below the ground
    or beside the terrain has no horizon, nor have an orthographic camera or one with a reach:
    nothing is hidden from these, and that is no error.
 
-   tree     built
-   walls    [terrimp_walls_bytes] built, aligned to 4
    error    how far below its samples the ground in front may be drawn, over the distance to it:
             0 for full resolution; a picture that is up to n pixels off its place: n / K
             [Limits: 0..0.5]
    low      [wu] the same whatever the distance [Limits: >= 0]
-   Errors   E_NULL; E_ALIGN; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
+   Errors   E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
    Cost     about 3 us */
 TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
-                                                 const terrimp_quadtree *tree, const void *walls,
                                                  const terrimp_camera *camera, float error,
                                                  float low);
 
@@ -1235,9 +1275,162 @@ TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, f
    Errors     those of begin: the draws are unchanged
    Cost       25 to 60 us in mountains */
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
-                                                const terrimp_quadtree *tree, const void *walls,
                                                 const terrimp_camera *camera,
                                                 terrimp_geomip_view *view);
+
+/* --- visible sets --- */
+
+/* For each cell of the ground plane and each node the least height of an eye over the cell that can
+   see any of the node: what sees a point sees it from farther up, too, so one number tells all. The
+   look-up is a comparison of bytes. Cells are the nodes of one level, and nodes those of another
+   and all above it: 16 x 16 cells of as many nodes take 64 KiB.
+
+     sets.codes = malloc(terrimp_sets_bytes(tree, &sets));  cell_level, node_level: set before
+     terrimp_sets_init(&sets, tree);                        then build or load the codes
+     settings.hider = &sets.hider; */
+typedef struct terrimp_sets {
+    terrimp_hider hider; /* for a view */
+    uint32_t cell_level; /* [Limits: < level_count] */
+    uint32_t node_level; /* [Limits: < level_count] */
+    float error, low;    /* what is drawn may be so far off, as in terrimp_hider [Limits: 0..0.5,
+                            >= 0]: in a frame where it may be farther off nothing is hidden */
+    float reach;         /* [wu] what eyes above a cell's lowest ground are told apart
+                            [Default 0 -> three times the terrain's range of heights] */
+    uint8_t *codes;      /* (required) [terrimp_sets_bytes] a row of nodes for each cell */
+    const uint8_t *row;  /* private, all from here on: of the cell that the eye is over */
+    uint32_t code;       /* of the eye's height */
+    terrimp_stand stand;
+} terrimp_sets;
+
+/* Bytes of the codes; 0 for levels that the tree does not have. */
+TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets);
+
+/* Checks settings, fills in defaults. The codes are left as they are: zeros hide nothing.
+
+   tree     built; outlives the sets
+   Errors   E_RANGE, E_NOT_FINITE */
+TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree);
+
+/* ==== Residency ========================================================== >>residency */
+
+/* A terrain that is larger than memory lies in pages: a header, and for each node its ground, 65 x
+   65 samples at its own step, its coarse mesh, and heights and errors of its four children. Pages
+   are of one size and stand in a file, a cartridge or behind a network, children side by side; this
+   header computes where, and never reads: a view lists what it wants, best first, and the host
+   reads when and how it likes. What is not here is drawn by its parent. In memory are some slots
+   for pages, and 2 bytes a node.
+
+   How to use it: read the header, open the terrain, and read the root's page. Then in each frame
+
+        terrimp_pages_next_frame(terrain);
+        terrimp_view_update(view, &camera);
+        terrimp_view_wants(view, wants, 64, &count);   // begin these, on any thread fill what
+                                                       // begin has given; put, or fail
+        terrimp_view_render(view, &draw);
+
+   Begin, put and fail belong to the thread of the views, between update and render or after it. The
+   pages that a frame uses stay where they are until the next frame's update. A page lies in its
+   slot until another needs it, and what the host has made of it is good as long: a mesh has its
+   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Views of modes AUTO and
+   GEOMIP draw pages, without morph_ratio and hider. */
+
+#define TERRIMP_PAGES_VERSION 1u
+#define TERRIMP_PAGES_HEADER_BYTES 8192u
+
+/* What a header says. */
+typedef struct terrimp_pages_info {
+    uint64_t bytes;          /* of the whole file: the header, then all pages */
+    uint32_t page_bytes;
+    uint32_t width, depth;   /* samples */
+    uint32_t chunk_quads, level_count, node_count;
+    uint32_t block_level;    /* see terrimp_pages_desc */
+    uint32_t stamp;          /* that all its pages bear: pages of another file are refused */
+    float height_scale, height_offset;
+} terrimp_pages_info;
+
+/* Looks at a header. Errors: E_BAKE when it is damaged or cut short; E_ORDER. */
+TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
+                                               terrimp_pages_info *info);
+
+/* Bytes of the block that a terrain in pages lives in. 0 for a header or slots that are no good.
+
+   slot_count  pages in memory at most [Limits: 8..65534] */
+TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count);
+
+/* Makes a terrain of a header. Nothing of it is here yet: until the root's page is, a view's update
+   returns E_PAGE.
+
+   field       NULL, or where it lies: spacing and origin; the rest is that of the header
+   memory      [memory_bytes] aligned to 8 bytes, at least terrimp_pages_bytes
+   terrain     out: lies in memory, as a copy of all that it needs of the header */
+TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
+                                              size_t bytes, uint32_t slot_count, void *memory,
+                                              size_t memory_bytes, terrimp_terrain **terrain);
+
+typedef enum terrimp_page_state {
+    TERRIMP_PAGE_ABSENT = 0,
+    TERRIMP_PAGE_COMING, /* begun, and neither put nor failed */
+    TERRIMP_PAGE_HERE,
+    TERRIMP_PAGE_STATE_COUNT
+} terrimp_page_state;
+
+/* Where a node's page stands. */
+typedef struct terrimp_page_info {
+    uint64_t offset; /* in the file */
+    uint32_t bytes;
+    uint32_t level;  /* of the node */
+    int state;       /* terrimp_page_state */
+    uint32_t slot;   /* unless it is absent */
+} terrimp_page_info;
+TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain, uint32_t node,
+                                                 terrimp_page_info *info);
+
+/* Finds a slot for a node's page, in the place of the one that was of no use for longest.
+
+   page        out: [bytes of the info] aligned to 8 bytes, to be filled, by any thread
+   Errors      E_STATE when it is here or coming, or its parent is not here: a page comes after its
+               parent's; E_CAPACITY when the frame uses all slots */
+TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page);
+
+/* Looks at a page that has been filled, and takes it if it is good. Else its slot is free again.
+
+   Errors      E_STATE when it has not been begun; E_BAKE when it is damaged, or another node's, or
+               another file's
+   Cost        O(samples), about 10 us */
+TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node);
+
+/* Gives the slot of a page back that has been begun: it could not be read, or is not wanted any
+   more. Nobody may fill it any longer. Errors: E_STATE when it has not been begun. */
+TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node);
+
+/* Begins a frame of all views of a terrain: what the frame before did not use may be given up. */
+TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain);
+
+/* Lists the pages that have been begun and that no view wanted in this frame and the one before.
+
+   nodes       [capacity] out, by slot; count: how many there are, also when they are more */
+TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
+                                                   uint32_t capacity, uint32_t *count);
+
+/* The height of a terrain, in pages or not, as terrimp_heightfield_height; the normal too.
+
+   height      out [wu]
+   normal      [3] out; NULL: not wanted
+   level       out: of the finest ground that is here, which has answered; 0 is the exact one. NULL:
+               only that will do, else E_PAGE */
+TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
+                                                  float *height, float normal[3], uint32_t *level);
+
+/* The first meeting of a ray and a terrain, in pages or not, as terrimp_heightfield_raycast.
+
+   hit         out; x and z count in samples of the terrain. NULL: not wanted
+   level       out: of the ground that was met, or when nothing was, the coarsest that was asked.
+               NULL: only level 0 will do, else E_PAGE */
+TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
+                                                   const float origin[3], const float direction[3],
+                                                   float max_distance, terrimp_ray_hit *hit,
+                                                   uint32_t *level);
+
 /* ==== Capture ============================================================ >>capture */
 
 /* Draw a ground node. */
@@ -1344,9 +1537,9 @@ typedef struct terrimp_view_desc {
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
-    const void *walls;      /* of the terrain's quadtree, aligned to 4, built, outliving the view:
-                               what lies behind a ridge is neither drawn nor captured. The view
-                               takes 28 KiB more [Default NULL -> nothing is hidden so] */
+    terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
+                               neither drawn nor captured: see terrimp_horizon, terrimp_sets
+                               [Default NULL -> nothing is hidden so] */
     uint32_t joined;        /* bit i: beyond side i (TERRIMP_SIDE_...) another terrain goes on, with
                                this one's border samples as its own: the floor is drawn for eyes
                                over that one, too, so that no sky shows between the two
@@ -1354,11 +1547,18 @@ typedef struct terrimp_view_desc {
     terrimp_costs costs;
 } terrimp_view_desc;
 
-/* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
-   texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
-   bilinear, divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a
-   picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
-   the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
+/* Draw a coarse mesh with its picture. With (s, t, r, q) the texture matrix times
+   (position - eye, 1), the colour is that of the atlas at (s / q, t / q), bilinear, divided by its
+   alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in two parts both
+   are drawn, each only where r / q is within 0..1: by a discard, or by the clip planes r >= 0 and
+   q - r >= 0, which are rows of the matrix.
+   Draw both sides of it, but in painter's order only counter-clockwise faces. Where the eye is
+   over the ground a side that is turned away shows the sky through, or else a hole is closed: a
+   ray that leaves the ground has come in, so where it leaves is terrain. A picture made from
+   elsewhere may be transparent at the ridge where it came in; then it goes on below the surface,
+   and out of the mesh: over its back, or below its border, through the skirt there, which reaches
+   from above all of the ground beside it to below (see terrimpi_mesh_skirt_foot); or it stays
+   down, and meets the floor. */
 typedef struct terrimp_impostor_command {
     uint32_t node, level, x, z;
     uint32_t part, part_count;
@@ -1421,6 +1621,7 @@ typedef struct terrimp_stats {
     uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
+    uint32_t late;               /* nodes and pictures that pages were missing for */
     float ground_tolerance_px;   /* what max_ground made of it */
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
@@ -1457,7 +1658,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
               atlas_count, max_impostors, max_ground and max_captures are those of before, or 0;
-              walls and exact_depth only if the view was made with them
+              exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1466,9 +1667,33 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
    perspective or orthographic cameras, and forgets its pictures from one kind to the other.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
-              more nodes in GEOMIP and AUTO even at 1000 px. The frame before stays
+              more nodes in GEOMIP and AUTO even at 1000 px; E_PAGE when the page of the root is not
+              here. The frame before stays
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
+
+/* Why a page is wanted. */
+typedef enum terrimp_want_reason {
+    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
+    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
+    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
+    TERRIMP_WANT_REASON_COUNT
+} terrimp_want_reason;
+
+typedef struct terrimp_want {
+    uint32_t node, level, bytes;
+    int reason;     /* terrimp_want_reason */
+    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
+} terrimp_want;
+
+/* The pages that the last update would have liked to have, best first, and no more than there are
+   slots for. None of them is here or coming, and the parents of all are here. Several views share a
+   terrain's pages: ask them all, and begin refuses what another has asked for.
+
+   wants      [capacity] out
+   count      out: how many */
+TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
+                                              uint32_t capacity, uint32_t *count);
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
@@ -2132,6 +2357,35 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 
 #endif /* TERRIMP_NO_MALLOC */
 
+/* --- materials --- */
+
+/* Where a material lies: weights over the whole terrain, as a texture that is clamped at its edges
+   and read bilinearly. */
+typedef struct terrimp_weights {
+    const uint8_t *texels; /* (required) */
+    uint32_t width, depth; /* in texels [Limits: 1..65536] */
+    size_t texel_bytes;    /* from one to the next [Default 0 -> 1] */
+    size_t row_bytes;      /* from row to row [Default 0 -> width * texel_bytes] */
+    int centred;           /* nonzero: the middles of the first and the last texel lie on the first
+                              and the last sample; else their outer edges do */
+} terrimp_weights;
+
+/* Finds which materials lie on each node: bit k of masks[node] for weights k. A pass that lacks its
+   bit has no weight on any pixel of the node and need not be drawn: every command says its node, on
+   the screen and in captures.
+
+   weights    [count]
+   count      [Limits: 1..32]
+   reach      [texels] of a read to both sides: 1 when it is bilinear; with mipmaps up to level m
+              1.5 times 2^m, so let the texture have no more of them [Limits: 1..65536]
+   masks      [node_count] out
+   Errors     E_NULL, E_RANGE, E_NOT_FINITE; nothing is written
+   Cost       O(count * texels)
+   Source     Wagner 2003, "Materials" */
+TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
+                                                  const terrimp_weights *weights, uint32_t count,
+                                                  float reach, uint32_t *masks);
+
 /* --- bake --- */
 
 /* The bytes of a terrain's bake; 0 when the terrain is NULL or not built, or for 4 GiB and more. */
@@ -2146,6 +2400,64 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes, int swapped);
+
+/* ==== Page builder ======================================================= >>page-builder */
+
+/* Makes the pages of the room Residency from samples that are larger than memory. The terrain is
+   built block by block, each in memory of its own, in any order, by any number of threads or
+   processes, to the same bytes; and the levels above the blocks, and the header, at last. What has
+   been written once need not be done again. Blocks stand one behind the other: those of a range
+   are one piece of the file.
+
+   In a block, and in a terrain of one block, all is what building in memory makes of it. Above the
+   blocks, ground and meshes are made of every 2^block_level-th sample, and their errors are those
+   against these, and what the blocks miss added. */
+typedef struct terrimp_pages_desc {
+    terrimp_terrain_desc terrain; /* (required) but its samples; U8, U16 or S16, without voids;
+                                     height_low and height_high have to be given */
+    uint32_t block_level;         /* blocks are the nodes of this level
+                                     [Default 0 -> 4; all for up to 4097 x 4097 samples] */
+    uint32_t stamp;               /* any number: it and the settings make the stamp of the pages */
+    void *user;                   /* the first argument of each of these; they return 0 for "no" */
+    int (*read)(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows, void *samples,
+                size_t row_bytes); /* (required) fills [rows][cols] samples from (x, z) on */
+    int (*load)(void *user, uint64_t offset, void *bytes, size_t count);        /* (required) ... */
+    int (*store)(void *user, uint64_t offset, const void *bytes, size_t count); /* of the file */
+} terrimp_pages_desc;
+
+/* Writes the effective descriptor, and how many blocks it makes. */
+TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *desc,
+                                                      terrimp_pages_desc *out,
+                                                      uint32_t *block_count);
+
+/* The part of the file that some blocks are: [offset, offset + bytes). Errors: E_RANGE when they
+   are not all there. */
+TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, uint32_t first_block,
+                                               uint32_t block_count, uint64_t *offset,
+                                               uint64_t *bytes);
+
+/* Bytes of scratch for one block, or for the end. 0 when the descriptor is wrong. 13 MiB for blocks
+   of level 4 in chunks of 64; for the end 520 bytes a block, and 2 for each of its samples. */
+TERRIMP_API size_t terrimp_pages_scratch_bytes(const terrimp_pages_desc *desc);
+
+/* Builds one block: reads it and 2^block_level samples round it, stores its pages, the topmost as
+   the last one.
+
+   scratch    [bytes] at least terrimp_pages_scratch_bytes, aligned to 8 bytes; not shared
+   Errors     E_PAGE when read or store says no; E_VOID; E_RANGE for a height outside of the range
+   Cost       that of terrimp_terrain_build_node for each of its nodes */
+TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *desc, uint32_t block,
+                                                     void *scratch, size_t bytes);
+
+/* Whether a block has been built: looks at its topmost page. Errors: E_PAGE when load says no;
+   E_BAKE when it is damaged, or of other settings. */
+TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
+                                                     uint32_t block, void *scratch, size_t bytes);
+
+/* Builds the levels above the blocks, then the header, from the blocks. Errors: E_PAGE when a
+   callback says no; E_BAKE for a damaged page. */
+TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,
+                                                   size_t bytes);
 
 /* ==== Visible sets ======================================================= >>visible-sets */
 
@@ -2167,6 +2479,29 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
    Cost       that of build_node for each: 0.05 ms for a chunk and all nodes above it */
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls);
+
+/* --- visible sets --- */
+
+/* Finds the codes of one cell, after terrimp_sets_init. Different cells may be built at the same
+   time by several threads.
+
+   sets       its codes of this cell are written
+   walls      [terrimp_walls_bytes] built
+   cell       [Limits: < nodes of cell_level]
+   samples    after an edit: only the nodes are found anew whose sight lines meet it; NULL: all
+   Errors     E_NULL; E_ALIGN; E_RANGE
+   Cost       10 ms for 256 nodes of 64 x 64 quads, 4 ms for those of 16 x 16
+   Source     Wagner 2003 asks for them; monotony in height, cuts and their proof are our own */
+TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, const void *walls,
+                                                   uint32_t cell, const terrimp_rect *samples);
+
+/* Forgets what an edit may have changed, in the frame of the edit: those nodes are not hidden any
+   more. Building its cells anew, at leisure, with the same rectangle, finds them again.
+
+   Errors     E_NULL; E_RANGE
+   Cost       20 ns for a cell and a node */
+TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
+                                              const terrimp_rect *samples);
 
 /* ==== Layer builder ====================================================== >>layer-builder */
 
@@ -4255,6 +4590,75 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
     return TERRIMP_OK;
 }
 
+/* ---- what is kept of it ---- */
+
+/* A place for a page, see the room Residency. */
+typedef struct terrimpi_page_slot {
+    uint32_t node;      /* whose page it has or waits for; node_count: none */
+    uint32_t used;      /* the last frame that had a use for it */
+    uint8_t is_here;    /* the page has come and is good */
+    uint8_t children;   /* nodes below that have a slot */
+} terrimpi_page_slot;
+
+struct terrimp_pages {
+    terrimpi_page_slot *slots; /* [slot_count] */
+    unsigned char *pages;      /* [slot_count][page_bytes] */
+    const unsigned char *root; /* the record of the root */
+    const float *lows;         /* heights of the floor's vertices */
+    uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
+    uint32_t slot_count, page_bytes, node_count;
+    uint32_t frame, block_level, stamp;
+};
+
+#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
+#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
+
+/* The page of a node, NULL when it is not here. */
+static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint32_t node)
+{
+    uint32_t slot = p->slot_of[node];
+    return slot && p->slots[slot - 1u].is_here ? p->pages + (size_t)(slot - 1u) * p->page_bytes
+                                               : NULL;
+}
+
+/* The record of a node: its parent's page has it. NULL when that is not here. */
+static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
+{
+    terrimp_node n;
+    const unsigned char *page;
+    if (number + 1u == t->node_count)
+        return t->pages->root;
+    n = terrimpi_tree_node(t, number);
+    page = terrimpi_page_of(t->pages, terrimpi_tree_parent(t, &n).number);
+    return page ? page + TERRIMPI_PAGE_CHILDREN +
+                      (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
+}
+
+/* What PICTURE asks of a node for those below it: the last number of its record. */
+static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
+{
+    return *(const float *)(const void *)(terrimpi_page_record(t, number) +
+                                          TERRIMPI_PAGE_RECORD - sizeof(float));
+}
+
+/* Heights and errors of a node. */
+static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtree *t,
+                                                            uint32_t number)
+{
+    return t->nodes ? t->nodes + number
+                    : (const struct terrimp_geomip_node *)(const void *)
+                          terrimpi_page_record(t, number);
+}
+
+/* Whether there is anything to be known of a tree's nodes. */
+static int terrimpi_tree_is_built(const terrimp_quadtree *t) { return t->nodes || t->pages; }
+
+/* Whether anything is known of a node's children. */
+static int terrimpi_tree_opens(const terrimp_quadtree *t, uint32_t number)
+{
+    return !t->pages || terrimpi_page_of(t->pages, number);
+}
+
 /* ---- its children, closest first ---- */
 
 /* The children of a node above level 0, in the order in which an eye comes upon them: none hides
@@ -4312,7 +4716,7 @@ static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_vi
 {
     terrimp_node children[4];
     uint32_t count;
-    if (visit->node.level == 0)
+    if (visit->node.level == 0 || !terrimpi_tree_opens(walk->tree, visit->node.number))
         return;
     count = terrimpi_tree_children(walk->tree, &visit->node, walk->eye, children);
     while (count > 0) {
@@ -4513,7 +4917,8 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 
 static void terrimpi_mip_box(const terrimp_quadtree *t, const terrimp_node *n, terrimp_box *box)
 {
-    terrimpi_tree_box(t, n, t->nodes[n->number].low, t->nodes[n->number].high, box);
+    const terrimp_geomip_node *kept = terrimpi_tree_kept(t, n->number);
+    terrimpi_tree_box(t, n, kept->low, kept->high, box);
 }
 
 /* The box within which a node's error holds: half a quad larger all round, for what finer
@@ -4533,8 +4938,9 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint
                                               terrimp_box *box)
 {
     terrimp_node n;
-    TERRIMPI_REFUSE(!tree || !box || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!tree || !box || !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_tree_kept(tree, node), TERRIMP_E_PAGE);
     n = terrimpi_tree_node(tree, node);
     terrimpi_mip_box(tree, &n, box);
     return TERRIMP_OK;
@@ -4580,8 +4986,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
 static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, uint32_t node,
                                    int rule, float tolerance_px, float pixel_factor)
 {
-    const terrimp_geomip_node *n = &t->nodes[node];
-    float d;
+    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
+    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
     if (level == 0)
         return 0.0f;
     if (rule == TERRIMP_GEOMIP_BOUND || rule == TERRIMP_GEOMIP_DISTANCE) {
@@ -4595,7 +5001,7 @@ static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, ui
            same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
            is equal over all nodes where rms * quad / d^2 is. */
         float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
-        d = n->rms * pixel_factor * (quad * pixel_factor) /
+        d = rms * pixel_factor * (quad * pixel_factor) /
             (tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
     }
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
@@ -4610,7 +5016,7 @@ static int terrimpi_mip_rule_fits(int rule)
 static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
-    TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!t || !terrimpi_tree_is_built(t), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(rule) ||
                     !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
@@ -4653,6 +5059,7 @@ typedef struct terrimpi_mip_frame {
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
     float relief;              /* what measures are multiplied with */
+    float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
@@ -4753,8 +5160,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp_node *node,
                                       int *planes)
 {
-    float d2, measure, split2 = f->view->distances[node->number];
+    float d2, measure, split2;
     terrimp_box box;
+    split2 = !f->tree->pages ? f->view->distances[node->number]
+                             : terrimpi_mip_distance(f->tree, node->level, node->number,
+                                                     f->view->rule, f->view->tolerance_px,
+                                                     f->factor);
     if (!(split2 > 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
@@ -4928,6 +5339,9 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     wanted[2] = v->morph_ratio;
     wanted[3] = v->rule == TERRIMP_GEOMIP_DISTANCE ? pixel_factor / f->cos2 : pixel_factor;
     wanted[4] = 1.0f + (float)(f->tree->edits & 0xffffffu);
+    f->factor = wanted[3];
+    if (f->tree->pages) /* they say what those below ask of them */
+        return;
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
@@ -5029,6 +5443,7 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
     terrimp_camera c;
     terrimp_result result;
     TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(tree->pages, TERRIMP_E_PAGE);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
     TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
@@ -5089,6 +5504,7 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *
     terrimp_node n;
     uint32_t i, j, i0, j0;
     TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(tree->pages, TERRIMP_E_PAGE);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     n = terrimpi_tree_node(tree, node);
     i0 = n.x * tree->chunk_quads;
@@ -6161,6 +6577,14 @@ typedef struct terrimpi_mesh_point_steps {
     float height;
 } terrimpi_mesh_point_steps;
 
+/* What a page's record has beside heights and errors of the ground, which it begins with. */
+typedef struct terrimpi_record {
+    terrimp_geomip_node ground;
+    terrimpi_mesh mesh;
+    float held; /* the largest of its rms and of half of what its children hold: what PICTURE asks
+                   of a node for those below it */
+} terrimpi_record;
+
 struct terrimp_terrain {
     uint32_t border_limit, vertex_limit, index_limit; /* of one surface; the last ones are kept */
     uint32_t vertex_stride, index_stride;  /* of the host's buffers */
@@ -6359,6 +6783,28 @@ static float terrimpi_terrain_z(const terrimp_terrain *t, uint32_t row)
     return terrimpi_tree_z(&t->tree, 0, row);
 }
 
+static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t node)
+{
+    if (t->meshes)
+        return &t->meshes[node];
+    return &((const terrimpi_record *)(const void *)terrimpi_page_record(&t->tree, node))->mesh;
+}
+
+/* The stored vertices of a node's mesh, and behind them the words with its indices. */
+static const uint32_t *terrimpi_points_of(const terrimp_terrain *t, uint32_t node)
+{
+    if (t->points)
+        return t->points + (size_t)node * t->vertex_limit;
+    return (const uint32_t *)(const void *)(terrimpi_page_of(t->tree.pages, node) +
+                                            TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD);
+}
+
+static const uint32_t *terrimpi_corners_of(const terrimp_terrain *t, uint32_t node)
+{
+    return t->corners ? t->corners + (size_t)node * (t->index_limit / 4u)
+                      : terrimpi_points_of(t, node) + t->vertex_limit;
+}
+
 static uint32_t terrimpi_mesh_triangles(const terrimpi_mesh *mesh)
 {
     return mesh->counts & 0x1ffu;
@@ -6394,8 +6840,8 @@ static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
                                                      const terrimpi_terrain_tile *p,
                                                      uint32_t node, uint32_t i)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node];
-    uint32_t word = t->points[(size_t)node * t->vertex_limit + i];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
+    uint32_t word = terrimpi_points_of(t, node)[i];
     terrimpi_mesh_point_steps point;
     point.x = word & 0xffu;
     point.z = word >> 8 & 0xffu;
@@ -6413,7 +6859,7 @@ static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
 /* Index i of a node's mesh. */
 static uint32_t terrimpi_mesh_corner(const terrimp_terrain *t, uint32_t node, uint32_t i)
 {
-    return t->corners[(size_t)node * (t->index_limit / 4u) + i / 4u] >> i % 4u * 8u & 0xffu;
+    return terrimpi_corners_of(t, node)[i / 4u] >> i % 4u * 8u & 0xffu;
 }
 
 /* Whether a range of heights does not overflow, nor squared errors that are summed up over all
@@ -6433,14 +6879,23 @@ static terrimp_result terrimpi_terrain_check_node(const terrimp_terrain *terrain
 {
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
-    return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(node >= terrain->tree.node_count, TERRIMP_E_RANGE);
+    return terrimpi_tree_kept(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
+}
+
+/* The same for what only a node's page has. */
+static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32_t node,
+                                          const void *out)
+{
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, out));
+    return terrimpi_tree_opens(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
 /* The box of a node: of everything drawn of it and of those below it. */
 static void terrimpi_terrain_node_box(const terrimp_terrain *t, const terrimp_node *node,
                                       terrimp_box *box)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node->number];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node->number);
     terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
 }
 
@@ -6454,14 +6909,25 @@ TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrai
     return TERRIMP_OK;
 }
 
+/* How many meshes the host's buffers have room for, and which place is a node's. */
+static uint32_t terrimpi_mesh_places(const terrimp_terrain *t)
+{
+    return t->tree.pages ? t->tree.pages->slot_count : t->tree.node_count;
+}
+
+static uint32_t terrimpi_mesh_at(const terrimp_terrain *t, uint32_t node)
+{
+    return t->tree.pages ? t->tree.pages->slot_of[node] - 1u : node;
+}
+
 /* Where a node's mesh stands in the host's buffers, and how good it is. */
 static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp_mesh_info *info)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
     uint32_t rim = t->desc.no_lower_skirts ? 0u : terrimpi_mesh_border(mesh);
-    info->base_vertex = node * t->vertex_stride;
+    info->base_vertex = terrimpi_mesh_at(t, node) * t->vertex_stride;
     info->vertex_count = terrimpi_mesh_vertices(mesh) + rim;
-    info->first_index = node * t->index_stride;
+    info->first_index = terrimpi_mesh_at(t, node) * t->index_stride;
     info->triangle_count = terrimpi_mesh_triangles(mesh);
     info->index_count = 3u * info->triangle_count + 6u * rim;
     info->error = mesh->error;
@@ -6471,7 +6937,7 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                     terrimp_mesh_info *mesh)
 {
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, mesh));
+    TERRIMPI_TRY(terrimpi_check_page(terrain, node, mesh));
     terrimpi_mesh_place(terrain, node, mesh);
     return TERRIMP_OK;
 }
@@ -6677,8 +7143,10 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->mesh_index_stride = terrain->index_stride;
     info->floor_vertex_count = terrimpi_floor_vertices(terrain);
     info->floor_index_count = terrimpi_floor_indices(terrain);
-    info->mesh_vertex_count = tree->node_count * terrain->vertex_stride + info->floor_vertex_count;
-    info->mesh_index_count = tree->node_count * terrain->index_stride + info->floor_index_count;
+    info->mesh_vertex_count =
+        terrimpi_mesh_places(terrain) * terrain->vertex_stride + info->floor_vertex_count;
+    info->mesh_index_count =
+        terrimpi_mesh_places(terrain) * terrain->index_stride + info->floor_index_count;
     info->mesh_triangle_count = terrain->mesh_triangle_count;
     root = terrimpi_tree_root(tree);
     terrimpi_terrain_node_box(terrain, &root, &info->box);
@@ -6708,12 +7176,52 @@ static size_t terrimpi_terrain_ground_vertices(const terrimp_terrain *t)
     return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
+/* The samples of a page, [chunk_quads + 1]^2 in 16 bits. */
+static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node)
+{
+    return terrimpi_corners_of(t, node) + t->index_limit / 4u;
+}
+
+/* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
+   is taken for a whole one. */
+static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_t node)
+{
+    terrimp_heightfield f = t->desc.field;
+    terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
+    f.samples = terrimpi_page_samples(t, node);
+    f.format = f.format == TERRIMP_FORMAT_S16 ? f.format : TERRIMP_FORMAT_U16;
+    f.row_bytes = 2u * (t->desc.chunk_quads + 1u);
+    f.origin_x = terrimpi_terrain_x(t, p.x);
+    f.origin_z = terrimpi_terrain_z(t, p.z);
+    f.spacing_x *= (float)(1u << p.level);
+    f.spacing_z *= (float)(1u << p.level);
+    f.width = p.cols;
+    f.depth = p.rows;
+    return f;
+}
+
+static void terrimpi_fill_page_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
+{
+    terrimp_heightfield f = terrimpi_page_field(t, node);
+    terrimp_node n = terrimpi_tree_node(&t->tree, node);
+    uint32_t quads = t->desc.chunk_quads, i, j;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++) {
+            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
+            *xyz++ = terrimpi_field_sample(&f, i, j);
+            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
+        }
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, xyz));
+    TERRIMPI_TRY(terrimpi_check_page(terrain, node, xyz));
     TERRIMPI_REFUSE(capacity < 3u * terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
-    return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
+    if (!terrain->tree.pages)
+        return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
+    terrimpi_fill_page_ground(terrain, node, xyz);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
@@ -6722,6 +7230,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       size_t capacity)
 {
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, vertices));
+    TERRIMPI_REFUSE(terrain->tree.pages, TERRIMP_E_PAGE);
     TERRIMPI_REFUSE(capacity < terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
 }
@@ -6733,14 +7242,16 @@ static void terrimpi_floor_write_ground(const terrimp_terrain *t, float *xyz, ui
 {
     uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
     uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level], x, z, i, k;
-    const terrimp_geomip_node *nodes = t->tree.nodes + t->tree.level_first[level];
+    const terrimp_geomip_node *nodes = t->tree.nodes;
     terrimpi_terrain_pattern all;
     for (z = 0; z <= deep; z++)
         for (x = 0; x <= wide; x++) {
             float low = TERRIMPI_FLOAT_MAX;
-            for (k = z ? z - 1u : 0; k <= terrimpi_min_u32(z, deep - 1u); k++)
+            for (k = z ? z - 1u : 0; nodes && k <= terrimpi_min_u32(z, deep - 1u); k++)
                 for (i = x ? x - 1u : 0; i <= terrimpi_min_u32(x, wide - 1u); i++)
-                    low = terrimpi_min(low, nodes[k * wide + i].low);
+                    low = terrimpi_min(low, nodes[t->tree.level_first[level] + k * wide + i].low);
+            if (!nodes)
+                low = t->tree.pages->lows[z * (wide + 1u) + x];
             *xyz++ = terrimpi_terrain_x(t, x * quads);
             *xyz++ = low;
             *xyz++ = terrimpi_terrain_z(t, z * quads);
@@ -6802,10 +7313,11 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
         terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
-        xyz[3u * k + 1u] = t->meshes[root.number].low;
+        xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
-        top[1] = terrimpi_min(terrimpi_terrain_lowest(t, before, at),
-                              terrimpi_terrain_lowest(t, at, after));
+        top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
+                               : terrimpi_min(terrimpi_terrain_lowest(t, before, at),
+                                              terrimpi_terrain_lowest(t, at, after));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
     for (i = first; i < terrimpi_floor_indices(t); i++)
@@ -6824,12 +7336,13 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
 static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
                                       uint32_t i)
 {
-    const terrimp_geomip_node *range = &t->tree.nodes[node];
-    uint32_t n = terrimpi_mesh_border(&t->meshes[node]);
+    const terrimp_geomip_node *range = terrimpi_tree_kept(&t->tree, node);
+    uint32_t n = terrimpi_mesh_border(terrimpi_mesh_of(t, node));
     float height = border[i * 3u + 1u];
     float lowest = terrimpi_min(border[(i + 1u) % n * 3u + 1u],
                                 border[(i + n - 1u) % n * 3u + 1u]);
-    float depth = terrimpi_max(2.0f * t->meshes[node].error, 0.25f * (range->high - range->low));
+    float depth = terrimpi_max(2.0f * terrimpi_mesh_of(t, node)->error,
+                               0.25f * (range->high - range->low));
     if (terrimpi_min(lowest, height) - depth <= range->low)
         return terrimpi_min(height, range->low);
     return height - depth;
@@ -6840,9 +7353,9 @@ static void terrimpi_mesh_write(const terrimp_terrain *t, uint32_t node, float *
                                 uint16_t *indices)
 {
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
-    uint32_t border = terrimpi_mesh_border(&t->meshes[node]), i;
-    uint32_t vertices = terrimpi_mesh_vertices(&t->meshes[node]);
-    uint32_t index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
+    uint32_t border = terrimpi_mesh_border(terrimpi_mesh_of(t, node)), i;
+    uint32_t vertices = terrimpi_mesh_vertices(terrimpi_mesh_of(t, node));
+    uint32_t index_count = 3u * terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     float *rim = xyz + (size_t)vertices * 3u;
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
@@ -6873,6 +7386,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     TERRIMPI_REFUSE(node > terrain->tree.node_count, TERRIMP_E_RANGE);
     is_floor = node == terrain->tree.node_count;
+    TERRIMPI_REFUSE(!is_floor && !terrimpi_tree_opens(&terrain->tree, node), TERRIMP_E_PAGE);
     vertices = is_floor ? terrimpi_floor_vertices(terrain) : terrain->vertex_stride;
     index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
     TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
@@ -6890,7 +7404,9 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
 {
     size_t node, vertex_stride, index_stride;
     TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, 0, xyz));
+    TERRIMPI_REFUSE(!terrain || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(terrain->tree.pages, TERRIMP_E_PAGE);
     vertex_stride = terrain->vertex_stride;
     index_stride = terrain->index_stride;
     node = terrain->tree.node_count;
@@ -7009,15 +7525,14 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
 /* ---- validation: nothing of a block is used before it has been looked at ---- */
 
 /* Fills in a terrain from a header in this machine's byte order: all but the arrays and the field's
-   samples. Returns 0 when the header is wrong or speaks of more bytes than there are. */
-static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp_terrain *t)
+   samples. Returns 0 when the header is wrong. */
+static int terrimpi_bake_header(const terrimpi_bake *bake, uint32_t version, terrimp_terrain *t)
 {
     static const float any = 0.0f; /* stands for the samples: they are not looked at */
     terrimp_terrain_desc desc;
-    size_t arrays;
     memset(t, 0, sizeof *t);
     memset(&desc, 0, sizeof desc);
-    if (bake->version != TERRIMP_BAKE_VERSION || bake->format == 0 ||
+    if (bake->version != version || bake->format == 0 ||
         bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
         bake->triangle_budget == 0 || bake->flags > 3u)
         return 0;
@@ -7034,11 +7549,7 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
     desc.height_low = bake->height_low;
     desc.height_high = bake->height_high;
-    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK)
-        return 0;
-    arrays = terrimpi_terrain_layout(t, NULL);
-    if (arrays == 0 || bytes < sizeof *bake || arrays != (size_t)bake->bytes - sizeof *bake ||
-        bake->bytes < sizeof *bake || bake->bytes > bytes)
+    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK || !terrimpi_terrain_count(t))
         return 0;
     t->mesh_triangle_count = bake->mesh_triangle_count;
     t->sample_low = bake->sample_low;
@@ -7051,6 +7562,14 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
            terrimpi_terrain_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
+/* Whether a header speaks of no more bytes than there are. */
+static int terrimpi_bake_bytes_fit(const terrimpi_bake *bake, size_t bytes, terrimp_terrain *t)
+{
+    size_t arrays = terrimpi_terrain_layout(t, NULL);
+    return arrays && bake->bytes >= sizeof *bake && bake->bytes <= bytes &&
+           arrays == (size_t)bake->bytes - sizeof *bake;
+}
+
 /* Sets the arrays of a terrain to those of a bake. Only reading functions touch them then. */
 static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
 {
@@ -7061,7 +7580,7 @@ static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
 static int terrimpi_bake_loop_ok(const terrimp_terrain *t, const terrimpi_terrain_tile *tile,
                                  uint32_t node)
 {
-    uint32_t i, count = terrimpi_mesh_border(&t->meshes[node]);
+    uint32_t i, count = terrimpi_mesh_border(terrimpi_mesh_of(t, node));
     uint32_t last_x = tile->cols - 1u, last_z = tile->rows - 1u;
     terrimpi_mesh_point_steps p = terrimpi_mesh_point(t, tile, node, 0), q;
     if (p.x != 0 || p.z != 0)
@@ -7098,7 +7617,7 @@ static uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
 static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                     uint32_t node)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
     int64_t all = 0;
     uint32_t i, k, edges = 0, border = terrimpi_mesh_border(mesh);
     for (i = 0; i < border; i++)
@@ -7128,8 +7647,8 @@ static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_ter
 /* Whether all numbers of one node are what building could have made. */
 static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
 {
-    const terrimp_geomip_node *ground = &t->tree.nodes[node];
-    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimp_geomip_node *ground = terrimpi_tree_kept(&t->tree, node);
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
     const float most = TERRIMPI_FLOAT_MAX;
     float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
     uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
@@ -7159,10 +7678,11 @@ static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
     uint32_t parent =
         node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
-    const terrimp_geomip_node *c = &t->tree.nodes[node], *p = &t->tree.nodes[parent];
+    const terrimp_geomip_node *c = terrimpi_tree_kept(&t->tree, node);
+    const terrimp_geomip_node *p = terrimpi_tree_kept(&t->tree, parent);
     return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
-           t->meshes[node].low >= t->meshes[parent].low &&
-           t->meshes[node].high <= t->meshes[parent].high;
+           terrimpi_mesh_of(t, node)->low >= terrimpi_mesh_of(t, parent)->low &&
+           terrimpi_mesh_of(t, node)->high <= terrimpi_mesh_of(t, parent)->high;
 }
 
 /* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
@@ -7178,7 +7698,9 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
     TERRIMPI_REFUSE(bytes < sizeof bake, TERRIMP_E_BAKE);
     memcpy(&bake, block, sizeof bake);
     TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_SWAPPED, TERRIMP_E_ORDER);
-    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, t) ||
+    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC ||
+                    !terrimpi_bake_header(&bake, TERRIMP_BAKE_VERSION, t) ||
+                    !terrimpi_bake_bytes_fit(&bake, bytes, t) ||
                     terrimpi_bake_hash(block) != bake.checksum, TERRIMP_E_BAKE);
     TERRIMPI_REFUSE(field && (field->width != f->width || field->depth != f->depth ||
                               field->format != f->format ||
@@ -7188,7 +7710,7 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
     for (node = 0; node < t->tree.node_count; node++) {
         if (!terrimpi_bake_node_ok(t, node) || !terrimpi_bake_parent_ok(t, node))
             return TERRIMP_E_BAKE;
-        triangles += terrimpi_mesh_triangles(&t->meshes[node]);
+        triangles += terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     }
     return triangles == t->mesh_triangle_count ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
@@ -7265,28 +7787,143 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 
 #define TERRIMPI_WALL_TOPS 4u      /* along a node's side: squares of which the height is kept */
 #define TERRIMPI_WALL_FINE 20.0f   /* quads of distance for each quad between walls */
-#define TERRIMPI_HORIZON_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
+#define TERRIMPI_STAND_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
 #define TERRIMPI_HORIZON_NONE -1e30f
 #define TERRIMPI_HORIZON_ALL 1e30f
 #define TERRIMPI_HORIZON_CLOSEST 0.25f /* [quads] of a wall: closer by, places are too rough */
 
+/* ---- where an eye is ---- */
+
+/* The last column, or row. */
+static uint32_t terrimpi_stand_last(const terrimp_quadtree *tree, uint32_t axis)
+{
+    return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
+}
+
+/* The highest that the ground can be within so many quads of the eye: of each quad the highest
+   corner or, if that is less, how far its triangles rise there. */
+static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *tree,
+                                const float reach[2])
+{
+    uint32_t from[2], to[2], k, i, j;
+    float top = TERRIMPI_HORIZON_NONE;
+    for (k = 0; k < 2u; k++) {
+        uint32_t last = terrimpi_stand_last(tree, k) - 1u;
+        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + s->rounding, 1e6f));
+        if (wide > TERRIMPI_STAND_CLIPPED)
+            return TERRIMPI_HORIZON_ALL;
+        from[k] = s->quad[k] - terrimpi_min_u32(wide, s->quad[k]);
+        to[k] = terrimpi_min_u32(s->quad[k] + wide, last);
+    }
+    for (j = from[1]; j <= to[1]; j++)
+        for (i = from[0]; i <= to[0]; i++) {
+            float a = terrimpi_field_sample(&tree->field, i, j), u, v, low, high;
+            float b = terrimpi_field_sample(&tree->field, i + 1u, j);
+            float c = terrimpi_field_sample(&tree->field, i, j + 1u);
+            float d = terrimpi_field_sample(&tree->field, i + 1u, j + 1u);
+            u = (float)((int32_t)s->quad[0] - (int32_t)i) + s->within[0];
+            v = (float)((int32_t)s->quad[1] - (int32_t)j) + s->within[1];
+            low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
+                  terrimpi_abs(d - b) * reach[1];
+            high = a + (d - c) * u + (c - a) * v + terrimpi_abs(d - c) * reach[0] +
+                   terrimpi_abs(c - a) * reach[1];
+            high = terrimpi_min(terrimpi_max(low, high),
+                                terrimpi_max(terrimpi_max(a, b), terrimpi_max(c, d)));
+            top = terrimpi_max(top, high);
+        }
+    return top;
+}
+
+/* Finds which sight lines may begin below the ground, for what is closer than z_near is not drawn.
+   Returns 0 when they all may. */
+static int terrimpi_stand_clip(terrimp_stand *s, const terrimp_quadtree *tree,
+                               const terrimp_capture *c)
+{
+    const terrimp_heightfield *field = &tree->field;
+    float x = terrimpi_max(c->tan_right, -c->tan_left), y = terrimpi_max(c->tan_up, -c->tan_down);
+    float reach = c->z_near * TERRIMP_SQRTF(1.0f + x * x + y * y), top = s->low, quads[2];
+    s->clipped[0] = quads[0] = reach / field->spacing_x;
+    s->clipped[1] = quads[1] = reach / field->spacing_z;
+    s->steepest = TERRIMPI_HORIZON_NONE;
+    if (tree->nodes[tree->node_count - 1u].high < s->eye - 2.0f * reach)
+        return 1;
+    top += terrimpi_stand_top(s, tree, quads) + 2.0f * s->error * reach;
+    if (top >= s->eye)
+        return 0;
+    if (top > s->eye - reach)
+        s->steepest = (top - s->eye) * terrimpi_min(field->spacing_x, field->spacing_z) / reach;
+    return 1;
+}
+
+/* By how many quads places may be off: two roundings of a float. */
+static float terrimpi_stand_rounding(const terrimp_quadtree *tree)
+{
+    const terrimp_heightfield *f = &tree->field;
+    float x = terrimpi_field_line(f->origin_x, f->spacing_x, f->width - 1u);
+    float z = terrimpi_field_line(f->origin_z, f->spacing_z, f->depth - 1u);
+    x = terrimpi_max(terrimpi_abs(f->origin_x), terrimpi_abs(x)) / f->spacing_x;
+    z = terrimpi_max(terrimpi_abs(f->origin_z), terrimpi_abs(z)) / f->spacing_z;
+    return 1e-6f + 1.2e-7f * terrimpi_max(x, z);
+}
+
+/* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
+static int terrimpi_stand_over(terrimp_stand *s, const terrimp_quadtree *tree, const float eye[3])
+{
+    const terrimp_heightfield *field = &tree->field;
+    float x, z;
+    if (!terrimpi_field_locate(field, eye[0], eye[2], &s->quad[0], &s->quad[1]))
+        return 0;
+    x = terrimpi_field_line(field->origin_x, field->spacing_x, s->quad[0]);
+    z = terrimpi_field_line(field->origin_z, field->spacing_z, s->quad[1]);
+    s->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
+    s->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
+    s->rounding = terrimpi_stand_rounding(tree);
+    return 1;
+}
+
+/* Looks at what a camera stands over. Returns 0 when nothing is hidden from it. */
+static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
+                                const terrimp_camera *camera, const terrimp_capture *capture,
+                                float error, float low)
+{
+    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    float ground;
+    s->eye = camera->eye[1];
+    s->error = error;
+    s->low = low + 4e-7f * (terrimpi_abs(s->eye) +
+                            terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
+    return !camera->orthographic && !(camera->reach > 0.0f) &&
+           terrimpi_stand_over(s, tree, camera->eye) &&
+           terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) ==
+               TERRIMP_OK &&
+           s->eye > ground + s->low && terrimpi_stand_clip(s, tree, capture);
+}
+
+/* Whether sight lines to a node whose lowest height is given could run below the ground where
+   z_near lets them begin. */
+static int terrimpi_stand_under(const terrimp_stand *s, float x, float z, float size, float low)
+{
+    float beside_x = terrimpi_max(terrimpi_max(x, -x - size), 0.0f);
+    float beside_z = terrimpi_max(terrimpi_max(z, -z - size), 0.0f);
+    return low - s->eye <= s->steepest * terrimpi_max(beside_x, beside_z);
+}
+
+/* ---- walls ---- */
+
 /* How the walls of a node are kept: the height of code 0 and the step of the codes, as floats;
    [2 axes][cells lines][cells] codes of lowest heights, rounded down; and those of the highest of
    each of 4 x 4 squares, rounded up. */
-typedef struct terrimpi_wall_form {
-    uint32_t quads, cells; /* of a cell at level 0, a power of two; along a side of a node */
-    uint32_t stride;       /* [bytes] from node to node */
-} terrimpi_wall_form;
-
-static terrimpi_wall_form terrimpi_wall_form_of(const terrimp_quadtree *tree)
+static terrimp_walls terrimpi_walls_of(const terrimp_quadtree *tree, const void *codes)
 {
-    terrimpi_wall_form form;
-    form.quads = tree->chunk_quads % 4u == 0 ? 4u : 2u;
-    form.cells = tree->chunk_quads / form.quads;
-    form.stride = 2u * (uint32_t)sizeof(float) + 2u * form.cells * form.cells +
-                  TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS;
-    form.stride = (form.stride + 3u) / 4u * 4u;
-    return form;
+    terrimp_walls w;
+    w.tree = tree;
+    w.codes = (const unsigned char *)codes;
+    w.quads = tree->chunk_quads % 4u == 0 ? 4u : 2u;
+    w.cells = tree->chunk_quads / w.quads;
+    w.stride = 2u * (uint32_t)sizeof(float) + 2u * w.cells * w.cells +
+               TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS;
+    w.stride = (w.stride + 3u) / 4u * 4u;
+    return w;
 }
 
 TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
@@ -7295,7 +7932,7 @@ TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
     int ok = 1;
     if (!tree)
         return 0;
-    bytes = terrimpi_mul(tree->node_count, terrimpi_wall_form_of(tree).stride, &ok);
+    bytes = terrimpi_mul(tree->node_count, terrimpi_walls_of(tree, NULL).stride, &ok);
     return ok ? bytes : 0;
 }
 
@@ -7307,28 +7944,52 @@ static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const v
 }
 
 /* The codes of a node's walls and the two floats before them. */
-static const unsigned char *terrimpi_wall_codes(const unsigned char *walls, uint32_t stride,
-                                                uint32_t node, float scale[2])
+static const unsigned char *terrimpi_walls_codes(const terrimp_walls *w, uint32_t node,
+                                                 float scale[2])
 {
-    const unsigned char *at = walls + (size_t)node * stride;
+    const unsigned char *at = w->codes + (size_t)node * w->stride;
     memcpy(scale, at, 2u * sizeof(float));
     return at + 2u * sizeof(float);
 }
 
-/* ---- walls as an eye sees them ---- */
-
-/* The last column, or row. */
-static uint32_t terrimpi_horizon_last(const terrimp_quadtree *tree, uint32_t axis)
+/* Those of its squares. */
+static const unsigned char *terrimpi_walls_tops(const terrimp_walls *w, uint32_t node,
+                                                float scale[2])
 {
-    return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
+    return terrimpi_walls_codes(w, node, scale) + 2u * w->cells * w->cells;
 }
+
+/* The lowest height of a wall of a level in the cells that quads i to j are in. The wall is told by
+   the node across the axis that it is in, and its row there. */
+static float terrimpi_walls_lowest(const terrimp_walls *w, uint32_t axis, uint32_t level,
+                                   uint32_t across, uint32_t row, uint32_t i, uint32_t j)
+{
+    uint32_t shift = level + w->quads / 2u; /* quads are 2 or 4 */
+    uint32_t cell = i >> shift, last = j >> shift, node = cell / w->cells;
+    uint32_t columns = w->tree->level_x[level];
+    float lowest = TERRIMPI_HORIZON_ALL, scale[2];
+    row = (axis * w->cells + row) * w->cells;
+    while (cell <= last) {
+        uint32_t end = terrimpi_min_u32(last + 1u, (node + 1u) * w->cells), lowest_code = 255u;
+        const unsigned char *codes = terrimpi_walls_codes(
+            w, w->tree->level_first[level] + (axis == 0 ? node * columns + across
+                                                        : across * columns + node), scale);
+        for (; cell < end; cell++)
+            lowest_code = terrimpi_min_u32(lowest_code, codes[row + cell - node * w->cells]);
+        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)lowest_code);
+        node++;
+    }
+    return lowest;
+}
+
+/* ---- walls as an eye sees them ---- */
 
 /* The sample where line `line` of an axis crosses line `other` of the other one. */
 static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
                                      uint32_t other)
 {
-    return axis == 0 ? terrimpi_field_sample(&h->tree->field, line, other)
-                     : terrimpi_field_sample(&h->tree->field, other, line);
+    return axis == 0 ? terrimpi_field_sample(&h->hider.tree->field, line, other)
+                     : terrimpi_field_sample(&h->hider.tree->field, other, line);
 }
 
 /* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
@@ -7346,29 +8007,6 @@ static float terrimpi_horizon_ground(const terrimp_horizon *h, uint32_t axis, ui
     return terrimpi_min(lowest, a + (b - a) * to);
 }
 
-/* The same from walls, of the cells that quads i to j are in. */
-static float terrimpi_horizon_walls(const terrimp_horizon *h, uint32_t axis,
-                                    const terrimp_horizon_step *step, uint32_t i, uint32_t j)
-{
-    uint32_t level = step->level - 1u, shift = level + h->quads / 2u; /* quads are 2 or 4 */
-    uint32_t cell = i >> shift, last = j >> shift, node = cell / h->cells;
-    uint32_t row = (axis * h->cells + step->row) * h->cells;
-    float lowest = TERRIMPI_HORIZON_ALL, scale[2];
-    while (cell <= last) {
-        uint32_t end = terrimpi_min_u32(last + 1u, (node + 1u) * h->cells), lowest_code = 255u;
-        const unsigned char *codes = terrimpi_wall_codes(
-            h->walls, h->stride,
-            h->tree->level_first[level] +
-                (axis == 0 ? node * h->tree->level_x[level] + step->node
-                           : step->node * h->tree->level_x[level] + node), scale);
-        for (; cell < end; cell++)
-            lowest_code = terrimpi_min_u32(lowest_code, codes[row + cell - node * h->cells]);
-        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)lowest_code);
-        node++;
-    }
-    return lowest;
-}
-
 /* What integer a float is at or above. */
 static int32_t terrimpi_horizon_floor(float value)
 {
@@ -7383,21 +8021,22 @@ static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, 
 {
     const float width = 2.0f / (float)TERRIMP_HORIZON_BINS;
     uint32_t axis = quarter / 2u, other = 1u - axis, i, j;
-    uint32_t quads = terrimpi_horizon_last(h->tree, other);
+    uint32_t quads = terrimpi_stand_last(h->hider.tree, other);
     float t = (float)bin * width - 1.0f, lowest, slope;
-    float from = h->within[other] + t * step->distance - h->rounding;
-    float to = h->within[other] + (t + width) * step->distance + h->rounding;
+    float from = h->stand.within[other] + t * step->distance - h->stand.rounding;
+    float to = h->stand.within[other] + (t + width) * step->distance + h->stand.rounding;
     int32_t first = terrimpi_horizon_floor(from), last = terrimpi_horizon_floor(to);
-    i = h->quad[other] + (uint32_t)first; /* below 0 it becomes large */
-    j = h->quad[other] + (uint32_t)last;
+    i = h->stand.quad[other] + (uint32_t)first; /* below 0 it becomes large */
+    j = h->stand.quad[other] + (uint32_t)last;
     if (i >= quads || j >= quads)
         return TERRIMPI_HORIZON_NONE;
     lowest = step->level == 0 ? terrimpi_horizon_ground(h, axis, step->line, i, from - (float)first,
                                                         j, to - (float)last)
-                              : terrimpi_horizon_walls(h, axis, step, i, j);
-    slope = (lowest - h->low - h->eye) * step->inverse;
-    return slope - h->error * (h->spread + terrimpi_abs(slope)) -
-           h->rounding * step->inverse * terrimpi_abs(slope);
+                              : terrimpi_walls_lowest(&h->walls, axis, step->level - 1u, step->node,
+                                                      step->row, i, j);
+    slope = (lowest - h->stand.low - h->stand.eye) * step->inverse;
+    return slope - h->stand.error * (h->spread + terrimpi_abs(slope)) -
+           h->stand.rounding * step->inverse * terrimpi_abs(slope);
 }
 
 /* Whether the horizon of a bin, made of what stands before a distance, is above what has a height
@@ -7457,8 +8096,8 @@ static void terrimpi_horizon_span(const terrimp_horizon *h, const terrimpi_horiz
         *leave = terrimpi_min(*leave, box->beside[1] * inverse[0]);
     if (!right && box->beside[0] < 0.0f)
         *leave = terrimpi_min(*leave, box->beside[0] * inverse[1]);
-    *enter = terrimpi_max(*enter - 2.0f * h->rounding, 0.0f);
-    *leave = terrimpi_max(*leave + 2.0f * h->rounding, *enter);
+    *enter = terrimpi_max(*enter - 2.0f * h->stand.rounding, 0.0f);
+    *leave = terrimpi_max(*leave + 2.0f * h->stand.rounding, *enter);
 }
 
 /* Whether the part of a box that one quarter sees is hidden. */
@@ -7514,38 +8153,28 @@ static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, floa
     return 1;
 }
 
-/* Whether sight lines to a node whose lowest height is given could run below the ground where
-   z_near lets them begin. */
-static int terrimpi_horizon_under(const terrimp_horizon *h, float x, float z, float size, float low)
-{
-    float beside_x = terrimpi_max(terrimpi_max(x, -x - size), 0.0f);
-    float beside_z = terrimpi_max(terrimpi_max(z, -z - size), 0.0f);
-    return low - h->eye <= h->steepest * terrimpi_max(beside_x, beside_z);
-}
-
 /* First the node as a whole; then, since its summit is seldom at its border, its squares, from the
    one that is closest to the eye. */
 static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
 {
-    const terrimp_geomip_node *heights = &h->tree->nodes[node->number];
-    uint32_t quads = h->tree->chunk_quads << node->level, k, first;
+    const terrimp_geomip_node *heights = &h->hider.tree->nodes[node->number];
+    uint32_t quads = h->hider.tree->chunk_quads << node->level, k, first;
     float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
-    float x = (float)((int32_t)(node->x * quads) - (int32_t)h->quad[0]) - h->within[0];
-    float z = (float)((int32_t)(node->z * quads) - (int32_t)h->quad[1]) - h->within[1];
+    float x = (float)((int32_t)(node->x * quads) - (int32_t)h->stand.quad[0]) - h->stand.within[0];
+    float z = (float)((int32_t)(node->z * quads) - (int32_t)h->stand.quad[1]) - h->stand.within[1];
     const unsigned char *tops;
-    if (h->blind || terrimpi_horizon_under(h, x, z, size, heights->low - raised))
+    if (h->blind || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
         return 0;
-    if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->eye))
+    if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->stand.eye))
         return 1;
-    tops = terrimpi_wall_codes(h->walls, h->stride, node->number, scale) +
-           2u * h->cells * h->cells;
+    tops = terrimpi_walls_tops(&h->walls, node->number, scale);
     first = (x + 0.5f * size < 0.0f ? 3u : 0u) | (z + 0.5f * size < 0.0f ? 12u : 0u);
     for (k = 0; k < TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
         uint32_t i = k ^ first;
-        float top = scale[0] + scale[1] * (float)tops[i] + raised + h->low;
+        float top = scale[0] + scale[1] * (float)tops[i] + raised + h->stand.low;
         if (!terrimpi_horizon_hides_box(h, x + part * (float)(i % TERRIMPI_WALL_TOPS),
                                         z + part * (float)(i / TERRIMPI_WALL_TOPS), part,
-                                        terrimpi_min(top, heights->high) - h->eye))
+                                        terrimpi_min(top, heights->high) - h->stand.eye))
             return 0;
     }
     return 1;
@@ -7554,9 +8183,10 @@ static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *n
 TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, float raised)
 {
     terrimp_node n;
-    if (!horizon || !horizon->tree || node >= horizon->tree->node_count || !(raised >= 0.0f))
+    if (!horizon || !horizon->hider.tree || node >= horizon->hider.tree->node_count ||
+        !(raised >= 0.0f))
         return 0;
-    n = terrimpi_tree_node(horizon->tree, node);
+    n = terrimpi_tree_node(horizon->hider.tree, node);
     return terrimpi_horizon_hides_node(horizon, &n, raised);
 }
 
@@ -7567,27 +8197,28 @@ TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, f
 static void terrimpi_horizon_lay_steps(terrimp_horizon *h, uint32_t quarter)
 {
     uint32_t axis = quarter / 2u, back = quarter & 1u, count = 0, apart = 1, level = 0;
-    uint32_t end = terrimpi_horizon_last(h->tree, axis); /* behind the last one there is nothing */
-    uint32_t line = h->quad[axis] + (back ? 0u : 1u);
+    uint32_t end = terrimpi_stand_last(h->hider.tree, axis); /* behind the last is nothing */
+    uint32_t line = h->stand.quad[axis] + (back ? 0u : 1u);
     while (line < end && count < TERRIMP_HORIZON_STEPS) {
         terrimp_horizon_step *step = &h->steps[quarter][count];
-        float ahead = (float)(back ? h->quad[axis] - line : line - h->quad[axis]);
-        step->distance = back ? ahead + h->within[axis] : ahead - h->within[axis];
+        float ahead = (float)(back ? h->stand.quad[axis] - line : line - h->stand.quad[axis]);
+        step->distance = back ? ahead + h->stand.within[axis] : ahead - h->stand.within[axis];
         step->line = line;
         step->level = (uint8_t)level;
         if (level > 0) {
             uint32_t row = line / apart;
-            step->node = (uint16_t)(row / h->cells);
-            step->row = (uint8_t)(row % h->cells);
+            step->node = (uint16_t)(row / h->walls.cells);
+            step->row = (uint8_t)(row % h->walls.cells);
         }
-        if (step->distance >= TERRIMPI_HORIZON_CLOSEST && step->distance >= h->clipped[axis]) {
+        if (step->distance >= TERRIMPI_HORIZON_CLOSEST &&
+            step->distance >= h->stand.clipped[axis]) {
             step->inverse = 1.0f / step->distance;
             count++;
         }
         while ((float)(2u * apart) * TERRIMPI_WALL_FINE <= step->distance &&
-               line % (2u * apart) == 0 && level < h->tree->level_count) {
+               line % (2u * apart) == 0 && level < h->hider.tree->level_count) {
             apart *= 2u;
-            level += apart >= h->quads ? 1u : 0u;
+            level += apart >= h->walls.quads ? 1u : 0u;
         }
         line = back ? line - apart : line + apart; /* from 0 it becomes large */
     }
@@ -7633,7 +8264,7 @@ static void terrimpi_horizon_empty(terrimp_horizon *h, uint32_t quarter, const f
 static void terrimpi_horizon_cone(const terrimp_horizon *h, const terrimp_capture *c,
                                   float ahead[2], float cone[2])
 {
-    const terrimp_heightfield *field = &h->tree->field;
+    const terrimp_heightfield *field = &h->hider.tree->field;
     uint32_t i;
     ahead[0] = c->forward[0] / field->spacing_x;
     ahead[1] = c->forward[2] / field->spacing_z;
@@ -7656,103 +8287,17 @@ static void terrimpi_horizon_cone(const terrimp_horizon *h, const terrimp_captur
     cone[1] += 1e-4f * (1.0f + terrimpi_abs(cone[1]));
 }
 
-/* The highest that the ground can be within so many quads of the eye: of each quad the highest
-   corner or, if that is less, how far its triangles rise there. */
-static float terrimpi_horizon_ground_top(const terrimp_horizon *h, const float reach[2])
-{
-    uint32_t from[2], to[2], k, i, j;
-    float top = TERRIMPI_HORIZON_NONE;
-    for (k = 0; k < 2u; k++) {
-        uint32_t last = terrimpi_horizon_last(h->tree, k) - 1u;
-        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + h->rounding, 1e6f));
-        if (wide > TERRIMPI_HORIZON_CLIPPED)
-            return TERRIMPI_HORIZON_ALL;
-        from[k] = h->quad[k] - terrimpi_min_u32(wide, h->quad[k]);
-        to[k] = terrimpi_min_u32(h->quad[k] + wide, last);
-    }
-    for (j = from[1]; j <= to[1]; j++)
-        for (i = from[0]; i <= to[0]; i++) {
-            float a = terrimpi_field_sample(&h->tree->field, i, j), u, v, low, high;
-            float b = terrimpi_field_sample(&h->tree->field, i + 1u, j);
-            float c = terrimpi_field_sample(&h->tree->field, i, j + 1u);
-            float d = terrimpi_field_sample(&h->tree->field, i + 1u, j + 1u);
-            u = (float)((int32_t)h->quad[0] - (int32_t)i) + h->within[0];
-            v = (float)((int32_t)h->quad[1] - (int32_t)j) + h->within[1];
-            low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
-                  terrimpi_abs(d - b) * reach[1];
-            high = a + (d - c) * u + (c - a) * v + terrimpi_abs(d - c) * reach[0] +
-                   terrimpi_abs(c - a) * reach[1];
-            high = terrimpi_min(terrimpi_max(low, high),
-                                terrimpi_max(terrimpi_max(a, b), terrimpi_max(c, d)));
-            top = terrimpi_max(top, high);
-        }
-    return top;
-}
-
-/* Finds which sight lines may begin below the ground, for what is closer than z_near is not drawn.
-   Returns 0 when they all may. */
-static int terrimpi_horizon_clip(terrimp_horizon *h, const terrimp_capture *c)
-{
-    const terrimp_heightfield *field = &h->tree->field;
-    float x = terrimpi_max(c->tan_right, -c->tan_left), y = terrimpi_max(c->tan_up, -c->tan_down);
-    float reach = c->z_near * TERRIMP_SQRTF(1.0f + x * x + y * y), top = h->low, quads[2];
-    h->clipped[0] = quads[0] = reach / field->spacing_x;
-    h->clipped[1] = quads[1] = reach / field->spacing_z;
-    h->steepest = TERRIMPI_HORIZON_NONE;
-    if (h->tree->nodes[h->tree->node_count - 1u].high < h->eye - 2.0f * reach)
-        return 1;
-    top += terrimpi_horizon_ground_top(h, quads) + 2.0f * h->error * reach;
-    if (top >= h->eye)
-        return 0;
-    if (top > h->eye - reach)
-        h->steepest = (top - h->eye) * terrimpi_min(field->spacing_x, field->spacing_z) / reach;
-    return 1;
-}
-
-/* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
-static int terrimpi_horizon_set_eye(terrimp_horizon *h, const float eye[3])
-{
-    const terrimp_heightfield *field = &h->tree->field;
-    float x, z, right, down;
-    if (!terrimpi_field_locate(field, eye[0], eye[2], &h->quad[0], &h->quad[1]))
-        return 0;
-    x = terrimpi_field_line(field->origin_x, field->spacing_x, h->quad[0]);
-    z = terrimpi_field_line(field->origin_z, field->spacing_z, h->quad[1]);
-    right = terrimpi_field_line(field->origin_x, field->spacing_x, field->width - 1u);
-    down = terrimpi_field_line(field->origin_z, field->spacing_z, field->depth - 1u);
-    h->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
-    h->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
-    x = terrimpi_max(terrimpi_abs(field->origin_x), terrimpi_abs(right)) / field->spacing_x;
-    z = terrimpi_max(terrimpi_abs(field->origin_z), terrimpi_abs(down)) / field->spacing_z;
-    h->rounding = 1e-6f + 1.2e-7f * terrimpi_max(x, z); /* two roundings of a float */
-    return 1;
-}
-
-static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *tree,
-                                   const void *walls, const terrimp_camera *camera, float error,
+static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_camera *camera, float error,
                                    float low)
 {
-    const terrimpi_wall_form form = terrimpi_wall_form_of(tree);
-    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    const terrimp_heightfield *field = &h->hider.tree->field;
     terrimp_capture capture;
-    float ahead[2], cone[2], ground;
+    float ahead[2], cone[2];
     uint32_t i;
-    h->tree = tree;
-    h->walls = (const unsigned char *)walls;
-    h->quads = form.quads;
-    h->cells = form.cells;
-    h->stride = form.stride;
-    h->eye = camera->eye[1];
-    h->error = error;
-    h->low = low + 4e-7f * (terrimpi_abs(h->eye) +
-                            terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
-    h->spread = TERRIMP_SQRTF(tree->field.spacing_x * tree->field.spacing_x +
-                              tree->field.spacing_z * tree->field.spacing_z);
+    h->spread = TERRIMP_SQRTF(field->spacing_x * field->spacing_x +
+                              field->spacing_z * field->spacing_z);
     terrimpi_camera_capture(camera, &capture);
-    h->blind = camera->orthographic || camera->reach > 0.0f ||
-               !terrimpi_horizon_set_eye(h, camera->eye) ||
-               terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) !=
-                   TERRIMP_OK || h->eye <= ground + h->low || !terrimpi_horizon_clip(h, &capture);
+    h->blind = !terrimpi_stand_begin(&h->stand, h->hider.tree, camera, &capture, error, low);
     if (h->blind)
         return;
     for (i = 0; i <= TERRIMP_HORIZON_BINS; i++)
@@ -7763,17 +8308,44 @@ static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *t
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
-                                                 const terrimp_quadtree *tree, const void *walls,
                                                  const terrimp_camera *camera, float error,
                                                  float low)
 {
     terrimp_camera c;
     TERRIMPI_REFUSE(!horizon, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_REFUSE(!terrimpi_finite2(error, low), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!terrimpi_within(error, 0.0f, 0.5f) || !(low >= 0.0f), TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
-    terrimpi_horizon_begin(horizon, tree, walls, &c, error, low);
+    terrimpi_horizon_begin(horizon, &c, error, low);
+    return TERRIMP_OK;
+}
+
+/* What a view calls. */
+static int terrimpi_horizon_hider_begin(terrimp_hider *hider, const terrimp_camera *camera,
+                                        float error, float low)
+{
+    terrimp_horizon *h = (terrimp_horizon *)(void *)hider;
+    terrimpi_horizon_begin(h, camera, error, low);
+    return !h->blind;
+}
+
+static int terrimpi_horizon_hider_hides(terrimp_hider *hider, const terrimp_node *node)
+{
+    terrimp_horizon *h = (terrimp_horizon *)(void *)hider;
+    return terrimpi_horizon_hides_node(h, node, h->stand.low);
+}
+
+TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls)
+{
+    TERRIMPI_REFUSE(!horizon, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    memset(horizon, 0, sizeof *horizon);
+    horizon->hider.tree = tree;
+    horizon->hider.begin = terrimpi_horizon_hider_begin;
+    horizon->hider.hides = terrimpi_horizon_hider_hides;
+    horizon->walls = terrimpi_walls_of(tree, walls);
+    horizon->blind = 1;
     return TERRIMP_OK;
 }
 
@@ -7835,18 +8407,18 @@ static void terrimpi_horizon_draws_error(const terrimp_quadtree *tree,
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
-                                                const terrimp_quadtree *tree, const void *walls,
                                                 const terrimp_camera *camera,
                                                 terrimp_geomip_view *view)
 {
+    const terrimp_quadtree *tree;
     terrimp_camera c;
     float error, low;
     uint32_t i, count = 0;
     TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    tree = horizon->hider.tree;
     terrimpi_horizon_draws_error(tree, view, c.eye, &error, &low);
-    terrimpi_horizon_begin(horizon, tree, walls, &c, terrimpi_min(error, 0.5f), low);
+    terrimpi_horizon_begin(horizon, &c, terrimpi_min(error, 0.5f), low);
     horizon->blind |= error > 0.5f;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
@@ -7858,6 +8430,705 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
     }
     view->draw_count = count;
     return TERRIMP_OK;
+}
+
+/* ---- visible sets ---- */
+
+/* Heights over a cell's lowest ground have codes of 5 bits of a number and 3 of its exponent, up to
+   TERRIMPI_SETS_UNITS. */
+#define TERRIMPI_SETS_UNITS 4032.0f
+
+static float terrimpi_sets_height(const terrimp_sets *s, float ground, uint32_t code)
+{
+    uint32_t units = code < 32u ? code : (32u + code % 32u) << (code / 32u - 1u);
+    return ground + s->reach * (1.0f / TERRIMPI_SETS_UNITS) * (float)units;
+}
+
+/* The largest code of a height that is not above `y`. */
+static uint32_t terrimpi_sets_code(const terrimp_sets *s, float ground, float y)
+{
+    uint32_t code = 0, bit;
+    for (bit = 128u; bit > 0; bit >>= 1)
+        if (terrimpi_sets_height(s, ground, code + bit) <= y)
+            code += bit;
+    return code;
+}
+
+static uint32_t terrimpi_sets_level_nodes(const terrimp_quadtree *tree, uint32_t level)
+{
+    return tree->level_first[level + 1u] - tree->level_first[level];
+}
+
+/* What ground and nodes may be off their samples, with the rounding of heights [wu]. */
+static float terrimpi_sets_low(const terrimp_sets *s)
+{
+    const terrimp_geomip_node *all = &s->hider.tree->nodes[s->hider.tree->node_count - 1u];
+    float most = terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high));
+    return s->low + 1e-6f * (2.0f * most + s->reach);
+}
+
+static int terrimpi_sets_begin(terrimp_hider *hider, const terrimp_camera *camera, float error,
+                               float low)
+{
+    terrimp_sets *s = (terrimp_sets *)(void *)hider;
+    const terrimp_quadtree *tree = hider->tree;
+    uint32_t quads = tree->chunk_quads << s->cell_level;
+    terrimp_capture capture;
+    terrimp_node cell;
+    terrimpi_camera_capture(camera, &capture);
+    if (error > s->error || !terrimpi_stand_begin(&s->stand, tree, camera, &capture, error, low) ||
+        s->stand.low > terrimpi_sets_low(s))
+        return 0;
+    cell = terrimpi_tree_at(tree, s->cell_level, s->stand.quad[0] / quads,
+                            s->stand.quad[1] / quads);
+    s->row = s->codes + (size_t)(cell.number - tree->level_first[cell.level]) *
+                            terrimpi_sets_level_nodes(tree, s->node_level);
+    s->code = terrimpi_sets_code(s, tree->nodes[cell.number].low, s->stand.eye);
+    return 1;
+}
+
+/* A node is hidden when all those of the table's level in it are. */
+static int terrimpi_sets_hides(terrimp_hider *hider, const terrimp_node *node)
+{
+    const terrimp_sets *s = (const terrimp_sets *)(void *)hider;
+    const terrimp_quadtree *tree = hider->tree;
+    uint32_t columns = tree->level_x[s->node_level], rows = tree->level_z[s->node_level];
+    uint32_t quads = tree->chunk_quads << node->level, shift, x, z;
+    if (node->level < s->node_level)
+        return 0; /* then so was what it is in */
+    shift = node->level - s->node_level;
+    for (z = node->z << shift; z < (node->z + 1u) << shift && z < rows; z++)
+        for (x = node->x << shift; x < (node->x + 1u) << shift && x < columns; x++)
+            if (s->row[z * columns + x] <= s->code)
+                return 0;
+    return !terrimpi_stand_under(
+        &s->stand, (float)((int32_t)(node->x * quads) - (int32_t)s->stand.quad[0]) -
+                       s->stand.within[0],
+        (float)((int32_t)(node->z * quads) - (int32_t)s->stand.quad[1]) - s->stand.within[1],
+        (float)quads, tree->nodes[node->number].low - s->stand.low);
+}
+
+TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets)
+{
+    size_t bytes;
+    int ok = 1;
+    if (!tree || !sets || sets->cell_level >= tree->level_count ||
+        sets->node_level >= tree->level_count)
+        return 0;
+    bytes = terrimpi_mul(terrimpi_sets_level_nodes(tree, sets->cell_level),
+                         terrimpi_sets_level_nodes(tree, sets->node_level), &ok);
+    return ok ? bytes : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree)
+{
+    const terrimp_geomip_node *all;
+    TERRIMPI_REFUSE(!sets || !tree || !tree->nodes || !sets->codes, TERRIMP_E_NULL);
+    all = &tree->nodes[tree->node_count - 1u];
+    TERRIMPI_REFUSE(!terrimpi_finite2(sets->error, sets->low) || !terrimpi_finite(sets->reach),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(terrimp_sets_bytes(tree, sets) == 0 || !(sets->low >= 0.0f) ||
+                    !terrimpi_within(sets->error, 0.0f, 0.5f) || !(sets->reach >= 0.0f),
+                    TERRIMP_E_RANGE);
+    TERRIMPI_DEFAULT(sets->reach, 3.0f * (all->high - all->low));
+    sets->hider.tree = tree;
+    sets->hider.begin = terrimpi_sets_begin;
+    sets->hider.hides = terrimpi_sets_hides;
+    sets->hider.blind = 1;
+    return TERRIMP_OK;
+}
+
+/* ==== Residency ========================================================== >>impl-residency */
+/* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
+   terrain only while it is made).
+
+   The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
+   is known of a node hangs on its parent's page alone. */
+
+#define TERRIMPI_PAGES_MAGIC 0x54494d51u
+#define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
+
+/* What a page begins with; then come the records of the children, vertices and indices of the mesh
+   and the samples. */
+typedef struct terrimpi_page_head {
+    uint32_t checksum; /* of all behind it */
+    uint32_t stamp, node;
+    terrimpi_record record;
+} terrimpi_page_head;
+
+/* What a file begins with; then come the heights of the floor. */
+typedef struct terrimpi_pages_head {
+    terrimpi_bake bake; /* of no arrays: bytes are those of the header */
+    uint32_t block_level, stamp;
+    terrimpi_record root;
+} terrimpi_pages_head;
+
+static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
+{
+    uint32_t side = t->desc.chunk_quads + 1u;
+    uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
+                     t->index_limit + 2u * side * side;
+    return (bytes + 15u) / 16u * 16u;
+}
+
+/* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
+   its top down, and on each level four children side by side ---- */
+
+/* Nodes of so many levels of a full tree, from the root down. */
+static uint32_t terrimpi_page_full(uint32_t levels) { return ((1u << 2u * levels) - 1u) / 3u; }
+
+/* Interleaves the bits of a column and a row. */
+static uint32_t terrimpi_page_interleave(uint32_t x, uint32_t z)
+{
+    uint32_t bit, out = 0;
+    for (bit = 0; bit < 16u; bit++)
+        out |= (x >> bit & 1u) << 2u * bit | (z >> bit & 1u) << (2u * bit + 1u);
+    return out;
+}
+
+/* Pages above the blocks. */
+static uint32_t terrimpi_page_upper(const terrimp_quadtree *t, uint32_t block_level)
+{
+    return t->node_count - t->level_first[block_level + 1u];
+}
+
+static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_level,
+                                     const terrimp_node *n)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t index = n->number - tree->level_first[block_level + 1u];
+    if (n->level <= block_level) {
+        uint32_t up = block_level - n->level, mask = (1u << up) - 1u;
+        index = terrimpi_page_upper(tree, block_level) +
+                ((n->z >> up) * tree->level_x[block_level] + (n->x >> up)) *
+                    terrimpi_page_full(block_level + 1u) +
+                terrimpi_page_full(up) + terrimpi_page_interleave(n->x & mask, n->z & mask);
+    }
+    return TERRIMP_PAGES_HEADER_BYTES + (uint64_t)index * terrimpi_page_bytes(t);
+}
+
+/* ---- the header ---- */
+
+static int terrimpi_record_ok(const terrimpi_record *r)
+{
+    const float most = TERRIMPI_FLOAT_MAX;
+    return terrimpi_within(r->ground.error, 0.0f, most) &&
+           terrimpi_within(r->ground.rms, 0.0f, most) &&
+           terrimpi_within(r->held, r->ground.rms, most) &&
+           terrimpi_within(r->mesh.error, 0.0f, most) &&
+           terrimpi_within(r->mesh.error_rms, 0.0f, most) &&
+           terrimpi_within(r->mesh.low, -most, most) &&
+           terrimpi_within(r->mesh.high, r->mesh.low, most) &&
+           terrimpi_within(r->ground.low, r->mesh.low, r->mesh.high) &&
+           terrimpi_within(r->ground.high, r->ground.low, r->mesh.high);
+}
+
+/* Reads a header into a terrain, all but its memory. */
+static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terrimp_terrain *t,
+                                          terrimpi_pages_head *head)
+{
+    const unsigned char *lows = (const unsigned char *)header + sizeof *head;
+    uint32_t i;
+    TERRIMPI_REFUSE(!header, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(bytes < TERRIMP_PAGES_HEADER_BYTES, TERRIMP_E_BAKE);
+    memcpy(head, header, sizeof *head);
+    TERRIMPI_REFUSE(head->bake.magic == TERRIMPI_PAGES_MAGIC_SWAPPED, TERRIMP_E_ORDER);
+    TERRIMPI_REFUSE(head->bake.magic != TERRIMPI_PAGES_MAGIC ||
+                    head->bake.bytes != TERRIMP_PAGES_HEADER_BYTES ||
+                    terrimpi_bake_hash(header) != head->bake.checksum ||
+                    !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
+                    t->desc.field.format == TERRIMP_FORMAT_F32 ||
+                    head->block_level >= t->tree.level_count ||
+                    terrimpi_page_upper(&t->tree, head->block_level) +
+                        (uint64_t)t->tree.level_x[head->block_level] *
+                            t->tree.level_z[head->block_level] *
+                            terrimpi_page_full(head->block_level + 1u) > 0xffffffffu ||
+                    !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
+    for (i = 0; i < terrimpi_floor_ground_vertices(t) + terrimpi_floor_wall_points(t); i++) {
+        float height;
+        memcpy(&height, lows + i * sizeof height, sizeof height);
+        TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_BAKE);
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
+                                               terrimp_pages_info *info)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    terrimp_node last;
+    uint32_t edge;
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    if (!info)
+        return TERRIMP_OK;
+    edge = (1u << head.block_level) - 1u;
+    last = terrimpi_tree_at(&t.tree, head.block_level, t.tree.level_x[head.block_level] - 1u,
+                            t.tree.level_z[head.block_level] - 1u);
+    last.level = 0; /* the last node of a block, whether there is one or not */
+    last.x = (last.x << head.block_level) + edge;
+    last.z = (last.z << head.block_level) + edge;
+    memset(info, 0, sizeof *info);
+    info->page_bytes = terrimpi_page_bytes(&t);
+    info->bytes = terrimpi_page_offset(&t, head.block_level, &last) + info->page_bytes;
+    info->width = t.desc.field.width;
+    info->depth = t.desc.field.depth;
+    info->chunk_quads = t.desc.chunk_quads;
+    info->level_count = t.tree.level_count;
+    info->node_count = t.tree.node_count;
+    info->block_level = head.block_level;
+    info->stamp = head.stamp;
+    info->height_scale = t.desc.field.height_scale;
+    info->height_offset = t.desc.field.height_offset;
+    return TERRIMP_OK;
+}
+
+/* The one description of the block: sets the arrays when there is a base. */
+static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pages *p,
+                                    unsigned char *base, unsigned char **head)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    terrimpi_take(&b, 1, sizeof *t);
+    terrimpi_take(&b, 1, sizeof *p);
+    *head = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
+    p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
+    p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
+    p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
+    return b.ok ? b.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *none;
+    if (!terrimpi_within_u32(slot_count, 8u, 65534u) ||
+        terrimpi_pages_read(header, bytes, &t, &head) != TERRIMP_OK)
+        return 0;
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    return terrimpi_pages_layout(&t, &p, NULL, &none);
+}
+
+TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
+                                              size_t bytes, uint32_t slot_count, void *memory,
+                                              size_t memory_bytes, terrimp_terrain **terrain)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *copy;
+    uint32_t i;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    TERRIMPI_REFUSE(!terrimpi_within_u32(slot_count, 8u, 65534u), TERRIMP_E_RANGE);
+    memset(&p, 0, sizeof p);
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    p.node_count = t.tree.node_count;
+    p.block_level = head.block_level;
+    p.stamp = head.stamp;
+    p.frame = 2;
+    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
+                                      terrimpi_pages_layout(&t, &p, NULL, &copy)));
+    if (field) {
+        terrimp_heightfield place = *field;
+        place.samples = header;
+        place.width = t.desc.field.width;
+        place.depth = t.desc.field.depth;
+        place.format = t.desc.field.format;
+        place.row_bytes = 0;
+        place.height_scale = t.desc.field.height_scale;
+        place.height_offset = t.desc.field.height_offset;
+        TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
+    }
+    t.desc.field.samples = NULL; /* there are none but those of pages */
+    t.desc.field.has_no_data = t.desc.field.wrap = 0;
+    t.tree.field = t.desc.field;
+    t.begun = t.built = t.baked = 1;
+    terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
+    memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
+    memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
+    p.root = copy + offsetof(terrimpi_pages_head, root);
+    p.lows = (const float *)(const void *)(copy + sizeof head);
+    for (i = 0; i < slot_count; i++)
+        p.slots[i].node = p.node_count;
+    t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
+    *t.tree.pages = p;
+    *(terrimp_terrain *)memory = t;
+    *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+/* ---- pages come and go ---- */
+
+static terrimp_result terrimpi_page_check(const terrimp_terrain *t, uint32_t node, const void *out)
+{
+    TERRIMPI_REFUSE(!t || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!t->tree.pages, TERRIMP_E_STATE);
+    return node < t->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
+}
+
+/* The slot of a node, NULL when it has none. */
+static terrimpi_page_slot *terrimpi_page_slot_of(const struct terrimp_pages *p, uint32_t node)
+{
+    return p->slot_of[node] ? p->slots + p->slot_of[node] - 1u : NULL;
+}
+
+/* The slot of a node's parent; NULL for the root. */
+static terrimpi_page_slot *terrimpi_page_above(const terrimp_quadtree *t, uint32_t node)
+{
+    return node + 1u < t->node_count
+               ? terrimpi_page_slot_of(t->pages, terrimpi_tree_parent_number(t, node)) : NULL;
+}
+
+TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain, uint32_t node,
+                                                 terrimp_page_info *info)
+{
+    const terrimpi_page_slot *slot;
+    terrimp_node n;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, info));
+    slot = terrimpi_page_slot_of(terrain->tree.pages, node);
+    n = terrimpi_tree_node(&terrain->tree, node);
+    info->offset = terrimpi_page_offset(terrain, terrain->tree.pages->block_level, &n);
+    info->bytes = terrain->tree.pages->page_bytes;
+    info->level = n.level;
+    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->is_here ? TERRIMP_PAGE_HERE
+                                                              : TERRIMP_PAGE_COMING;
+    info->slot = slot ? (uint32_t)(slot - terrain->tree.pages->slots) : 0u;
+    return TERRIMP_OK;
+}
+
+/* Whether a slot may be given up: it has a page that this frame does not use, nor has the one
+   before, and no page below it. The root stays. */
+static int terrimpi_page_is_spare(const struct terrimp_pages *p, const terrimpi_page_slot *slot)
+{
+    return slot->is_here && slot->children == 0 && slot->used + 1u < p->frame &&
+           slot->node + 1u < p->node_count;
+}
+
+static void terrimpi_page_clear(const terrimp_quadtree *t, terrimpi_page_slot *slot)
+{
+    terrimpi_page_slot *above = terrimpi_page_above(t, slot->node);
+    if (above)
+        above->children--;
+    t->pages->slot_of[slot->node] = 0;
+    slot->node = t->node_count;
+    slot->is_here = 0;
+}
+
+TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page)
+{
+    struct terrimp_pages *p;
+    terrimpi_page_slot *above, *found = NULL, *slot;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, page));
+    p = terrain->tree.pages;
+    above = terrimpi_page_above(&terrain->tree, node);
+    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && (!above || !above->is_here)),
+                    TERRIMP_E_STATE);
+    for (slot = p->slots; slot < p->slots + p->slot_count; slot++) {
+        if (slot->node == p->node_count) {
+            found = slot;
+            break;
+        }
+        if (slot != above && terrimpi_page_is_spare(p, slot) &&
+            (!found || slot->used < found->used))
+            found = slot;
+    }
+    TERRIMPI_REFUSE(!found, TERRIMP_E_CAPACITY);
+    if (found->node < p->node_count)
+        terrimpi_page_clear(&terrain->tree, found);
+    if (above)
+        above->children++;
+    found->node = node;
+    found->used = p->frame;
+    found->is_here = found->children = 0;
+    p->slot_of[node] = (uint16_t)(found - p->slots + 1);
+    *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
+    return TERRIMP_OK;
+}
+
+/* The slot of a page that has been begun; NULL: it has not. */
+static terrimpi_page_slot *terrimpi_page_begun(const terrimp_terrain *t, uint32_t node)
+{
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(t->tree.pages, node);
+    return slot && !slot->is_here ? slot : NULL;
+}
+
+/* Whether the records of a node's children are held by its own. */
+static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
+                                     const terrimpi_record *own)
+{
+    uint32_t i;
+    for (i = 0; i < 4u && n->level > 0; i++) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimpi_record r;
+        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
+                       i * TERRIMPI_PAGE_RECORD, sizeof r);
+        if (!terrimpi_record_ok(&r) || r.ground.low < own->ground.low ||
+            r.ground.high > own->ground.high || r.ground.error > own->ground.error ||
+            r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
+            0.5f * r.held > own->held)
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether a page that has just come is that of its node, and all numbers of it are what building
+   could have made. */
+static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
+{
+    const struct terrimp_pages *p = t->tree.pages;
+    const unsigned char *page = terrimpi_page_of(p, node);
+    terrimpi_page_head head;
+    terrimpi_field_scan scan;
+    terrimp_heightfield f = terrimpi_page_field(t, node);
+    terrimp_node n = terrimpi_tree_node(&t->tree, node);
+    uint32_t at, hash = 2166136261u, word;
+    memcpy(&head, page, sizeof head);
+    for (at = 4u; at < p->page_bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    if (head.checksum != hash || head.stamp != p->stamp || head.node != node ||
+        memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
+        !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
+        return 0;
+    scan.skip_voids = 0;
+    return terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan) == TERRIMP_OK &&
+           terrimpi_field_world_height(&f, scan.low) >= head.record.ground.low &&
+           terrimpi_field_world_height(&f, scan.high) <= head.record.ground.high;
+}
+
+TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
+{
+    terrimpi_page_slot *slot;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
+    slot = terrimpi_page_begun(terrain, node);
+    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    slot->is_here = 1; /* to be looked at */
+    slot->used = terrain->tree.pages->frame;
+    if (terrimpi_page_ok(terrain, node))
+        return TERRIMP_OK;
+    terrimpi_page_clear(&terrain->tree, slot);
+    return TERRIMP_E_BAKE;
+}
+
+TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
+{
+    terrimpi_page_slot *slot;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
+    slot = terrimpi_page_begun(terrain, node);
+    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    terrimpi_page_clear(&terrain->tree, slot);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain)
+{
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, terrain));
+    terrain->tree.pages->frame++;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
+                                                   uint32_t capacity, uint32_t *count)
+{
+    const struct terrimp_pages *p;
+    uint32_t i;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
+    TERRIMPI_REFUSE(!nodes && capacity > 0, TERRIMP_E_NULL);
+    p = terrain->tree.pages;
+    *count = 0;
+    for (i = 0; i < p->slot_count; i++) {
+        const terrimpi_page_slot *slot = &p->slots[i];
+        if (slot->node == p->node_count || slot->is_here || slot->used + 1u >= p->frame)
+            continue;
+        if (*count < capacity)
+            nodes[*count] = slot->node;
+        ++*count;
+    }
+    return TERRIMP_OK;
+}
+
+/* ---- what a frame uses ---- */
+
+static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
+{
+    terrimpi_page_slot *slot = t->pages ? terrimpi_page_slot_of(t->pages, node) : NULL;
+    if (slot)
+        slot->used = t->pages->frame;
+}
+
+/* Whether a node may be left for its children: its page is here, and of these each in sight. */
+static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
+                                 const terrimp_frustum *frustum)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t i;
+    int all = 1;
+    if (!tree->pages)
+        return 1;
+    if (!terrimpi_page_of(tree->pages, node->number))
+        return 0;
+    terrimpi_page_use(tree, node->number);
+    for (i = 0; i < 4u && node->level > 0; i++) {
+        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
+        terrimp_node child;
+        terrimp_box box;
+        if (!terrimpi_tree_has(tree, node->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(tree, node->level - 1u, x, z);
+        terrimpi_terrain_node_box(t, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        terrimpi_page_use(tree, child.number);
+        all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+    }
+    return all;
+}
+
+/* ---- heights and rays ---- */
+
+/* The finest page that is here at a position. */
+static terrimp_node terrimpi_page_at(const terrimp_terrain *t, float x, float z)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    terrimp_node n = terrimpi_tree_root(tree);
+    while (n.level > 0) {
+        uint32_t level = n.level - 1u, quads = tree->chunk_quads, i, j;
+        terrimp_node child;
+        i = 2u * n.x + (x >= terrimpi_tree_x(tree, level, (2u * n.x + 1u) * quads) ? 1u : 0u);
+        j = 2u * n.z + (z >= terrimpi_tree_z(tree, level, (2u * n.z + 1u) * quads) ? 1u : 0u);
+        child = terrimpi_tree_at(tree, level, terrimpi_min_u32(i, tree->level_x[level] - 1u),
+                                 terrimpi_min_u32(j, tree->level_z[level] - 1u));
+        if (!terrimpi_page_of(tree->pages, child.number))
+            break;
+        n = child;
+    }
+    return n;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
+                                                  float *height, float normal[3], uint32_t *level)
+{
+    terrimp_heightfield f;
+    terrimp_node n;
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
+                                             height));
+    f = terrain->desc.field;
+    memset(&n, 0, sizeof n);
+    if (terrain->tree.pages) {
+        const terrimp_quadtree *tree = &terrain->tree;
+        TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!terrimpi_within(x, f.origin_x, terrimpi_tree_x(tree, 0, f.width - 1u)) ||
+                        !terrimpi_within(z, f.origin_z, terrimpi_tree_z(tree, 0, f.depth - 1u)),
+                        TERRIMP_E_MISS);
+        n = terrimpi_page_at(terrain, x, z);
+        TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, n.number) || (n.level > 0 && !level),
+                        TERRIMP_E_PAGE);
+        f = terrimpi_page_field(terrain, n.number);
+    }
+    TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
+    if (normal)
+        TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
+    if (level)
+        *level = n.level;
+    return TERRIMP_OK;
+}
+
+/* Whether a ray comes into the columns and rows of a box before a distance. The direction's length
+   is 1. */
+static int terrimpi_page_on_way(const terrimp_box *box, const float origin[3],
+                                const float direction[3], float distance)
+{
+    float from = 0.0f, to = distance;
+    int i;
+    for (i = 0; i < 3; i++) {
+        float slack = 1e-5f * (terrimpi_abs(box->min[i]) + terrimpi_abs(box->max[i]) +
+                               terrimpi_abs(origin[i]));
+        float low = box->min[i] - origin[i] - slack, high = box->max[i] - origin[i] + slack;
+        if (direction[i] > -1e-12f && direction[i] < 1e-12f) {
+            if (low > 0.0f || high < 0.0f)
+                return 0;
+            continue;
+        }
+        from = terrimpi_max(from, (direction[i] > 0.0f ? low : high) / direction[i]);
+        to = terrimpi_min(to, (direction[i] > 0.0f ? high : low) / direction[i]);
+    }
+    return from <= to;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
+                                                   const float origin[3], const float direction[3],
+                                                   float max_distance, terrimp_ray_hit *hit,
+                                                   uint32_t *level)
+{
+    const terrimp_quadtree *tree;
+    terrimp_ray_hit best, found;
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
+    float way[3], reach = max_distance;
+    uint32_t of = 0, coarsest = 0;
+    int is_met = 0;
+    TERRIMPI_REFUSE(!terrain || !origin || !direction, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    tree = &terrain->tree;
+    if (!tree->pages) {
+        if (level)
+            *level = 0;
+        return terrimp_heightfield_raycast(&terrain->desc.field, origin, direction, max_distance,
+                                           hit);
+    }
+    TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, tree->node_count - 1u), TERRIMP_E_PAGE);
+    memcpy(way, direction, sizeof way);
+    TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
+                    !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_normalize(way), TERRIMP_E_RANGE);
+    memset(&best, 0, sizeof best);
+    terrimpi_tree_begin(&walk, tree, origin, 0);
+    while (terrimpi_tree_next(&walk, &v)) {
+        terrimp_node children[4];
+        terrimp_heightfield f;
+        terrimp_box box;
+        uint32_t i, count = 0;
+        terrimpi_mip_box(tree, &v.node, &box);
+        if (!terrimpi_page_of(tree->pages, v.node.number) ||
+            !terrimpi_page_on_way(&box, origin, way, reach))
+            continue;
+        if (v.node.level > 0) /* those on the ray's way must all be here to answer for it */
+            count = terrimpi_tree_children(tree, &v.node, origin, children);
+        for (i = 0; i < count; i++) {
+            terrimpi_mip_box(tree, &children[i], &box);
+            if (!terrimpi_page_of(tree->pages, children[i].number) &&
+                terrimpi_page_on_way(&box, origin, way, reach))
+                break;
+        }
+        if (count > 0 && i == count) {
+            terrimpi_tree_enter(&walk, &v);
+            continue;
+        }
+        TERRIMPI_REFUSE(v.node.level > 0 && !level, TERRIMP_E_PAGE);
+        coarsest = terrimpi_max_u32(coarsest, v.node.level);
+        f = terrimpi_page_field(terrain, v.node.number);
+        if (terrimp_heightfield_raycast(&f, origin, direction, max_distance, &found) !=
+                TERRIMP_OK || (is_met && found.distance >= best.distance))
+            continue;
+        is_met = 1;
+        best = found;
+        of = v.node.level;
+        reach = found.distance;
+        best.x = (v.node.x * tree->chunk_quads + found.x) << of;
+        best.z = (v.node.z * tree->chunk_quads + found.z) << of;
+    }
+    if (level)
+        *level = is_met ? of : coarsest;
+    if (hit && is_met)
+        *hit = best;
+    return is_met ? TERRIMP_OK : TERRIMP_E_MISS;
 }
 
 /* ==== Capture ============================================================ >>impl-capture */
@@ -7926,7 +9197,8 @@ static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], cons
     return 1;
 }
 
-/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
+/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. Negative
+   when a page is missing that would tell it. */
 static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const terrimp_node *node,
                                            uint32_t level)
 {
@@ -7935,21 +9207,31 @@ static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const t
     uint32_t z1 = terrimpi_min_u32((node->z + 1u) << shift, tree->level_z[level]);
     float worst = 0.0f;
     for (z = node->z << shift; z < z1; z++)
-        for (x = node->x << shift; x < x1; x++)
-            worst = terrimpi_max(worst, tree->nodes[tree->level_first[level] +
-                                                    z * tree->level_x[level] + x].rms);
+        for (x = node->x << shift; x < x1; x++) {
+            const terrimp_geomip_node *kept = terrimpi_tree_kept(
+                tree, tree->level_first[level] + z * tree->level_x[level] + x);
+            if (!kept)
+                return -1.0f;
+            worst = terrimpi_max(worst, kept->rms);
+        }
     return worst;
 }
 
 /* The level of the ground that a picture is made of: the coarsest whose rms error [wu] keeps to a
-   limit. */
+   limit; or that of which this is not known yet, when *is_known becomes 0: pages of that level are
+   missing, and it needs them in any case. */
 static uint32_t terrimpi_capture_source(const terrimp_quadtree *tree, const terrimp_node *node,
-                                        float limit)
+                                        float limit, int *is_known)
 {
     uint32_t level = node->level;
-    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES &&
-           terrimpi_capture_source_error(tree, node, level) > limit)
+    float error = 0.0f;
+    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES) {
+        error = terrimpi_capture_source_error(tree, node, level);
+        if (!(error > limit))
+            break;
         level--;
+    }
+    *is_known = error >= 0.0f;
     return level;
 }
 
@@ -8014,7 +9296,8 @@ static float terrimpi_capture_overlap(const terrimp_terrain *t, const terrimpi_c
 {
     const terrimp_capture *c = &plan->camera;
     float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
-    return terrimpi_min(TERRIMPI_CAPTURE_OVERLAP * t->meshes[plan->node.number].error * c->z_far /
+    return terrimpi_min(TERRIMPI_CAPTURE_OVERLAP *
+                            terrimpi_mesh_of(t, plan->node.number)->error * c->z_far /
                             terrimpi_max(drop, 1e-20f),
                         c->z_far);
 }
@@ -8208,6 +9491,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
+#define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
 #define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... the share of it after which the first are due */
@@ -8299,12 +9584,6 @@ static float terrimpi_view_distance(const terrimpi_frame *f, const terrimp_box *
     return terrimpi_max(0.0f, terrimp_box_distance(box, f->eye) - f->camera.reach);
 }
 
-#ifndef TERRIMP_NO_HORIZON
-#define TERRIMPI_CULL_HAS_HORIZON 1
-#else
-#define TERRIMPI_CULL_HAS_HORIZON 0
-#endif
-
 /* ---- settings ---- */
 
 /* Impostors of a mode. */
@@ -8380,6 +9659,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                                                      terrimp_view_desc *out)
 {
     terrimp_view_desc d;
+    const terrimp_hider *hider;
     uint32_t chunks;
     TERRIMPI_REFUSE(!terrain || !desc || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
@@ -8402,8 +9682,11 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
-    TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
+    for (hider = d.hider; hider; hider = hider->next)
+        TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
+                        TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(terrain->tree.pages &&
+                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.hider), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8436,7 +9719,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
-        TERRIMPI_TROUBLE(terrimp_view_desc, walls),
+        TERRIMPI_TROUBLE(terrimp_view_desc, hider),
         TERRIMPI_TROUBLE(terrimp_view_desc, joined),
         TERRIMPI_TROUBLE(terrimp_view_desc, costs)
     };
@@ -8666,7 +9949,8 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
-    TERRIMPI_CULL_IMPOSTOR = 2  /* the impostor cut does */
+    TERRIMPI_CULL_IMPOSTOR = 2, /* the impostor cut does, */
+    TERRIMPI_CULL_SHORT = 4     /* ... only because pages of its children are missing */
 };
 
 /* A node in sight. */
@@ -8685,27 +9969,30 @@ typedef struct terrimpi_cull {
     uint32_t capacity, count;
     uint32_t ground_count, impostor_count; /* with TERRIMPI_CULL_GROUND, _IMPOSTOR */
     uint32_t hidden_count;
-    terrimp_horizon *horizon;  /* NULL: without walls there is none */
+    terrimp_hider *hider;      /* in use; NULL: none */
 } terrimpi_cull;
 
 /* Whether a node is hidden. What hides nodes has its place here: nodes come closest first. */
-static int terrimpi_cull_hides(terrimpi_cull *cull, int behind, const terrimpi_frame *f,
+static int terrimpi_cull_hides(terrimpi_cull *cull, const terrimpi_frame *f,
                                const terrimp_node *node, int *planes, terrimp_box *box)
 {
+    terrimp_hider *hider;
     terrimpi_terrain_node_box(f->terrain, node, box);
     if (*planes)
         *planes = terrimp_frustum_test(&f->frustum, box, *planes);
     if (*planes == TERRIMP_PLANES_OUTSIDE)
         return 1;
-    if (!TERRIMPI_CULL_HAS_HORIZON || !behind ||
-        !terrimpi_horizon_hides_node(cull->horizon, node, cull->horizon->low))
-        return 0;
-    cull->hidden_count++;
-    return 1;
+    for (hider = cull->hider; hider; hider = hider->next)
+        if (!hider->blind && hider->hides(hider, node)) {
+            cull->hidden_count++;
+            return 1;
+        }
+    return 0;
 }
 
 /* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
-   that has a picture keeps its place for a little longer. */
+   that has a picture keeps its place for a little longer. Where pages of its children are missing
+   it has to, with TERRIMPI_CULL_SHORT. */
 static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *node, float closest,
                                   int has_picture)
 {
@@ -8723,7 +10010,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    return closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side);
+    if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
+        return 1;
+    return terrimpi_page_divides(f->terrain, node, &f->frustum) ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -8761,7 +10050,7 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
                               const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
                               float closest, int *done)
 {
-    int cuts = 0;
+    int cuts = 0, impostor;
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
@@ -8769,10 +10058,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
             terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
-    if (!(*done & TERRIMPI_CULL_IMPOSTOR) &&
-        terrimpi_cull_impostor(f, node, closest,
-                               cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE)) {
-        cuts |= TERRIMPI_CULL_IMPOSTOR;
+    if (*done & TERRIMPI_CULL_IMPOSTOR)
+        return cuts;
+    impostor = terrimpi_cull_impostor(f, node, closest, cache->of_node[node->number] !=
+                                                            TERRIMPI_CACHE_NO_PICTURE);
+    if (impostor) {
+        cuts |= TERRIMPI_CULL_IMPOSTOR | (impostor & TERRIMPI_CULL_SHORT);
         *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     return cuts;
@@ -8789,8 +10080,7 @@ static size_t terrimpi_cull_capacity(const terrimp_quadtree *tree, size_t cuts)
 /* Lists the nodes in sight. Which cuts a node lies below goes down the tree beside its planes.
    Returns 0 when there is more ground than may be. */
 static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
-                              const terrimpi_cache *cache, const terrimpi_mip_frame *mip,
-                              int behind)
+                              const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
     const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
     terrimpi_tree_walk walk;
@@ -8801,7 +10091,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         terrimpi_cull_node *n = &cull->nodes[cull->count];
         int planes = v.planes % below, done = v.planes / below;
         terrimp_box box;
-        if (terrimpi_cull_hides(cull, behind, f, &v.node, &planes, &box))
+        if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
         if (cull->count++ == cull->capacity)
             return 0;
@@ -8824,13 +10114,13 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
     return 1;
 }
 
-/* Begins the horizon, with the ground that a walk without it has listed. That ground may be off its
+/* Begins what hides nodes, with the ground that a walk without it has listed. That may be off its
    samples both where it hides and where it is hidden, so its error counts twice. A border that a
    node draws as its coarser neighbour does is no closer than that neighbour, whose error over its
    distance is here too. What a picture shows is off its place by the parallax error. */
-static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimpi_frame *f,
-                                        int full)
+static void terrimpi_cull_begin_hiders(const terrimpi_cull *cull, const terrimpi_frame *f, int full)
 {
+    terrimp_hider *hider;
     const terrimp_quadtree *tree = &f->terrain->tree;
     float side = (float)tree->chunk_quads *
                  terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
@@ -8848,21 +10138,22 @@ static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimp
     }
     if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_NEVER)
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
-    terrimpi_horizon_begin(cull->horizon, tree, f->desc->walls, &f->camera,
-                           terrimpi_min(2.0f * error, 0.5f), low);
-    cull->horizon->blind |= 2.0f * error > 0.5f;
+    for (hider = f->desc->hider; hider; hider = hider->next)
+        hider->blind = 2.0f * error > 0.5f || !hider->begin(hider, &f->camera, 2.0f * error, low);
 }
 
-/* Lists the nodes in sight, without those behind ridges. */
+/* Lists the nodes in sight, without those that are hidden. */
 static int terrimpi_cull_list(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
-    if (!TERRIMPI_CULL_HAS_HORIZON || !cull->horizon)
-        return terrimpi_cull_walk(cull, f, cache, mip, 0);
-    if (mip && !terrimpi_cull_walk(cull, f, cache, mip, 0))
-        return 0;
-    terrimpi_cull_begin_horizon(cull, f, !mip);
-    return terrimpi_cull_walk(cull, f, cache, mip, !cull->horizon->blind);
+    cull->hider = NULL;
+    if (f->desc->hider) {
+        if (mip && !terrimpi_cull_walk(cull, f, cache, mip))
+            return 0;
+        terrimpi_cull_begin_hiders(cull, f, !mip);
+        cull->hider = f->desc->hider;
+    }
+    return terrimpi_cull_walk(cull, f, cache, mip);
 }
 
 /* ---- what things cost ---- */
@@ -8905,13 +10196,14 @@ static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
 static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node *node,
-                                     float closest)
+                                     float closest, int *is_known)
 {
+    *is_known = 1;
     if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
-                                       (f->pixel_factor * f->desc->texels_per_px));
+                                       (f->pixel_factor * f->desc->texels_per_px), is_known);
 }
 
 /* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
@@ -9009,7 +10301,9 @@ typedef struct terrimpi_candidate {
     float urgency;              /* error of its picture over the tolerance */
     float life;                 /* [frames] that a new picture would last */
     float draw_cost, capture_cost;
-    int rank;                   /* among the captures of this frame, */
+    uint8_t is_short;           /* it stands for those below, whose pages are missing */
+    uint8_t is_known;           /* what of the ground it would show */
+    uint16_t rank;              /* among the captures of this frame, */
     float weight;               /* ... and within its rank */
     terrimpi_cache_picture *picture;  /* or NULL */
 } terrimpi_candidate;
@@ -9076,6 +10370,8 @@ struct terrimp_view {
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
+    terrimp_want *wants;           /* [want_limit] of a terrain in pages */
+    uint32_t want_count, want_limit, late;
     uint32_t open;                 /* 1 + the job of which pieces are missing */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
@@ -9141,7 +10437,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     if (v->desc.exact_depth)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
-    v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
+    v->want_limit = v->terrain->tree.pages ? TERRIMPI_VIEW_WANTS : 0u;
+    v->wants = (terrimp_want *)terrimpi_take(&l, v->want_limit, sizeof *v->wants);
+    v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
+                                                 sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
     v->cull.capacity = (uint32_t)terrimpi_cull_capacity(&v->terrain->tree, ground + impostors);
     captures = terrimpi_arena_at(NULL);
@@ -9157,9 +10456,6 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
     v->draws = (terrimpi_view_draw *)terrimpi_take(&l, ground + impostors + 1u, sizeof *v->draws);
-    v->cull.horizon = NULL;
-    if (v->desc.walls)
-        v->cull.horizon = (terrimp_horizon *)terrimpi_take(&l, 1, sizeof *v->cull.horizon);
     return l.ok && slots ? l.bytes : 0;
 }
 
@@ -9220,7 +10516,7 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
-                    d.max_captures != has->max_captures || (d.walls && !view->cull.horizon) ||
+                    d.max_captures != has->max_captures ||
                     (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
@@ -9368,6 +10664,193 @@ TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float di
     return TERRIMP_OK;
 }
 
+/* ---- the pages that are missing ---- */
+
+/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
+static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
+{
+    if (a->urgency > b->urgency || a->urgency < b->urgency)
+        return a->urgency > b->urgency;
+    return a->level != b->level ? a->level > b->level : a->node < b->node;
+}
+
+/* Notes that a page is of use in this frame. If it is missing it is wanted; or the one above it
+   that has to come first. */
+static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int reason,
+                               float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    terrimp_node n = *node, above;
+    terrimp_want want, *worst = v->wants;
+    uint32_t i;
+    while (n.level + 1u < t->level_count && !t->pages->slot_of[n.number]) {
+        above = terrimpi_tree_parent(t, &n);
+        terrimpi_page_use(t, above.number); /* or it might be given up for this */
+        if (terrimpi_page_of(t->pages, above.number))
+            break;
+        n = above;
+    }
+    terrimpi_page_use(t, n.number);
+    if (t->pages->slot_of[n.number])
+        return;
+    want.node = n.number;
+    want.level = n.level;
+    want.bytes = t->pages->page_bytes;
+    want.reason = reason;
+    want.urgency = urgency;
+    for (i = 0; i < v->want_count; i++) {
+        if (v->wants[i].node == n.number) {
+            if (terrimpi_want_before(&want, &v->wants[i]))
+                v->wants[i] = want;
+            return;
+        }
+        if (terrimpi_want_before(worst, &v->wants[i]))
+            worst = &v->wants[i];
+    }
+    if (v->want_count < v->want_limit)
+        v->wants[v->want_count++] = want;
+    else if (terrimpi_want_before(&want, worst))
+        *worst = want;
+}
+
+/* The same for the children of a node that are in sight, and the node itself. */
+static void terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
+                                        const terrimp_node *node, int reason, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    uint32_t i;
+    if (!t->pages)
+        return;
+    terrimpi_view_want(v, node, reason, urgency);
+    if (!terrimpi_page_of(t->pages, node->number))
+        return;
+    for (i = 0; i < 4u && node->level > 0; i++) {
+        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
+        terrimp_node child;
+        terrimp_box box;
+        if (!terrimpi_tree_has(t, node->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(t, node->level - 1u, x, z);
+        terrimpi_terrain_node_box(v->terrain, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+            terrimpi_view_want(v, &child, reason, urgency);
+    }
+}
+
+/* Whether the nodes exist that have to beside and above one that is split. */
+static int terrimpi_view_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
+{
+    terrimp_node beyond;
+    int side;
+    if (node->level + 1u == mip->tree->level_count)
+        return 1;
+    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
+        return 0;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
+            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
+            return 0;
+    return 1;
+}
+
+/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
+   neighbours still differ by one level at most. All that the split would need is wanted. */
+static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
+                                 const terrimpi_mip_frame *mip)
+{
+    const terrimp_quadtree *t = mip->tree;
+    uint32_t level, number;
+    v->want_count = v->late = 0;
+    if (!t->pages)
+        return;
+    terrimpi_page_use(t, t->node_count - 1u);
+    for (level = t->level_count; level-- > 1u;)
+        for (number = mip->first[level]; number != t->node_count;
+             number = v->ground.marks[number].next) {
+            terrimp_geomip_mark *mark = &v->ground.marks[number];
+            terrimp_node node = terrimpi_tree_node(t, number);
+            if (mark->measure < 1.0f)
+                continue;
+            terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
+                                        TERRIMP_SQRTF(mark->measure));
+            if (terrimpi_view_has_around(mip, &node) &&
+                terrimpi_page_divides(v->terrain, &node, &f->frustum))
+                continue;
+            mark->measure = 0.0f;
+            v->late++;
+        }
+}
+
+/* Asks for the pages that ground will need soon, as the eye goes on. */
+static void terrimpi_view_look_ahead(terrimp_view *v, const terrimpi_frame *f,
+                                     const terrimpi_mip_frame *mip)
+{
+    const float *away = f->motion.away[0];
+    float frames = f->motion.frames[0] > 0.0f ? TERRIMPI_VIEW_SOON / f->motion.frames[0] : 0.0f;
+    uint32_t i, k;
+    if (!mip->tree->pages || f->desc->no_lookahead || !(terrimpi_length(away) > 0.0f))
+        return;
+    for (i = 0; i < v->ground.draw_count; i++) {
+        const terrimp_node *node = &v->ground.draws[i].node;
+        int planes = 0;
+        float measure, now, soon, eye[3];
+        terrimp_box box;
+        if (node->level == 0)
+            continue;
+        measure = terrimpi_mip_split_ratio(mip, node, &planes);
+        terrimpi_terrain_node_box(v->terrain, node, &box);
+        for (k = 0; k < 3u; k++)
+            eye[k] = f->eye[k] + away[k] * frames;
+        now = terrimp_box_distance(&box, f->eye);
+        soon = terrimp_box_distance(&box, eye);
+        if (measure * now * now >= soon * soon)
+            terrimpi_view_want_children(v, &f->frustum, node, TERRIMP_WANT_AHEAD,
+                                        0.99f * terrimpi_min(measure, 1.0f));
+    }
+}
+
+/* Whether all pages are here that a capture draws; those that are not are wanted. */
+static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
+                                   uint32_t count, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    uint32_t i;
+    int all = 1;
+    for (i = 0; i < count && t->pages; i++) {
+        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
+        terrimpi_view_want(v, &node, urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE,
+                           terrimpi_min(urgency, 2.0f));
+        all &= terrimpi_page_of(t->pages, node.number) != NULL;
+    }
+    v->late += all ? 0u : 1u;
+    return all;
+}
+
+TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
+                                              uint32_t capacity, uint32_t *count)
+{
+    uint32_t i, k, gap, room = 0;
+    const struct terrimp_pages *p;
+    TERRIMPI_REFUSE(!view || !count || (!wants && capacity > 0), TERRIMP_E_NULL);
+    *count = 0;
+    p = view->terrain->tree.pages;
+    if (!p)
+        return TERRIMP_OK;
+    for (gap = view->want_count / 2u; gap > 0; gap /= 2u)
+        for (i = gap; i < view->want_count; i++) {
+            terrimp_want moved = view->wants[i];
+            for (k = i; k >= gap && terrimpi_want_before(&moved, &view->wants[k - gap]); k -= gap)
+                view->wants[k] = view->wants[k - gap];
+            view->wants[k] = moved;
+        }
+    for (i = 0; i < p->slot_count; i++)
+        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
+    *count = terrimpi_min_u32(terrimpi_min_u32(view->want_count, room), capacity);
+    for (i = 0; i < *count; i++)
+        wants[i] = view->wants[i];
+    return TERRIMP_OK;
+}
+
 /* ---- the regions ---- */
 
 /* Makes the ground draw of a node in the ground cut. */
@@ -9408,6 +10891,7 @@ static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_
             memset(c, 0, sizeof *c);
             c->node = node;
             c->closest = nodes[i].closest;
+            c->is_short = (nodes[i].cuts & TERRIMPI_CULL_SHORT) != 0;
         }
         v->candidate_count++;
     }
@@ -9449,6 +10933,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
+        terrimpi_view_settle(v, f, &mip);
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most)
@@ -9456,6 +10941,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
     terrimpi_view_make_regions(v, &mip);
+    terrimpi_view_look_ahead(v, f, &mip);
     return TERRIMP_OK;
 }
 
@@ -9470,7 +10956,8 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
-    uint32_t quads;
+    uint32_t quads, source;
+    int is_known;
     terrimpi_terrain_node_box(f->terrain, &c->node, &box);
     if (terrimpi_terrain_stale(f->terrain, c->node.number)) /* its mesh is not of this ground */
         return 0;
@@ -9480,6 +10967,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
+    c->is_known = 1;
     c->pixels = k * k * (camera.tan_right - camera.tan_left) * (camera.tan_up - camera.tan_down);
     c->draw_cost = terrimpi_cost_draw(costs, (float)(mesh.index_count / 3u));
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
@@ -9491,8 +10979,9 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 1;
     }
     c->urgency = 1e9f;
-    quads = f->terrain->desc.chunk_quads
-            << (c->node.level - terrimpi_view_source(f, &c->node, c->closest));
+    source = terrimpi_view_source(f, &c->node, c->closest, &is_known);
+    c->is_known = (uint8_t)is_known;
+    quads = f->terrain->desc.chunk_quads << (c->node.level - source);
     c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
     return 1;
@@ -9583,8 +11072,9 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    if (!p)
+    if (!p || !terrimpi_tree_opens(&v->terrain->tree, node->number))
         return 0;
+    terrimpi_page_use(&v->terrain->tree, node->number);
     if (p->listed == v->frame.number) {
         v->draws[p->draw].alpha = 1.0f;
         return 1;
@@ -9608,7 +11098,8 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
     count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.eye, children);
     for (i = 0; i < count; i++) {
         const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
-        if (!p || p->layer_count == 0)
+        if (!p || p->layer_count == 0 ||
+            !terrimpi_tree_opens(&v->terrain->tree, children[i].number))
             return 0;
     }
     for (i = 0; i < count; i++)
@@ -9738,8 +11229,8 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
     if (!callbacks->draw_floor)
         return;
     memset(&command, 0, sizeof command);
-    command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
-    command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
+    command.base_vertex = terrimpi_mesh_places(v->terrain) * v->terrain->vertex_stride;
+    command.first_index = terrimpi_mesh_places(v->terrain) * v->terrain->index_stride;
     command.index_count = terrimpi_floor_indices(v->terrain);
     callbacks->draw_floor(callbacks->user, &command);
 }
@@ -9775,6 +11266,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     int before = v->kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
+    int is_known = 1;
     terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
@@ -9787,7 +11279,12 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
         terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
-    region->kind = v->kind_of[region->node] = (uint8_t)best;
+    region->kind = (uint8_t)best;
+    for (i = 0; i < region->candidate_count; i++)
+        is_known &= v->candidates[region->first_candidate + i].is_known &&
+                    !v->candidates[region->first_candidate + i].is_short;
+    if (is_known) /* else a page that comes later must not find it settled */
+        v->kind_of[region->node] = (uint8_t)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
@@ -9807,7 +11304,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
                                float *distance)
 {
 #ifndef TERRIMP_NO_SPLIT
-    const terrimpi_mesh *mesh = &f->terrain->meshes[plan->node.number];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(f->terrain, plan->node.number);
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
@@ -9854,7 +11351,13 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
     uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
+    int is_known;
     memset(job, 0, sizeof *job);
+    if (c->is_short) {
+        terrimpi_view_want_children(v, &f->frustum, &c->node, TERRIMP_WANT_PICTURE, 2.0f);
+        v->late++;
+        return 0;
+    }
     job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
         return 0;
@@ -9873,14 +11376,16 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               mesh.vertex_count, f->side_px * f->desc->texels_per_px, largest,
                               &plan->camera, size))
         return 0;
+    distance = terrimp_box_distance(&plan->box, plan->eye);
+    plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
+    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
+    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+        return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    distance = terrimp_box_distance(&plan->box, plan->eye);
-    plan->source = terrimpi_view_source(f, &c->node, distance);
-    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
     job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
@@ -10052,7 +11557,12 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
     terrimpi_job *job = &v->jobs[0];
     float angle, parallax;
-    if (terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
+    int has_pages;
+    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
+                terrimpi_view_has_pages(v, v->capture_draws, job->draw_count, 2.0f);
+    if (!has_pages ||
+        terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
         v->open = 0;
@@ -10060,7 +11570,6 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
     terrimpi_job_cut(v->capture_draws, terrimpi_spending_left(&v->frame, s), job);
     terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
 }
@@ -10148,13 +11657,15 @@ static int terrimpi_view_over(const terrimpi_frame *f)
     terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_box box;
     float ground;
+    uint32_t level; /* of the finest ground that is here */
+    terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
     terrimpi_terrain_node_box(f->terrain, &root, &box);
-    if (terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
-        TERRIMP_E_MISS)
+    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    if (result == TERRIMP_E_MISS)
         return terrimpi_view_inside(f, &box, eye);
-    return terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
+    return result ==
                TERRIMP_OK &&
            eye[1] - f->camera.reach >= ground;
 }
@@ -10212,6 +11723,7 @@ static void terrimpi_view_count_frame(terrimp_view *v)
     for (i = 0; i < v->draw_count; i++)
         terrimpi_view_count_draw(v, &v->draws[i], s);
     s->visible = v->region_count;
+    s->late = v->late;
     s->evictions = v->cache.evictions;
     s->atlas_failures = v->cache.failures;
     for (i = 0; i < v->region_count; i++) {
@@ -10276,6 +11788,13 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     frame = terrimpi_frame_next(&view->frame, &resolved);
+    if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
+                                                          view->terrain->tree.node_count - 1u)) {
+        terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
+        view->want_count = 0;
+        terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
+        return TERRIMP_E_PAGE;
+    }
     TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
     if (!frame.camera.orthographic != !view->frame.camera.orthographic)
         terrimp_view_invalidate(view); /* no picture is of use to a camera of the other kind */
@@ -14807,6 +16326,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 {
     float low, high, room, step;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->meshes, TERRIMP_E_STATE);
     low = terrain->desc.height_low;
     high = terrain->desc.height_high;
     if (low == 0.0f && high == 0.0f) {
@@ -14854,6 +16374,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     const terrimp_quadtree *tree;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->meshes, TERRIMP_E_STATE);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
         TERRIMPI_REFUSE(terrimpi_mesh_vertices(&terrain->meshes[node]) == 0, TERRIMP_E_STATE);
@@ -15102,6 +16623,64 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 
 #endif /* TERRIMP_NO_MALLOC */
 
+/* ---- materials ---- */
+
+/* The texels that columns or rows of samples from `from` to `to` may read, of `count` over `last`
+   quads; with the 1 / 64 that machines round places by. */
+static void terrimpi_material_range(uint32_t from, uint32_t to, uint32_t last, uint32_t count,
+                                    int centred, float reach, uint32_t range[2])
+{
+    float scale = (float)(centred ? count - 1u : count) / (float)last;
+    float shift = centred ? 0.5f : 0.0f, most = (float)(count - 1u), slack = reach - 0.484375f;
+    range[0] = (uint32_t)terrimpi_clamp((float)from * scale + shift - slack, 0.0f, most);
+    range[1] = (uint32_t)terrimpi_clamp((float)to * scale + shift + slack, 0.0f, most);
+}
+
+/* Whether a material has any weight on a node of level 0. */
+static int terrimpi_material_on(const terrimp_quadtree *tree, const terrimp_node *n,
+                                const terrimp_weights *w, float reach)
+{
+    uint32_t last_x = tree->field.width - 1u, last_z = tree->field.depth - 1u;
+    uint32_t x = n->x * tree->chunk_quads, z = n->z * tree->chunk_quads, u[2], v[2], i, j;
+    size_t step = w->texel_bytes ? w->texel_bytes : 1u;
+    size_t row = w->row_bytes ? w->row_bytes : w->width * step;
+    terrimpi_material_range(x, terrimpi_min_u32(x + tree->chunk_quads, last_x), last_x, w->width,
+                            w->centred, reach, u);
+    terrimpi_material_range(z, terrimpi_min_u32(z + tree->chunk_quads, last_z), last_z, w->depth,
+                            w->centred, reach, v);
+    for (j = v[0]; j <= v[1]; j++)
+        for (i = u[0]; i <= u[1]; i++)
+            if (w->texels[j * row + i * step])
+                return 1;
+    return 0;
+}
+
+TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
+                                                  const terrimp_weights *weights, uint32_t count,
+                                                  float reach, uint32_t *masks)
+{
+    uint32_t i, k;
+    TERRIMPI_REFUSE(!tree || !weights || !masks, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(reach), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(count, 1u, 32u) || !terrimpi_within(reach, 1.0f, 65536.0f),
+                    TERRIMP_E_RANGE);
+    for (k = 0; k < count; k++) {
+        TERRIMPI_REFUSE(!weights[k].texels, TERRIMP_E_NULL);
+        TERRIMPI_REFUSE(!terrimpi_within_u32(weights[k].width, 1u, 65536u) ||
+                        !terrimpi_within_u32(weights[k].depth, 1u, 65536u), TERRIMP_E_RANGE);
+    }
+    memset(masks, 0, tree->node_count * sizeof *masks);
+    for (i = 0; i < tree->node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i);
+        for (k = 0; k < count && n.level == 0; k++)
+            if (terrimpi_material_on(tree, &n, &weights[k], reach))
+                masks[i] |= 1u << k;
+        if (n.level + 1u < tree->level_count)
+            masks[terrimpi_tree_parent(tree, &n).number] |= masks[i];
+    }
+    return TERRIMP_OK;
+}
+
 /* ---- the bake ---- */
 
 /* The bytes of the arrays, 0 when they and the header pass what 32 bits can count. */
@@ -15114,7 +16693,8 @@ static size_t terrimpi_bake_array_bytes(const terrimp_terrain *t)
 
 TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
 {
-    size_t arrays = terrain && terrain->built ? terrimpi_bake_array_bytes(terrain) : 0;
+    int any = terrain && terrain->built && terrain->meshes;
+    size_t arrays = any ? terrimpi_bake_array_bytes(terrain) : 0;
     return arrays ? sizeof(terrimpi_bake) + arrays : 0;
 }
 
@@ -15130,44 +16710,50 @@ static void terrimpi_bake_swap_words(unsigned char *words, size_t bytes)
     }
 }
 
+/* Fills in what a header says of a terrain. */
+static void terrimpi_bake_describe(const terrimp_terrain *t, terrimpi_bake *bake)
+{
+    const terrimp_terrain_desc *desc = &t->desc;
+    memset(bake, 0, sizeof *bake);
+    bake->width = desc->field.width;
+    bake->depth = desc->field.depth;
+    bake->format = (uint32_t)desc->field.format;
+    bake->chunk_quads = desc->chunk_quads;
+    bake->triangle_budget = desc->triangle_budget;
+    bake->flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
+                  (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
+    bake->node_count = t->tree.node_count;
+    bake->vertex_limit = t->vertex_limit;
+    bake->index_limit = t->index_limit;
+    bake->mesh_triangle_count = t->mesh_triangle_count;
+    bake->height_scale = desc->field.height_scale;
+    bake->height_offset = desc->field.height_offset;
+    bake->height_low = desc->height_low;
+    bake->height_high = desc->height_high;
+    bake->sample_low = t->sample_low;
+    bake->sample_high = t->sample_high;
+    bake->range_low = t->range_low;
+    bake->range_step = t->range_step;
+    bake->proud = desc->proud;
+}
+
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes, int swapped)
 {
-    const terrimp_terrain_desc *desc;
     terrimpi_bake bake;
     size_t arrays;
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrain->built || terrimpi_build_any_stale(terrain), TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrain->built || !terrain->meshes || terrimpi_build_any_stale(terrain),
+                    TERRIMP_E_STATE);
     arrays = terrimpi_bake_array_bytes(terrain);
     TERRIMPI_REFUSE(arrays == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_REFUSE(bytes < sizeof bake + arrays, TERRIMP_E_CAPACITY);
     TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    desc = &terrain->desc;
-    memset(&bake, 0, sizeof bake);
+    terrimpi_bake_describe(terrain, &bake);
     bake.magic = TERRIMPI_BAKE_MAGIC;
     bake.version = TERRIMP_BAKE_VERSION;
     bake.bytes = (uint32_t)(sizeof bake + arrays);
-    bake.width = desc->field.width;
-    bake.depth = desc->field.depth;
-    bake.format = (uint32_t)desc->field.format;
-    bake.chunk_quads = desc->chunk_quads;
-    bake.triangle_budget = desc->triangle_budget;
-    bake.flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
-                 (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
-    bake.node_count = terrain->tree.node_count;
-    bake.vertex_limit = terrain->vertex_limit;
-    bake.index_limit = terrain->index_limit;
-    bake.mesh_triangle_count = terrain->mesh_triangle_count;
-    bake.samples = terrimpi_bake_hash_samples(&desc->field);
-    bake.height_scale = desc->field.height_scale;
-    bake.height_offset = desc->field.height_offset;
-    bake.height_low = desc->height_low;
-    bake.height_high = desc->height_high;
-    bake.sample_low = terrain->sample_low;
-    bake.sample_high = terrain->sample_high;
-    bake.range_low = terrain->range_low;
-    bake.range_step = terrain->range_step;
-    bake.proud = desc->proud;
+    bake.samples = terrimpi_bake_hash_samples(&terrain->desc.field);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
     bake.checksum = terrimpi_bake_hash(out);
@@ -15177,35 +16763,563 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     return TERRIMP_OK;
 }
 
+/* ==== Page builder ======================================================= >>impl-page-builder */
+/* A block is built as a terrain of its own, over a window of the field: of the block, of what its
+   nodes look at beyond it, and of the block before it along either axis, so that numbers of nodes
+   and places of the lattice differ from those of the whole field by a constant. What lies above the
+   blocks is built the same way over a field of every 2^block_level-th sample. */
+
+typedef struct terrimpi_paging {
+    const terrimp_pages_desc *desc; /* resolved */
+    terrimp_terrain whole;          /* nothing but its numbers */
+    uint32_t stamp;
+    uint32_t level;                 /* of the whole: of the part's level 0 */
+    uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
+    terrimp_terrain *part;
+    size_t part_bytes, scratch_bytes;
+    unsigned char *samples;         /* of the part */
+    float *held;                    /* [nodes of the part] see terrimpi_record */
+    float *missed, *squares;        /* [the same] what the ground of the blocks below misses */
+    unsigned char *page, *header;
+    void *scratch;                  /* of the Builder */
+} terrimpi_paging;
+
+TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *desc,
+                                                      terrimp_pages_desc *out,
+                                                      uint32_t *block_count)
+{
+    static const float any = 0.0f; /* stands for the samples */
+    terrimp_pages_desc d;
+    terrimp_terrain t;
+    uint32_t top;
+    TERRIMPI_REFUSE(!desc || !out || !block_count || !desc->read || !desc->load || !desc->store,
+                    TERRIMP_E_NULL);
+    d = *desc;
+    d.terrain.field.samples = &any;
+    d.terrain.field.row_bytes = 0;
+    memset(&t, 0, sizeof t);
+    TERRIMPI_TRY(terrimp_terrain_desc_resolve(&d.terrain, &t.desc));
+    TERRIMPI_REFUSE(!terrimpi_terrain_count(&t), TERRIMP_E_OVERFLOW);
+    TERRIMPI_REFUSE(t.desc.field.format == TERRIMP_FORMAT_F32 ||
+                    !(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
+    top = t.tree.level_count - 1u;
+    TERRIMPI_DEFAULT(d.block_level, t.desc.field.width <= 4097u && t.desc.field.depth <= 4097u
+                                        ? top : 4u);
+    d.block_level = terrimpi_min_u32(d.block_level, top);
+    d.terrain = t.desc;
+    *block_count = t.tree.level_x[d.block_level] * t.tree.level_z[d.block_level];
+    *out = d;
+    return TERRIMP_OK;
+}
+
+/* The number that all pages of a file bear. */
+static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
+{
+    const terrimp_terrain_desc *t = &d->terrain;
+    uint32_t words[13], i, hash = 2166136261u;
+    words[0] = d->stamp;
+    words[1] = t->field.width;
+    words[2] = t->field.depth;
+    words[3] = (uint32_t)t->field.format;
+    words[4] = t->chunk_quads;
+    words[5] = t->triangle_budget;
+    words[6] = d->block_level;
+    words[7] = (t->no_lower_skirts ? 1u : 0u) | TERRIMP_PAGES_VERSION << 1;
+    words[8] = terrimpi_bake_float_bits(t->field.height_scale);
+    words[9] = terrimpi_bake_float_bits(t->field.height_offset);
+    words[10] = terrimpi_bake_float_bits(t->height_low);
+    words[11] = terrimpi_bake_float_bits(t->height_high);
+    words[12] = terrimpi_bake_float_bits(t->proud);
+    for (i = 0; i < 13u; i++)
+        hash = terrimpi_bake_hash_word(hash, words[i]);
+    return hash;
+}
+
+/* Begins a window of columns [x, x + width) and rows of the field at a level's steps; w has its
+   descriptor. Sets the arrays when there is a base. */
+static size_t terrimpi_paging_layout(terrimpi_paging *w, uint32_t level, const terrimp_rect *r,
+                                     unsigned char *base, terrimp_terrain_desc *part)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    terrimp_terrain counted;
+    *part = w->desc->terrain;
+    part->field.width = r->width;
+    part->field.depth = r->height;
+    part->field.row_bytes = r->width * terrimpi_field_sample_bytes(part->field.format);
+    memset(&counted, 0, sizeof counted);
+    counted.desc = *part;
+    terrimpi_terrain_count(&counted);
+    w->level = level;
+    w->x = r->x;
+    w->z = r->y;
+    w->part_bytes = terrimp_terrain_bytes(part);
+    w->scratch_bytes = terrimp_terrain_scratch_bytes(part);
+    w->samples = (unsigned char *)terrimpi_take(&b, r->height, part->field.row_bytes);
+    w->part = (terrimp_terrain *)terrimpi_take(&b, w->part_bytes, 1);
+    w->held = (float *)terrimpi_take(&b, counted.tree.node_count, sizeof *w->held);
+    w->missed = (float *)terrimpi_take(&b, counted.tree.node_count, sizeof *w->missed);
+    w->squares = (float *)terrimpi_take(&b, counted.tree.node_count, sizeof *w->squares);
+    w->page = (unsigned char *)terrimpi_take(&b, terrimpi_page_bytes(&w->whole), 1);
+    w->header = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
+    w->scratch = terrimpi_take(&b, w->scratch_bytes, 1);
+    part->field.samples = w->samples;
+    return b.ok && w->part_bytes && w->scratch_bytes ? b.bytes : 0;
+}
+
+/* Along one axis of `last` quads: the window of block k, and what of it is read. */
+static void terrimpi_paging_along(uint32_t k, uint32_t quads, uint32_t margin, uint32_t last,
+                                  uint32_t *first, uint32_t *count, uint32_t *from)
+{
+    uint32_t end = terrimpi_min_u32((k + 1u) * quads, last);
+    *first = k > 0 ? (k - 1u) * quads : 0u;
+    *from = k > 0 ? k * quads - margin : 0u;
+    *count = terrimpi_min_u32(margin, last - end) + end - *first + 1u;
+}
+
+/* The window of a block; *read gets what of it is to be read. */
+static terrimp_rect terrimpi_paging_of(const terrimpi_paging *w, uint32_t block, terrimp_rect *read)
+{
+    const terrimp_quadtree *t = &w->whole.tree;
+    uint32_t level = w->desc->block_level, quads = t->chunk_quads << level;
+    terrimp_rect r;
+    terrimpi_paging_along(block % t->level_x[level], quads, 1u << level, t->field.width - 1u, &r.x,
+                          &r.width, &read->x);
+    terrimpi_paging_along(block / t->level_x[level], quads, 1u << level, t->field.depth - 1u, &r.y,
+                          &r.height, &read->y);
+    read->width = r.x + r.width - read->x;
+    read->height = r.y + r.height - read->y;
+    return r;
+}
+
+/* The field of every 2^block_level-th sample. */
+static terrimp_rect terrimpi_paging_end(const terrimpi_paging *w)
+{
+    uint32_t level = w->desc->block_level;
+    return terrimpi_rect(0, 0, ((w->whole.desc.field.width - 2u) >> level) + 2u,
+                         ((w->whole.desc.field.depth - 2u) >> level) + 2u);
+}
+
+/* Whether there is anything above the blocks. */
+static int terrimpi_paging_has_end(const terrimpi_paging *w)
+{
+    return w->desc->block_level + 1u < w->whole.tree.level_count;
+}
+
+static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terrimp_pages_desc *d,
+                                            terrimpi_paging *w)
+{
+    uint32_t count;
+    TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
+    memset(w, 0, sizeof *w);
+    w->desc = d;
+    w->stamp = terrimpi_paging_stamp(d);
+    w->whole.desc = d->terrain;
+    terrimpi_terrain_count(&w->whole);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, uint32_t first_block,
+                                               uint32_t block_count, uint64_t *offset,
+                                               uint64_t *bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    const terrimp_quadtree *t = &w.whole.tree;
+    uint32_t all;
+    uint64_t block_bytes;
+    TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    all = t->level_x[d.block_level] * t->level_z[d.block_level];
+    TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
+    block_bytes = (uint64_t)terrimpi_page_full(d.block_level + 1u) * terrimpi_page_bytes(&w.whole);
+    *offset = TERRIMP_PAGES_HEADER_BYTES + block_bytes * first_block +
+              (uint64_t)terrimpi_page_upper(t, d.block_level) * terrimpi_page_bytes(&w.whole);
+    *bytes = block_bytes * block_count;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API size_t terrimp_pages_scratch_bytes(const terrimp_pages_desc *desc)
+{
+    terrimp_pages_desc d;
+    terrimp_terrain_desc part;
+    terrimpi_paging w;
+    terrimp_rect r, read;
+    size_t block, end = 1;
+    if (terrimpi_paging_begin(desc, &d, &w) != TERRIMP_OK)
+        return 0;
+    r = terrimpi_paging_of(&w, 0, &read); /* the last of two blocks has the larger window */
+    r.width = terrimpi_min_u32(w.whole.desc.field.width, 2u * r.width);
+    r.height = terrimpi_min_u32(w.whole.desc.field.depth, 2u * r.height);
+    block = terrimpi_paging_layout(&w, 0, &r, NULL, &part);
+    if (terrimpi_paging_has_end(&w)) {
+        r = terrimpi_paging_end(&w);
+        end = terrimpi_paging_layout(&w, d.block_level, &r, NULL, &part);
+    }
+    return block == 0 || end == 0 ? 0 : block > end ? block : end;
+}
+
+/* Lays a window's terrain out in the scratch. */
+static terrimp_result terrimpi_paging_open(terrimpi_paging *w, uint32_t level,
+                                           const terrimp_rect *r, void *scratch, size_t bytes)
+{
+    terrimp_terrain_desc part;
+    terrimp_terrain *made;
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_paging_layout(w, level, r, NULL, &part)));
+    terrimpi_paging_layout(w, level, r, (unsigned char *)scratch, &part);
+    TERRIMPI_TRY(terrimp_terrain_init(&part, w->part, w->part_bytes, &made));
+    return terrimp_terrain_build_begin(made);
+}
+
+/* Builds a node of the part and makes it hold those below it. */
+static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terrimp_node *n)
+{
+    terrimp_terrain *t = w->part;
+    terrimp_geomip_node *ground = &t->tree.nodes[n->number];
+    terrimpi_mesh *mesh = &t->meshes[n->number];
+    float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
+    uint32_t i;
+    TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
+    w->held[n->number] = *missed = *squares = 0.0f;
+    for (i = 0; i < 4u && n->level > 0; i++) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
+        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
+        *missed = terrimpi_max(*missed, w->missed[child]);
+        *squares += w->squares[child];
+        count += 1.0f;
+    }
+    if (w->level > 0) {
+        *squares /= count;
+        ground->error += *missed;
+        ground->rms = TERRIMP_SQRTF(ground->rms * ground->rms + *squares);
+        mesh->error += *missed;
+        mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
+    }
+    w->held[n->number] = ground->rms;
+    for (i = 0; i < 4u && n->level > 0; i++) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
+        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
+        ground->low = terrimpi_min(ground->low, t->tree.nodes[child].low);
+        ground->high = terrimpi_max(ground->high, t->tree.nodes[child].high);
+        ground->error = terrimpi_max(ground->error, t->tree.nodes[child].error);
+        terrimpi_build_hold(mesh, t->meshes[child].low, t->meshes[child].high);
+        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child]);
+    }
+    terrimpi_build_hold(mesh, ground->low, ground->high);
+    return TERRIMP_OK;
+}
+
+static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t node)
+{
+    terrimpi_record r;
+    r.ground = w->part->tree.nodes[node];
+    r.mesh = w->part->meshes[node];
+    r.held = w->held[node];
+    return r;
+}
+
+/* Copies the samples of a node of the part into its page. */
+static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n, uint16_t *out)
+{
+    const terrimp_quadtree *t = &w->part->tree;
+    uint32_t i, j, quads = t->chunk_quads;
+    for (j = 0; j <= quads; j++) {
+        const void *row = terrimpi_field_row(&t->field, terrimpi_tree_row(t, n->level,
+                                                                          n->z * quads + j));
+        for (i = 0; i <= quads; i++) {
+            uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
+            *out++ = t->field.format == TERRIMP_FORMAT_U8 ? ((const uint8_t *)row)[x]
+                                                          : ((const uint16_t *)row)[x];
+        }
+    }
+}
+
+/* The node of the whole that a node of the part is. */
+static terrimp_node terrimpi_paging_whole(const terrimpi_paging *w, const terrimp_node *n)
+{
+    uint32_t side = w->part->tree.chunk_quads << n->level;
+    return terrimpi_tree_at(&w->whole.tree, w->level + n->level, n->x + w->x / side,
+                            n->z + w->z / side);
+}
+
+/* Makes and stores the page of a node of the part. */
+static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terrimp_node *n)
+{
+    const terrimp_terrain *t = w->part;
+    terrimp_node whole = terrimpi_paging_whole(w, n);
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN, word;
+    terrimpi_page_head head;
+    memset(w->page, 0, bytes);
+    head.stamp = w->stamp;
+    head.node = whole.number;
+    head.record = terrimpi_paging_record(w, n->number);
+    for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimpi_record r;
+        if (n->level == 0 || !terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        r = terrimpi_paging_record(w, terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number);
+        memcpy(w->page + at, &r, sizeof r);
+    }
+    memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
+    at += 4u * t->vertex_limit;
+    memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
+    terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
+    memcpy(w->page, &head, sizeof head);
+    head.checksum = 2166136261u;
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, w->page + at, sizeof word);
+        head.checksum = terrimpi_bake_hash_word(head.checksum, word);
+    }
+    memcpy(w->page, &head.checksum, sizeof head.checksum);
+    return w->desc->store(w->desc->user,
+                          terrimpi_page_offset(&w->whole, w->desc->block_level, &whole), w->page,
+                          bytes) ? TERRIMP_OK : TERRIMP_E_PAGE;
+}
+
+/* The nodes of a level of a rectangle of blocks: from the top down to the finest, or up again. */
+static terrimp_result terrimpi_paging_each(const terrimpi_paging *w, uint32_t level, uint32_t top,
+                                           uint32_t x, uint32_t z,
+                                           terrimp_result (*act)(const terrimpi_paging *w,
+                                                                 const terrimp_node *n))
+{
+    const terrimp_quadtree *t = &w->part->tree;
+    uint32_t side = 1u << (top - level), i, j;
+    for (j = z * side; j < (z + 1u) * side; j++)
+        for (i = x * side; i < (x + 1u) * side; i++)
+            if (terrimpi_tree_has(t, level, i, j)) {
+                terrimp_node n = terrimpi_tree_at(t, level, i, j);
+                TERRIMPI_TRY(act(w, &n));
+            }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *desc, uint32_t block,
+                                                     void *scratch, size_t bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    terrimp_rect r, read;
+    uint32_t level, x, z, size;
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    x = block % w.whole.tree.level_x[d.block_level];
+    z = block / w.whole.tree.level_x[d.block_level];
+    TERRIMPI_REFUSE(z >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
+    r = terrimpi_paging_of(&w, block, &read);
+    TERRIMPI_TRY(terrimpi_paging_open(&w, 0, &r, scratch, bytes));
+    size = (uint32_t)terrimpi_field_sample_bytes(d.terrain.field.format);
+    TERRIMPI_REFUSE(!d.read(d.user, read.x, read.y, read.width, read.height,
+                            w.samples + ((size_t)(read.y - r.y) * r.width + (read.x - r.x)) * size,
+                            (size_t)r.width * size), TERRIMP_E_PAGE);
+    x = x > 0;
+    z = z > 0;
+    for (level = 0; level <= d.block_level; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, d.block_level, x, z, terrimpi_paging_build));
+    for (level = 0; level <= d.block_level; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, d.block_level, x, z, terrimpi_paging_store));
+    return TERRIMP_OK;
+}
+
+/* Loads the page of a node and looks at what is told by it alone. */
+static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terrimp_node *n,
+                                           unsigned char *page, terrimpi_page_head *head)
+{
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), at, word, hash = 2166136261u;
+    TERRIMPI_REFUSE(!w->desc->load(w->desc->user,
+                                   terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
+                                   bytes), TERRIMP_E_PAGE);
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    memcpy(head, page, sizeof *head);
+    return head->checksum == hash && head->stamp == w->stamp && head->node == n->number
+               ? TERRIMP_OK : TERRIMP_E_BAKE;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
+                                                     uint32_t block, void *scratch, size_t bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    terrimpi_page_head head;
+    terrimp_node n;
+    uint32_t across;
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    across = w.whole.tree.level_x[d.block_level];
+    TERRIMPI_REFUSE(block / across >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, terrimpi_page_bytes(&w.whole)));
+    n = terrimpi_tree_at(&w.whole.tree, d.block_level, block % across, block / across);
+    return terrimpi_paging_load(&w, &n, (unsigned char *)scratch, &head);
+}
+
+/* Takes over what a block's topmost page says: the part's level 0. */
+static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terrimp_node *n)
+{
+    const terrimp_quadtree *t = &w->part->tree;
+    terrimp_node whole = terrimpi_paging_whole(w, n);
+    uint32_t quads = t->chunk_quads, i, j, x, z;
+    terrimpi_page_head head;
+    const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
+                                4u * w->whole.vertex_limit + w->whole.index_limit;
+    TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++, from += 2) {
+            uint16_t sample;
+            x = terrimpi_tree_col(t, 0, n->x * quads + i);
+            z = terrimpi_tree_row(t, 0, n->z * quads + j);
+            memcpy(&sample, from, sizeof sample);
+            if (t->field.format == TERRIMP_FORMAT_U8)
+                w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
+            else
+                memcpy(w->samples + ((size_t)z * t->field.width + x) * 2u, &sample, sizeof sample);
+        }
+    t->nodes[n->number] = head.record.ground;
+    w->part->meshes[n->number] = head.record.mesh;
+    w->held[n->number] = head.record.held;
+    w->missed[n->number] = head.record.ground.error;
+    w->squares[n->number] = head.record.ground.rms * head.record.ground.rms;
+    return TERRIMP_OK;
+}
+
+/* The lowest sample of a rectangle that two of its corners span, through `read`. */
+static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uint32_t a[2],
+                                             const uint32_t b[2], float *lowest)
+{
+    terrimp_heightfield f = w->desc->terrain.field;
+    terrimpi_field_scan scan;
+    uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
+    uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
+    uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
+    uint16_t line[256]; /* either is 1 */
+    for (k = 0; k < cols * rows; k += 256u) {
+        f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
+        f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
+        f.row_bytes = f.width * terrimpi_field_sample_bytes(f.format);
+        f.samples = line;
+        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, cols > 1u ? x + k : x, rows > 1u ? z + k : z,
+                                       f.width, f.depth, line, f.row_bytes), TERRIMP_E_PAGE);
+        scan.skip_voids = 0;
+        TERRIMPI_TRY(terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
+        *lowest = terrimpi_min(*lowest, terrimpi_field_world_height(&f, scan.low));
+    }
+    return TERRIMP_OK;
+}
+
+/* The heights of the floor's corners and walls: see terrimpi_floor_write. */
+static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *lows)
+{
+    const terrimp_terrain *t = &w->whole;
+    uint32_t level = t->floor_level, wide = t->tree.level_x[level], deep = t->tree.level_z[level];
+    uint32_t i, k, x, z, points = terrimpi_floor_wall_points(t);
+    terrimpi_page_head head;
+    for (i = 0; i < terrimpi_floor_ground_vertices(t) + points; i++)
+        lows[i] = TERRIMPI_FLOAT_MAX;
+    for (z = 0; z < deep; z++)
+        for (x = 0; x < wide; x++) {
+            terrimp_node n = terrimpi_tree_at(&t->tree, level, x, z);
+            TERRIMPI_TRY(terrimpi_paging_load(w, &n, w->page, &head));
+            for (k = 0; k < 4u; k++) {
+                float *corner = lows + (z + k / 2u) * (wide + 1u) + x + k % 2u;
+                *corner = terrimpi_min(*corner, head.record.ground.low);
+            }
+        }
+    lows += terrimpi_floor_ground_vertices(t);
+    for (k = 0; k < points; k++) {
+        uint32_t before[2], at[2], after[2];
+        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
+        terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
+        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &lows[k]));
+    }
+    return TERRIMP_OK;
+}
+
+/* Makes and stores the header. */
+static terrimp_result terrimpi_paging_header(const terrimpi_paging *w)
+{
+    unsigned char *room = w->header;
+    const terrimp_terrain *t = &w->whole;
+    terrimp_node root = terrimpi_tree_root(&t->tree);
+    terrimpi_pages_head head;
+    terrimpi_page_head top;
+    memset(&head, 0, sizeof head);
+    memset(room, 0, TERRIMP_PAGES_HEADER_BYTES);
+    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(room + sizeof head)));
+    TERRIMPI_TRY(terrimpi_paging_load(w, &root, w->page, &top));
+    terrimpi_bake_describe(t, &head.bake);
+    head.bake.magic = TERRIMPI_PAGES_MAGIC;
+    head.bake.version = TERRIMP_PAGES_VERSION;
+    head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
+    head.bake.sample_low = w->part->sample_low;
+    head.bake.sample_high = w->part->sample_high;
+    head.bake.range_low = w->part->range_low;
+    head.bake.range_step = w->part->range_step;
+    head.block_level = w->desc->block_level;
+    head.stamp = w->stamp;
+    head.root = top.record;
+    memcpy(room, &head, sizeof head);
+    head.bake.checksum = terrimpi_bake_hash(room);
+    memcpy(room, &head, sizeof head);
+    return w->desc->store(w->desc->user, 0, room, TERRIMP_PAGES_HEADER_BYTES) ? TERRIMP_OK
+                                                                              : TERRIMP_E_PAGE;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,
+                                                   size_t bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    terrimp_rect r;
+    uint32_t level, top;
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    r = terrimpi_paging_end(&w);
+    top = w.whole.tree.level_count - 1u - d.block_level;
+    TERRIMPI_TRY(terrimpi_paging_open(&w, d.block_level, &r, scratch, bytes));
+    TERRIMPI_TRY(terrimpi_paging_each(&w, 0, top, 0, 0, terrimpi_paging_take));
+    for (level = 1; level <= top; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, top, 0, 0, terrimpi_paging_build));
+    for (level = 1; level <= top; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, top, 0, 0, terrimpi_paging_store));
+    return terrimpi_paging_header(&w);
+}
+
 /* ==== Visible sets ======================================================= >>impl-visible-sets */
 
 /* ---- walls ---- */
 
 /* A node whose walls are built. */
 typedef struct terrimpi_wall_site {
-    const terrimp_quadtree *tree;
-    const unsigned char *walls;
-    terrimpi_wall_form form;
+    terrimp_walls walls;
     terrimp_node node;
 } terrimpi_wall_site;
+
+/* The lowest or the highest of some samples, cut at the far edges. */
+static float terrimpi_wall_sample(const terrimpi_wall_site *s, uint32_t x, uint32_t z,
+                                  uint32_t cols, uint32_t rows, int highest)
+{
+    const terrimp_heightfield *field = &s->walls.tree->field;
+    float low = 0.0f, high = 0.0f;
+    x = terrimpi_min_u32(x, field->width - 1u);
+    z = terrimpi_min_u32(z, field->depth - 1u);
+    (void)terrimpi_field_range(field, terrimpi_rect(x, z, cols, rows), 1, &low, &high);
+    return highest ? high : low;
+}
 
 /* The lowest sample of a cell of a line, at level 0. */
 static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
                                   uint32_t cell)
 {
-    const terrimp_heightfield *field = &s->tree->field;
-    uint32_t quads = s->tree->chunk_quads, k;
-    uint32_t line = (axis == 0 ? s->node.x : s->node.z) * quads + row * s->form.quads;
-    uint32_t from = (axis == 0 ? s->node.z : s->node.x) * quads + cell * s->form.quads;
-    uint32_t last = (axis == 0 ? field->depth : field->width) - 1u;
-    float lowest = TERRIMPI_FLOAT_MAX;
-    line = terrimpi_min_u32(line, (axis == 0 ? field->width : field->depth) - 1u);
-    for (k = 0; k <= s->form.quads; k++) {
-        uint32_t at = terrimpi_min_u32(from + k, last);
-        lowest = terrimpi_min(lowest, axis == 0 ? terrimpi_field_sample(field, line, at)
-                                                : terrimpi_field_sample(field, at, line));
-    }
-    return lowest;
+    uint32_t chunk = s->walls.tree->chunk_quads, quads = s->walls.quads;
+    uint32_t x = s->node.x * chunk + (axis == 0 ? row : cell) * quads;
+    uint32_t z = s->node.z * chunk + (axis == 0 ? cell : row) * quads;
+    return terrimpi_wall_sample(s, x, z, axis == 0 ? 1u : quads + 1u, axis == 0 ? quads + 1u : 1u,
+                                0);
 }
 
 /* The lowest height of a cell: above level 0 of the two that its children have there; FLOAT_MAX
@@ -15213,7 +17327,7 @@ static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, ui
 static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
                                uint32_t cell)
 {
-    const uint32_t cells = s->form.cells;
+    const uint32_t cells = s->walls.cells;
     uint32_t line = 2u * row, k;
     float lowest = TERRIMPI_FLOAT_MAX;
     if (s->node.level == 0)
@@ -15223,10 +17337,10 @@ static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint3
         uint32_t z = 2u * s->node.z + (axis == 0 ? k : line) / cells;
         const unsigned char *codes;
         float scale[2];
-        if (!terrimpi_tree_has(s->tree, s->node.level - 1u, x, z))
+        if (!terrimpi_tree_has(s->walls.tree, s->node.level - 1u, x, z))
             continue;
-        codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
-                                        s->tree, s->node.level - 1u, x, z).number, scale);
+        codes = terrimpi_walls_codes(&s->walls, terrimpi_tree_at(
+                                         s->walls.tree, s->node.level - 1u, x, z).number, scale);
         lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)codes[(axis * cells +
                                               line % cells) * cells + k % cells]);
     }
@@ -15236,19 +17350,10 @@ static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint3
 /* The highest sample of one of the 4 x 4 squares of a node at level 0. */
 static float terrimpi_wall_highest(const terrimpi_wall_site *s, uint32_t x, uint32_t z)
 {
-    const terrimp_heightfield *field = &s->tree->field;
-    uint32_t quads = s->tree->chunk_quads, i, j;
-    uint32_t i0 = s->node.x * quads + x * quads / TERRIMPI_WALL_TOPS;
-    uint32_t j0 = s->node.z * quads + z * quads / TERRIMPI_WALL_TOPS;
+    uint32_t quads = s->walls.tree->chunk_quads;
     uint32_t size = (quads + TERRIMPI_WALL_TOPS - 1u) / TERRIMPI_WALL_TOPS + 1u;
-    float highest = -TERRIMPI_FLOAT_MAX;
-    for (j = j0; j < j0 + size; j++)
-        for (i = i0; i < i0 + size; i++)
-            highest = terrimpi_max(highest,
-                                   terrimpi_field_sample(field,
-                                                         terrimpi_min_u32(i, field->width - 1u),
-                                                         terrimpi_min_u32(j, field->depth - 1u)));
-    return highest;
+    return terrimpi_wall_sample(s, s->node.x * quads + x * quads / TERRIMPI_WALL_TOPS,
+                                s->node.z * quads + z * quads / TERRIMPI_WALL_TOPS, size, size, 1);
 }
 
 /* The highest height of a square; -FLOAT_MAX where there is no child. */
@@ -15261,11 +17366,10 @@ static float terrimpi_wall_top(const terrimpi_wall_site *s, uint32_t square)
     uint8_t highest = 0;
     if (s->node.level == 0)
         return terrimpi_wall_highest(s, x, z);
-    if (!terrimpi_tree_has(s->tree, s->node.level - 1u, child_x, child_z))
+    if (!terrimpi_tree_has(s->walls.tree, s->node.level - 1u, child_x, child_z))
         return -TERRIMPI_FLOAT_MAX;
-    codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
-                                    s->tree, s->node.level - 1u, child_x, child_z).number, scale) +
-            2u * s->form.cells * s->form.cells;
+    codes = terrimpi_walls_tops(&s->walls, terrimpi_tree_at(s->walls.tree, s->node.level - 1u,
+                                                            child_x, child_z).number, scale);
     for (k = 0; k < 4u; k++) {
         uint32_t i = (x % 2u) * 2u + k % 2u, j = (z % 2u) * 2u + k / 2u;
         if (codes[j * TERRIMPI_WALL_TOPS + i] > highest)
@@ -15277,7 +17381,7 @@ static float terrimpi_wall_top(const terrimpi_wall_site *s, uint32_t square)
 /* Code k of a node as a height: first the walls, then the squares. */
 static float terrimpi_wall_value(const terrimpi_wall_site *s, uint32_t k)
 {
-    const uint32_t cells = s->form.cells;
+    const uint32_t cells = s->walls.cells;
     if (k >= 2u * cells * cells)
         return terrimpi_wall_top(s, k - 2u * cells * cells);
     return terrimpi_wall_low(s, k / (cells * cells), k / cells % cells, k % cells);
@@ -15302,13 +17406,11 @@ static void terrimpi_wall_build(const terrimp_quadtree *tree, terrimp_node node,
     unsigned char *codes;
     uint32_t k, count;
     float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, scale[2];
-    s.tree = tree;
-    s.walls = walls;
-    s.form = terrimpi_wall_form_of(tree);
+    s.walls = terrimpi_walls_of(tree, walls);
     s.node = node;
-    codes = walls + (size_t)node.number * s.form.stride;
-    memset(codes, 0, s.form.stride);
-    count = 2u * s.form.cells * s.form.cells;
+    codes = walls + (size_t)node.number * s.walls.stride;
+    memset(codes, 0, s.walls.stride);
+    count = 2u * s.walls.cells * s.walls.cells;
     for (k = 0; k < count + TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
         float value = terrimpi_wall_value(&s, k);
         if (k < count)
@@ -15341,17 +17443,29 @@ static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uin
     range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
 }
 
+/* A rectangle of samples, NULL for all, cut at the far edges; `cut` may be NULL. Returns 0 when it
+   is empty or outside. */
+static int terrimpi_walls_rect(const terrimp_quadtree *tree, const terrimp_rect *samples,
+                               terrimp_rect *cut)
+{
+    uint32_t width = tree->field.width, depth = tree->field.depth;
+    terrimp_rect all = samples ? *samples : terrimpi_rect(0, 0, width, depth);
+    if (all.width < 1u || all.height < 1u || all.x >= width || all.y >= depth)
+        return 0;
+    all.width = terrimpi_min_u32(all.width, width - all.x);
+    all.height = terrimpi_min_u32(all.height, depth - all.y);
+    if (cut)
+        *cut = all;
+    return 1;
+}
+
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls)
 {
     terrimp_rect all;
     uint32_t level, x[2], z[2], i, j;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
-    all = samples ? *samples : terrimpi_rect(0, 0, tree->field.width, tree->field.depth);
-    TERRIMPI_REFUSE(all.width < 1u || all.height < 1u || all.x >= tree->field.width ||
-                    all.y >= tree->field.depth, TERRIMP_E_RANGE);
-    all.width = terrimpi_min_u32(all.width, tree->field.width - all.x);
-    all.height = terrimpi_min_u32(all.height, tree->field.depth - all.y);
+    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, &all), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++) {
         uint32_t quads = tree->chunk_quads << level;
         terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
@@ -15360,6 +17474,308 @@ TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
             for (i = x[0]; i <= x[1]; i++)
                 terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
                                     (unsigned char *)walls);
+    }
+    return TERRIMP_OK;
+}
+
+/* ---- visible sets ---- */
+/* What sees a point sees it from farther up, too: the upper sight line is above the lower one all
+   the way, so it clears the terrain. So for a cell and a node there is one least height.
+
+   A lower bound of it: take eyes in a rectangle, points of a height of at most Y in another one,
+   and a row of samples between the two. A sight line crosses the row at a part t of its way, of a
+   range that follows from the rectangles, and within an interval; the ground is nowhere lower there
+   than m, the lowest wall of the interval. It clears the row only if y (1 - t) + Y t >= m, so an
+   eye below (m - Y t) / (1 - t), which is monotone in t, is too low, whatever the line. Of all rows
+   of both axes the one that asks most counts. Cutting both rectangles makes intervals narrow and Y
+   low; the least of all pairs of parts is that of the whole. A part that a row proves to need more
+   than the least so far need not be looked at closer: mostly it is the row of the part before.
+
+   An eye has to be above the ground; ground that z_near clips is seen to in the look-up. What is
+   drawn off its samples by `low` is so both where it hides (m is lowered) and where it is hidden (Y
+   is raised); and the two lie no more than `error` times the distance of m off each other. */
+
+/* [quads] */
+typedef struct terrimpi_sets_rect {
+    float low[2], high[2];
+} terrimpi_sets_rect;
+
+typedef struct terrimpi_sets_job {
+    const terrimp_sets *sets;
+    terrimp_walls walls;
+    terrimpi_sets_rect cell, node;
+    float ground[16], tops[16]; /* of 4 x 4 parts of the two: lowest, highest heights */
+    float base, low, rounding;  /* base: the lowest of the cell */
+    uint32_t line[2], axis;     /* that asked most, the last time */
+} terrimpi_sets_job;
+
+/* Sight lines between two rectangles along an axis. */
+typedef struct terrimpi_sets_shaft {
+    terrimpi_sets_rect eye, to;
+    float top, off;        /* Y; what m is lowered by at the end of the way */
+    uint32_t axis, level;  /* of the walls */
+    uint32_t first, count; /* lines that are crossed, in steps of */
+    uint32_t apart;
+    float start, sign;     /* where the eyes' rectangle ends */
+    float wide, inverse[2]; /* its size; over the longest way from its end, the shortest from its
+                              beginning */
+} terrimpi_sets_shaft;
+
+/* Lays a shaft along an axis. Returns 0 when no line of it is between the two. */
+static int terrimpi_sets_along(const terrimpi_sets_job *b, terrimpi_sets_shaft *s, uint32_t axis,
+                               uint32_t level)
+{
+    const float *from, *to;
+    float gap, a, z;
+    int forward = s->to.low[axis] >= s->eye.high[axis];
+    if (!forward && s->to.high[axis] > s->eye.low[axis])
+        return 0;
+    from = forward ? s->eye.high : s->eye.low;
+    to = forward ? s->to.low : s->to.high;
+    s->axis = axis;
+    s->level = terrimpi_min_u32(level, b->walls.tree->level_count - 1u);
+    s->apart = b->walls.quads << s->level;
+    s->start = from[axis];
+    s->sign = forward ? 1.0f : -1.0f;
+    s->wide = s->eye.high[axis] - s->eye.low[axis];
+    gap = s->sign * (to[axis] - s->start);
+    s->inverse[0] = 1.0f / (gap + (s->to.high[axis] - s->to.low[axis]));
+    s->inverse[1] = 1.0f / (gap + s->wide);
+    a = terrimpi_max(terrimpi_min(from[axis], to[axis]), 0.0f);
+    z = terrimpi_max(from[axis], to[axis]);
+    s->first = terrimpi_ceil_u32(a / (float)s->apart);
+    s->count = (uint32_t)(z / (float)s->apart) + 1u;
+    s->count -= terrimpi_min_u32(s->first, s->count);
+    return s->count > 0;
+}
+
+/* The least height of an eye that one line of a shaft asks for. */
+static float terrimpi_sets_line(const terrimpi_sets_job *b, const terrimpi_sets_shaft *s,
+                                uint32_t line)
+{
+    uint32_t other = 1u - s->axis, row = line / s->apart;
+    uint32_t quads = terrimpi_stand_last(b->walls.tree, other) - 1u, i, j;
+    float way = s->sign * ((float)line - s->start), t[2], low, high, m, at;
+    float eye_low = s->eye.low[other], to_low = s->to.low[other] - eye_low;
+    float eye_high = s->eye.high[other], to_high = s->to.high[other] - eye_high;
+    t[0] = way * s->inverse[0];
+    t[1] = (way + s->wide) * s->inverse[1];
+    low = eye_low + terrimpi_min(to_low * t[0], to_low * t[1]) - b->rounding;
+    high = eye_high + terrimpi_max(to_high * t[0], to_high * t[1]) + b->rounding;
+    i = (uint32_t)terrimpi_max(low, 0.0f);
+    j = terrimpi_min_u32((uint32_t)high, quads);
+    m = terrimpi_walls_lowest(&b->walls, s->axis, s->level, row / b->walls.cells,
+                              row % b->walls.cells, i, j) - b->low - s->off * t[1];
+    at = m > s->top ? t[0] : t[1];
+    return at < 1.0f ? (m - s->top * at) / (1.0f - at) : TERRIMPI_HORIZON_NONE;
+}
+
+/* The least height that lines ask for, `least` or more; it need not be found once it is `enough`.
+   First the lines round those that asked most before, then all lines of the walls two levels up,
+   then those of finer ones round what asks most. */
+static float terrimpi_sets_least(terrimpi_sets_job *b, terrimpi_sets_shaft *s, uint32_t level,
+                                 float least, float enough)
+{
+    uint32_t turn, k, axis = b->axis;
+    for (turn = 0; turn < 8u && least < enough; turn++) {
+        uint32_t all = turn / 2u == 1u, coarser = turn < 2u ? 0u : 3u - turn / 2u, around;
+        if (!terrimpi_sets_along(b, s, (axis ^ turn) & 1u, level + coarser))
+            continue;
+        around = terrimpi_clamp_u32(b->line[s->axis] / s->apart, s->first,
+                                    s->first + s->count - 1u);
+        for (k = 0; k < (all ? 2u * s->count : 3u) && least < enough; k++) {
+            uint32_t n = around - s->first + (k % 2u ? 0u - (k + 1u) / 2u : k / 2u);
+            float asked;
+            if (n >= s->count) /* below 0 it becomes large */
+                continue;
+            asked = terrimpi_sets_line(b, s, (s->first + n) * s->apart);
+            if (asked > least) {
+                least = asked;
+                b->line[s->axis] = (s->first + n) * s->apart;
+                b->axis = s->axis;
+            }
+        }
+    }
+    return least;
+}
+
+/* Part (x, z) of a rectangle's 4 x 4, and those beside it: `size` along a side. */
+static terrimpi_sets_rect terrimpi_sets_part(const terrimpi_sets_job *b,
+                                             const terrimpi_sets_rect *of, const uint32_t at[2],
+                                             uint32_t size)
+{
+    terrimpi_sets_rect r;
+    uint32_t k;
+    for (k = 0; k < 2u; k++) {
+        float last = (float)terrimpi_stand_last(b->walls.tree, k);
+        float part = 0.25f * (of->high[k] - of->low[k]);
+        r.low[k] = terrimpi_min(of->low[k] + part * (float)at[k], last) - b->rounding;
+        r.high[k] = terrimpi_min(of->low[k] + part * (float)(at[k] + size), last) + b->rounding;
+    }
+    return r;
+}
+
+/* The highest of the same parts; of negative values the lowest. */
+static float terrimpi_sets_most(const float values[16], const uint32_t at[2], uint32_t size,
+                                float sign)
+{
+    uint32_t i;
+    float most = TERRIMPI_HORIZON_NONE;
+    for (i = 0; i < size * size; i++)
+        most = terrimpi_max(most, sign * values[(at[1] + i / size) * 4u + at[0] + i % size]);
+    return sign * most;
+}
+
+/* The least height of an eye in some parts of the cell that sees some of the node; `least` is known
+   of all parts that hold these. Returns the lesser one of it and `best`. */
+static float terrimpi_sets_search(terrimpi_sets_job *b, const uint32_t eye[2], const uint32_t to[2],
+                                  uint32_t size, float least, float best)
+{
+    const terrimp_quadtree *tree = b->walls.tree;
+    const terrimp_heightfield *field = &tree->field;
+    terrimpi_sets_shaft s;
+    float top = terrimpi_sets_most(b->tops, to, size, 1.0f), x, z, up;
+    uint32_t k, half = size / 2u;
+    least = terrimpi_max(least, terrimpi_sets_most(b->ground, eye, size, -1.0f));
+    if (least >= best)
+        return best;
+    s.eye = terrimpi_sets_part(b, &b->cell, eye, size);
+    s.to = terrimpi_sets_part(b, &b->node, to, size);
+    x = terrimpi_max(s.to.high[0] - s.eye.low[0], s.eye.high[0] - s.to.low[0]) * field->spacing_x;
+    z = terrimpi_max(s.to.high[1] - s.eye.low[1], s.eye.high[1] - s.to.low[1]) * field->spacing_z;
+    up = terrimpi_max(best, top) - tree->nodes[tree->node_count - 1u].low;
+    s.off = b->sets->error * TERRIMP_SQRTF(x * x + z * z + up * up);
+    s.top = top + b->low;
+    least = terrimpi_sets_least(b, &s, terrimpi_min_u32(b->sets->cell_level, b->sets->node_level) +
+                                           half, least, best); /* 4, 2, 1 parts: 2, 1, 0 */
+    if (least >= best)
+        return best;
+    if (size == 1u) /* rounded to codes, the rest need not be looked at any closer */
+        return terrimpi_sets_height(b->sets, b->base, terrimpi_sets_code(b->sets, b->base, least));
+    for (k = 0; k < 16u; k++) {
+        uint32_t eye_part[2], to_part[2];
+        eye_part[0] = eye[0] + (k & 1u) * half;
+        eye_part[1] = eye[1] + (k >> 1 & 1u) * half;
+        to_part[0] = to[0] + (k >> 2 & 1u) * half;
+        to_part[1] = to[1] + (k >> 3) * half;
+        best = terrimpi_sets_search(b, eye_part, to_part, half, least, best);
+    }
+    return best;
+}
+
+/* What a node of a level covers, also beyond the far edges. */
+static terrimpi_sets_rect terrimpi_sets_place(const terrimp_quadtree *tree, const terrimp_node *n)
+{
+    float quads = (float)(tree->chunk_quads << n->level);
+    terrimpi_sets_rect r;
+    r.low[0] = (float)n->x * quads;
+    r.low[1] = (float)n->z * quads;
+    r.high[0] = r.low[0] + quads;
+    r.high[1] = r.low[1] + quads;
+    return r;
+}
+
+/* Whether sight lines between two squares can meet quads round some samples: all are within half of
+   the larger square's side of the line between their middles. */
+static int terrimpi_sets_meets(const terrimpi_sets_rect *a, const terrimpi_sets_rect *b,
+                               const terrimp_rect *samples)
+{
+    float wide = 0.5f * terrimpi_max(a->high[0] - a->low[0], b->high[0] - b->low[0]) + 1.5f;
+    float from = 0.0f, to = 1.0f;
+    uint32_t k;
+    for (k = 0; k < 2u; k++) {
+        float start = 0.5f * (a->low[k] + a->high[k]);
+        float way = 0.5f * (b->low[k] + b->high[k]) - start;
+        float low = (float)(k == 0 ? samples->x : samples->y) - wide - start;
+        float high = low + 2.0f * wide + (float)(k == 0 ? samples->width : samples->height);
+        if (terrimpi_abs(way) < 0.5f) {
+            if (low > 0.0f || high < 0.0f)
+                return 0;
+            continue;
+        }
+        from = terrimpi_max(from, terrimpi_min(low / way, high / way) - 1e-4f);
+        to = terrimpi_min(to, terrimpi_max(low / way, high / way) + 1e-4f);
+    }
+    return from <= to;
+}
+
+/* Works on the codes of a cell that some samples can change: builds them, or without a job that has
+   walls forgets them. */
+static void terrimpi_sets_row(terrimpi_sets_job *b, const terrimp_node *cell,
+                              const terrimp_rect *samples)
+{
+    const terrimp_sets *sets = b->sets;
+    const terrimp_quadtree *tree = sets->hider.tree;
+    uint32_t first = tree->level_first[sets->node_level], i, k, zero[2] = {0, 0};
+    uint32_t count = terrimpi_sets_level_nodes(tree, sets->node_level);
+    uint8_t *row = sets->codes +
+                   (size_t)(cell->number - tree->level_first[cell->level]) * count;
+    float most = terrimpi_sets_height(sets, b->base, 255u);
+    for (i = 0; i < count; i++) {
+        terrimp_node node = terrimpi_tree_node(tree, first + i);
+        const unsigned char *tops;
+        float scale[2];
+        b->node = terrimpi_sets_place(tree, &node);
+        if (samples && !terrimpi_sets_meets(&b->cell, &b->node, samples))
+            continue;
+        row[i] = 0;
+        if (!b->walls.codes)
+            continue;
+        b->line[0] = b->line[1] = b->axis = 0; /* the same code, whatever was built before */
+        tops = terrimpi_walls_tops(&b->walls, node.number, scale);
+        for (k = 0; k < 16u; k++)
+            b->tops[k] = terrimpi_min(scale[0] + scale[1] * (float)tops[k],
+                                      tree->nodes[node.number].high);
+        row[i] = (uint8_t)terrimpi_sets_code(
+            sets, b->base, terrimpi_sets_search(b, zero, zero, 4u, b->base, most));
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, const void *walls,
+                                                   uint32_t cell, const terrimp_rect *samples)
+{
+    const terrimp_quadtree *tree;
+    terrimpi_sets_job b;
+    terrimp_node node;
+    terrimpi_wall_site site;
+    uint32_t k;
+    TERRIMPI_REFUSE(!sets || !sets->hider.tree, TERRIMP_E_NULL);
+    tree = sets->hider.tree;
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_REFUSE(cell >= terrimpi_sets_level_nodes(tree, sets->cell_level) ||
+                    (samples && !terrimpi_walls_rect(tree, samples, NULL)), TERRIMP_E_RANGE);
+    memset(&b, 0, sizeof b);
+    node = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + cell);
+    b.sets = sets;
+    b.walls = site.walls = terrimpi_walls_of(tree, walls);
+    b.cell = terrimpi_sets_place(tree, &node);
+    b.base = tree->nodes[node.number].low;
+    b.low = terrimpi_sets_low(sets);
+    b.rounding = 4.0f * terrimpi_stand_rounding(tree);
+    for (k = 0; k < 16u; k++) {
+        uint32_t quads = tree->chunk_quads << node.level, part = (quads + 3u) / 4u + 1u;
+        b.ground[k] = terrimpi_wall_sample(&site, node.x * quads + k % 4u * quads / 4u,
+                                           node.z * quads + k / 4u * quads / 4u, part, part, 0);
+    }
+    terrimpi_sets_row(&b, &node, samples);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
+                                              const terrimp_rect *samples)
+{
+    const terrimp_quadtree *tree;
+    terrimpi_sets_job b;
+    uint32_t i;
+    TERRIMPI_REFUSE(!sets || !samples || !sets->hider.tree, TERRIMP_E_NULL);
+    tree = sets->hider.tree;
+    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, NULL), TERRIMP_E_RANGE);
+    memset(&b, 0, sizeof b);
+    b.sets = sets;
+    for (i = 0; i < terrimpi_sets_level_nodes(tree, sets->cell_level); i++) {
+        terrimp_node cell = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + i);
+        b.cell = terrimpi_sets_place(tree, &cell);
+        terrimpi_sets_row(&b, &cell, samples);
     }
     return TERRIMP_OK;
 }
@@ -17972,6 +20388,7 @@ static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *d
     int k;
     TERRIMPI_REFUSE(!desc || !desc->terrain, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_terrain_get_info(desc->terrain, &info));
+    TERRIMPI_REFUSE(desc->terrain->tree.pages, TERRIMP_E_PAGE);
     *d = *desc;
     TERRIMPI_DEFAULT(d->directions, 8u);
     TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
@@ -18060,7 +20477,7 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
    0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
           have an alpha, the share of the pixels in the fade band; texture matrices and
           terrimp_texture_coordinates take positions relative to the eye of the picture;
-          exact_depth; terrimp_view_set; walls, which hide what lies behind ridges; first what
+          exact_depth; terrimp_view_set; a hider, which hides what lies behind ridges; first what
           draws, then what builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement.
           Gone: the pair of atlases (a benchmark has it), evict, query, rect and reset of the live
           atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
