@@ -110,6 +110,15 @@
               |  next nodes        |
               +--------------------+
 
+   IN A SCENE
+       Captures are drawn as the frame's opaque ground is: back faces culled, no blending, not the
+       frame's scissor, alpha 1 written; what stands still may be drawn into them beside the ground,
+       cut to the clip rectangle. Whatever depends on the frame's eye or on time stays out of them:
+       specular light, fog, moving shadows; fog comes on impostors when these are drawn. An sRGB
+       atlas is filtered rightly; captures need no multisampling where the screen has it. On the
+       screen all is opaque and at its own depth: the sky goes before or after, transparent things
+       after.
+
    MEMORY
        The caller owns it. terrimp_terrain_bytes and terrimp_view_bytes say how much; init lays
        everything out in one block and nothing is allocated afterwards. create does the same over
