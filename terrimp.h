@@ -110,6 +110,15 @@
               |  next nodes        |
               +--------------------+
 
+   IN A SCENE
+       Captures are drawn as the frame's opaque ground is: back faces culled, no blending, not the
+       frame's scissor, alpha 1 written; what stands still may be drawn into them beside the ground,
+       cut to the clip rectangle. Whatever depends on the frame's eye or on time stays out of them:
+       specular light, fog, moving shadows; fog comes on impostors when these are drawn. An sRGB
+       atlas is filtered rightly; captures need no multisampling where the screen has it. On the
+       screen all is opaque and at its own depth: the sky goes before or after, transparent things
+       after.
+
    MEMORY
        The caller owns it. terrimp_terrain_bytes and terrimp_view_bytes say how much; init lays
        everything out in one block and nothing is allocated afterwards. create does the same over
@@ -164,6 +173,7 @@
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
+         TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 30 KB of code at -Os on
@@ -387,7 +397,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 /* ==== Camera ============================================================= >>camera */
 
-/* The eye of a frame. The viewport is symmetric about forward and its pixels are square. */
+/* The eye of a frame; or the direction from which a shadow map, or a map, shows the terrain. */
 typedef struct terrimp_camera {
     float eye[3];           /* [wu] [Limits: -1e18..1e18] */
     float forward[3];       /* (required) viewing direction, any length > 0 */
@@ -395,14 +405,31 @@ typedef struct terrimp_camera {
     float fov_y_rad;        /* vertical field of view [Limits: 0.001..3.1] [Default 0 -> pi / 3] */
     uint32_t width_px;      /* (required) viewport [Limits: 1..65536] */
     uint32_t height_px;     /* (required) viewport [Limits: 1..65536] */
-    float z_near;           /* (required) [wu] clip distance along forward [Limits: > 0] */
-    float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
-                               ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
+    float z_near;           /* (required) [wu] clip distance along forward
+                               [Limits: > 0; orthographic: any] */
+    float z_far;            /* [wu] clip distance along forward [Limits: > z_near]
+                               [Default 0, or more than 1e18 -> an infinite far plane;
+                               orthographic: required] */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
     int rows_from_top;      /* nonzero: clip y = +1 is row 0 of a render target (Direct3D, Metal,
                                WebGPU), else its last row (OpenGL, Vulkan). Matrices are alike; the
                                texture matrices of pictures look where these were drawn */
+    int orthographic;       /* nonzero: all rays run along forward, and sides are required */
+    float sides[4];         /* where the viewport ends to the left, right, below, above: tangents
+                               from forward, or [wu] from the eye when it is orthographic.
+                               Off-centre for the eyes of a headset, tiles of a large picture,
+                               jitter [Limits: rising, -1e4..1e4; orthographic: -1e18..1e18]
+                               [Default all 0 -> by fov_y_rad, symmetric, pixels square] */
+    float reach;            /* [wu] what is decided holds for all eyes so close to this one: half
+                               the distance of two that share an update [Limits: 0..1e18] */
 } terrimp_camera;
+
+#ifndef TERRIMP_NO_TROUBLE
+/* The name of a field that makes resolve refuse a descriptor, for whoever looks for a mistake; NULL
+   when there is none. Of several wrong ones it names one. */
+TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field);
+TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera);
+#endif
 
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
    camera. */
@@ -417,7 +444,8 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
                                                    float projection[16]);
 
 /* K, the pixels that one unit of size covers at distance 1 in the middle of the screen:
-   height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels.
+   height_px / (2 tan(fov_y / 2)). An angle of a radians there is about K * a pixels. Orthographic:
+   at any distance. Where pixels are not square, the larger of two.
    Source: de Boer 2000, 1a to 1c: K = C * tolerance. */
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor);
 
@@ -434,7 +462,7 @@ enum {
     TERRIMP_PLANES_OUTSIDE = -1
 };
 
-/* The planes of a camera. */
+/* The planes of a camera, moved out by its reach. */
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
                                                   terrimp_frustum *frustum);
 
@@ -454,13 +482,15 @@ TERRIMP_API int terrimp_frustum_test(const terrimp_frustum *frustum, const terri
 TERRIMP_API float terrimp_box_distance(const terrimp_box *box, const float point[3]);
 TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point[3]);
 
-/* A perspective frustum fitted to a box: the camera of a capture. Its sides are tangents, that is
-   offsets along right and up at distance 1 along forward; left and down are the smaller ones. */
+/* A frustum fitted to a box: the camera of a capture. Its sides are tangents, that is offsets along
+   right and up at distance 1 along forward; left and down are the smaller ones. Of an orthographic
+   one they are [wu], and z_near may be below 0. */
 typedef struct terrimp_capture {
     float eye[3];
     float right[3], up[3], forward[3]; /* orthonormal */
     float z_near, z_far;               /* [wu] along forward */
     float tan_left, tan_right, tan_down, tan_up;
+    int orthographic;
 } terrimp_capture;
 
 /* Fits a frustum with its apex at the eye and its axis through the middle of the box around the
@@ -473,6 +503,14 @@ typedef struct terrimp_capture {
               axis) is useless, -z is up. */
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture);
+
+/* Fits an orthographic frustum around a box's eight corners.
+
+   eye, forward   what its sides and places are relative to; where it looks, any length > 0
+   Errors         E_RANGE as above */
+TERRIMP_API terrimp_result terrimp_capture_fit_along(const terrimp_box *box, const float eye[3],
+                                                     const float forward[3],
+                                                     terrimp_capture *capture);
 
 /* Narrows a fitted capture to points, for instance the vertices that its picture is drawn on: its
    sides touch their projections. The clip distances stay.
@@ -508,6 +546,7 @@ typedef struct terrimp_quadtree {
     uint32_t level_x[TERRIMP_QUADTREE_LEVELS], level_z[TERRIMP_QUADTREE_LEVELS]; /* its nodes */
     struct terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
     struct terrimp_pages *pages; /* of a terrain in pages, which has no nodes: else NULL */
+    uint32_t edits;            /* to be counted up when nodes have been built anew: views notice */
 } terrimp_quadtree;
 
 /* Lays the quadtree out; nodes is left NULL for the caller to set.
@@ -516,6 +555,14 @@ typedef struct terrimp_quadtree {
                 fewer triangles, for the same picture */
 TERRIMP_API terrimp_result terrimp_quadtree_init(const terrimp_heightfield *field,
                                                  uint32_t chunk_quads, terrimp_quadtree *tree);
+
+/* The node of a level over a world position; on a border between two, the one towards +x, +z.
+
+   level    [Limits: < level_count]
+   x, z     [wu]
+   Errors   E_MISS beside the field */
+TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, uint32_t level,
+                                                 float x, float z, terrimp_node *node);
 
 /* ==== Geomipmap ========================================================== >>geomipmap */
 
@@ -629,6 +676,16 @@ typedef struct terrimp_geomip_view {
     float distances_for[5];       /* private: what distances was made for */
     uint32_t frame;               /* private */
 } terrimp_geomip_view;
+
+/* The bytes of a block for the arrays of a view, 0 for bad arguments; and a view whose arrays lie
+   in such a block: set what is to be other than the default, and select.
+
+   draw_capacity   [Limits: >= 1] the chunks of level 0 are enough
+   memory          [bytes] aligned to 8 bytes */
+TERRIMP_API size_t terrimp_geomip_view_bytes(const terrimp_quadtree *tree, uint32_t draw_capacity);
+TERRIMP_API terrimp_result terrimp_geomip_view_init(const terrimp_quadtree *tree,
+                                                    uint32_t draw_capacity, void *memory,
+                                                    size_t bytes, terrimp_geomip_view *view);
 
 /* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
    level, those outside of the camera's view are left out.
@@ -822,7 +879,8 @@ typedef struct terrimp_split {
               [Limits: > 0]
    overlap    [wu] by which each part goes beyond the place of the split, since the mesh is not the
               terrain; what hides and what is hidden must both be that far from it [Limits: >= 0]
-   Errors     E_RANGE, also for an index beyond the vertices or a count not of triangles
+   Errors     E_RANGE, also for an index beyond the vertices, a count not of triangles, and an
+              orthographic capture
    Cost       O(triangles): about 8 us for 85 triangles; 2 KB of stack
    Source     Hess 2010, section 6.2, which proposes the split and leaves its place open */
 TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture, const float *xyz,
@@ -958,6 +1016,11 @@ typedef struct terrimp_terrain_info {
 /* Writes the effective descriptor, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_desc *desc,
                                                         terrimp_terrain_desc *out);
+
+#ifndef TERRIMP_NO_TROUBLE
+/* As terrimp_heightfield_trouble; a wrong field of the heightfield is named by itself. */
+TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc);
+#endif
 
 /* Lists the nodes whose vertices have to be filled anew after some samples have changed: ground and
    coarse meshes; the floor, too, may have changed.
@@ -1199,7 +1262,8 @@ TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
                                                 const terrimp_quadtree *tree, const void *walls);
 
 /* Begins the horizon of a camera. Ground that z_near clips hides nothing. An eye below the ground
-   or beside the terrain has no horizon: nothing is hidden from it, and that is no error.
+   or beside the terrain has no horizon, nor have an orthographic camera or one with a reach:
+   nothing is hidden from these, and that is no error.
 
    error    how far below its samples the ground in front may be drawn, over the distance to it:
             0 for full resolution; a picture that is up to n pixels off its place: n / K
@@ -1472,6 +1536,9 @@ typedef struct terrimp_view_desc {
     uint32_t atlas_size;    /* texels along the side of each of the host's atlas textures
                                [Limits: 64..32768] [Default 0 -> 4096] */
     uint32_t atlas_count;   /* atlas textures [Limits: 1..16] [Default 0 -> 1] */
+    uint32_t max_slot;      /* texels along a side of a picture's slot at most: what would need more
+                               is coarser [Limits: 12..atlas_size]
+                               [Default 0 -> half of atlas_size] */
     uint32_t max_impostors; /* pictures kept at most [Limits: 1..65534] [Default 0 -> 1024] */
     uint32_t max_ground;    /* ground nodes drawn at most; AUTO and GEOMIP coarsen the ground rather
                                than exceed it, FULL and IMPOSTOR need the chunks in sight
@@ -1494,6 +1561,10 @@ typedef struct terrimp_view_desc {
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
                                [Default NULL -> nothing is hidden so] */
+    uint32_t joined;        /* bit i: beyond side i (TERRIMP_SIDE_...) another terrain goes on, with
+                               this one's border samples as its own: the floor is drawn for eyes
+                               over that one, too, so that no sky shows between the two
+                               [Limits: 0..15] */
     terrimp_costs costs;
 } terrimp_view_desc;
 
@@ -1576,14 +1647,20 @@ typedef struct terrimp_stats {
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
-                                    drawn: update with a camera that sees far enough, then draw with
-                                    these; z_near is 0 within a box */
+                                    drawn, for a host that wants to draw with these; z_near is 0
+                                    within a box */
 } terrimp_stats;
 
 /* Writes the effective settings for a terrain, defaults filled in. out may be desc. */
 TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terrain,
                                                      const terrimp_view_desc *desc,
                                                      terrimp_view_desc *out);
+
+#ifndef TERRIMP_NO_TROUBLE
+/* As terrimp_heightfield_trouble; `costs` stands for each of its fields. */
+TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
+                                                  const terrimp_view_desc *desc);
+#endif
 
 /* Bytes of the block that a view lives in; 0 when an argument is wrong or the size overflows. */
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain,
@@ -1607,7 +1684,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
 
-/* Decides the frame: what is visible, what is drawn how, which pictures are made.
+/* Decides the frame: what is visible, what is drawn how, which pictures are made. A view serves
+   perspective or orthographic cameras, and forgets its pictures from one kind to the other.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
               more nodes in GEOMIP and AUTO even at 1000 px; E_PAGE when the page of the root is not
@@ -1642,6 +1720,10 @@ TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
    With `sorted`: captures, the floor, then ground and impostors as they come, farthest first, and
    of a picture in two parts the back part first.
+   An update may be rendered any number of times: captures come with the first one, all other
+   commands are the same again. They serve every eye within the camera's reach that looks through
+   its sides, each with matrices of its own; a place_matrix is relative to the update's eye. An
+   update that is never rendered makes no picture, and loses none.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
               before the first update, and after invalidate, touch and drop until the next one */
@@ -1840,7 +1922,8 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
 
    Errors     E_RANGE also when the eye is more than 2^23 samples from the origin, or when z_far
               reaches over more than 1024 pages, with TERRIMP_FIXED also 2048 quads less three
-              pages. After any error next returns 0
+              pages; or for a camera that is orthographic, or without a far plane. After any error
+              next returns 0
    Cost       about 2 us; with max_triangles one to two thirds of what next takes for the whole
               frame, more for the first
    Source     Finch and Bishop 1998, sections 4.3 and 4.10 */
@@ -2094,6 +2177,28 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
 TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, void *scratch,
                                             size_t scratch_bytes, terrimp_mesh *mesh);
 
+/* The bytes of scratch that terrimp_simplify_field wants; 0 when a number is outside its limits. */
+TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
+                                                        uint32_t triangle_budget);
+
+/* Simplifies a rectangle of a heightfield in one call. Its borders are simplified on their own, to
+   as many points as the budget asks for, so that two of them side by side meet.
+
+   samples          inside the field [Limits: width, height 2..TERRIMP_MAX_TILE_DIM]
+   triangle_budget  [Limits: 6..TERRIMP_MAX_TRIANGLES] [Default 0 -> TERRIMP_TRIANGLE_BUDGET]
+   max_error        [wu] above 0: as few triangles as are found to keep every sample within it; all
+                    of the budget when that is not enough [Limits: >= 0]
+   scratch          [bytes] as for terrimp_simplify
+   mesh             in: arrays, as terrimp_mesh_capacity says; out: in samples of the rectangle
+   error            out: [wu] the largest vertical distance of a sample; NULL: not wanted
+   Errors           E_VOID for a sample without data
+   Cost             that of terrimp_simplify; with max_error some ten times as much */
+TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
+                                                  const terrimp_rect *samples,
+                                                  uint32_t triangle_budget, float max_error,
+                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
+                                                  float *error);
+
 /* --- skirts (Hess 4.2) --- */
 
 /* Appends a skirt: a wall along the border, of as many vertices as its loop and two triangles for
@@ -2226,20 +2331,35 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
 TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void *scratch,
                                                  size_t bytes);
 
-/* Builds anew, after the host has changed samples, the nodes of all levels that these belong to,
-   and finishes. The result is that of building everything anew, bit for bit, with the same range of
-   heights: name one in the descriptor, so that it does not hang on what the samples once were. No
-   view may update meanwhile, and the pictures of the nodes are old; terrimp_terrain_touched lists
-   whose vertices are.
+/* Takes note of samples that the host has changed, so that all can be drawn at once: boxes and
+   errors of the nodes of all levels that they belong to hold for the new ones, too, but may be
+   larger than need be; and views draw these nodes as ground, which is the new one. The rest is left
+   to terrimp_terrain_refine. Call terrimp_view_touch for each view, fill the ground of the nodes of
+   terrimp_terrain_touched anew. No view may update meanwhile. Name the range of heights in the
+   descriptor, so that it does not hang on what the samples once were.
 
    samples    the changed ones: columns from x on, rows from y on [Limits: width, height >= 1, and
               it begins inside the field]; what reaches over the last column and row is cut
-   scratch    [bytes] at least terrimp_terrain_scratch_bytes
    Errors     E_RANGE for a rectangle outside of the limits or a height outside of the range;
               E_VOID, E_NOT_FINITE for such a sample; E_STATE before build_finish and for a terrain
               that uses a bake. Nothing has changed then
-   Cost       that of build_node for each such node: the root has every sample. A host that cannot
-              wait calls build_node itself, a few nodes a frame, from the finest level up */
+   Cost       however large the terrain, about 0.5 ms for 16 x 16 samples */
+TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
+                                                const terrimp_rect *samples);
+
+/* Builds some of the nodes anew that edits have left, from the finest level up; between frames.
+   When none is left all is as if everything had been built anew, bit for bit, with the same range.
+
+   nodes      [count] out: which ones; their coarse meshes are to be filled anew. NULL: not wanted
+   count      how many at most
+   done       out: how many; less than count when none is left
+   scratch    [bytes] at least terrimp_terrain_scratch_bytes
+   Cost       that of build_node for each: the root has every sample, and comes last */
+TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint32_t *nodes,
+                                                  uint32_t count, uint32_t *done, void *scratch,
+                                                  size_t bytes);
+
+/* Both in one: nothing is left then. */
 TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, void *scratch,
                                                    size_t bytes);
@@ -2295,6 +2415,7 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
    out        [bytes] aligned to 8 bytes
    bytes      at least terrimp_bake_bytes
    swapped    nonzero: for a machine of the other byte order
+   Errors     E_STATE also while terrimp_terrain_refine has nodes left to build
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes, int swapped);
@@ -3095,6 +3216,34 @@ static void terrimpi_widen(float *low, float *high, float slope)
     *high += margin;
 }
 
+#ifndef TERRIMP_NO_TROUBLE
+
+/* A field of a descriptor. */
+typedef struct terrimpi_trouble_field {
+    const char *name;
+    size_t at, bytes;
+} terrimpi_trouble_field;
+
+#define TERRIMPI_TROUBLE(type, field) {#field, offsetof(type, field), sizeof(((type *)0)->field)}
+
+/* Takes fields of a good descriptor for those of a bad one, one after the other, until it is good:
+   the last one was wrong. NULL when none was. */
+static const char *terrimpi_trouble(void *bad, const void *good,
+                                    const terrimpi_trouble_field *fields, size_t count,
+                                    terrimp_result (*resolve)(const void *context, void *desc),
+                                    const void *context)
+{
+    const char *name = NULL;
+    size_t i;
+    for (i = 0; i < count && resolve(context, bad) != TERRIMP_OK; i++) {
+        name = fields[i].name;
+        memcpy((char *)bad + fields[i].at, (const char *)good + fields[i].at, fields[i].bytes);
+    }
+    return name;
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
+
 /* ==== Heightfield ======================================================== >>impl-heightfield */
 
 /* Based on: Bornemann and Deuflhard 1996 (voids), Amanatides and Woo 1987 (ray walk).
@@ -3794,6 +3943,44 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
     return terrimpi_field_ray_walk(&f, &ray, x, z, hit);
 }
 
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_field_try(const void *context, void *desc)
+{
+    (void)context;
+    return terrimp_heightfield_resolve((const terrimp_heightfield *)desc,
+                                       (terrimp_heightfield *)desc);
+}
+
+TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_heightfield, samples),
+        TERRIMPI_TROUBLE(terrimp_heightfield, width),
+        TERRIMPI_TROUBLE(terrimp_heightfield, depth),
+        TERRIMPI_TROUBLE(terrimp_heightfield, format),
+        TERRIMPI_TROUBLE(terrimp_heightfield, row_bytes),
+        TERRIMPI_TROUBLE(terrimp_heightfield, spacing_x),
+        TERRIMPI_TROUBLE(terrimp_heightfield, spacing_z),
+        TERRIMPI_TROUBLE(terrimp_heightfield, height_scale),
+        TERRIMPI_TROUBLE(terrimp_heightfield, height_offset),
+        TERRIMPI_TROUBLE(terrimp_heightfield, origin_x),
+        TERRIMPI_TROUBLE(terrimp_heightfield, origin_z),
+        TERRIMPI_TROUBLE(terrimp_heightfield, no_data)
+    };
+    terrimp_heightfield good, bad;
+    if (!field)
+        return "the descriptor";
+    memset(&good, 0, sizeof good);
+    good.samples = &good; /* aligned for any */
+    good.width = good.depth = 2;
+    bad = *field;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_field_try, NULL);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
+
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
@@ -3807,6 +3994,28 @@ static int terrimpi_camera_orthonormal(const float a[3], const float b[3])
            terrimpi_abs(terrimpi_dot(a, b)) < 2e-6f;
 }
 
+static int terrimpi_camera_has_sides(const terrimp_camera *c)
+{
+    return c->sides[0] != 0.0f || c->sides[1] != 0.0f || c->sides[2] != 0.0f ||
+           c->sides[3] != 0.0f;
+}
+
+/* Whether a camera's sides are within their limits, with some size for a float to tell. */
+static int terrimpi_camera_sides_fit(const terrimp_camera *c)
+{
+    float most = c->orthographic ? TERRIMPI_CAMERA_FARTHEST : 1e4f;
+    int i;
+    if (!terrimpi_camera_has_sides(c))
+        return !c->orthographic;
+    for (i = 0; i < 4; i += 2) {
+        const float *s = c->sides + i;
+        float larger = terrimpi_max(terrimpi_abs(s[0]), terrimpi_abs(s[1]));
+        if (larger > most || !(s[1] - s[0] > 1e-5f * larger))
+            return 0;
+    }
+    return 1;
+}
+
 TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, terrimp_camera *out)
 {
     terrimp_camera c;
@@ -3815,14 +4024,20 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     c = *camera;
     TERRIMPI_REFUSE(!terrimpi_finite3(c.eye) || !terrimpi_finite3(c.forward) ||
                     !terrimpi_finite3(c.up) || !terrimpi_finite2(c.z_near, c.z_far) ||
+                    !terrimpi_finite3(c.sides) || !terrimpi_finite2(c.sides[3], c.reach) ||
                     !terrimpi_finite(c.fov_y_rad), TERRIMP_E_NOT_FINITE);
     TERRIMPI_DEFAULT(c.fov_y_rad, 1.0471976f);
+    if (!c.orthographic && (c.z_far == 0.0f || c.z_far > TERRIMPI_CAMERA_FARTHEST))
+        c.z_far = TERRIMPI_FLOAT_MAX;
     if (c.up[0] == 0.0f && c.up[1] == 0.0f && c.up[2] == 0.0f)
         c.up[1] = 1.0f;
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
-                    !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || c.z_far > TERRIMPI_CAMERA_FARTHEST ||
+                    !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_far <= c.z_near ||
+                    (c.orthographic ? c.z_far > TERRIMPI_CAMERA_FARTHEST ||
+                     c.z_near < -TERRIMPI_CAMERA_FARTHEST
+                                    : c.z_near <= 0.0f) || !terrimpi_camera_sides_fit(&c) ||
+                    !terrimpi_within(c.reach, 0.0f, TERRIMPI_CAMERA_FARTHEST) ||
                     terrimpi_largest(c.eye) > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
     if (!terrimpi_camera_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
         TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
@@ -3832,25 +4047,80 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     return TERRIMP_OK;
 }
 
-/* Half the height and width of a resolved camera's screen at distance 1. */
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_camera_try(const void *context, void *desc)
+{
+    (void)context;
+    return terrimp_camera_resolve((const terrimp_camera *)desc, (terrimp_camera *)desc);
+}
+
+TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_camera, eye),
+        TERRIMPI_TROUBLE(terrimp_camera, forward),
+        TERRIMPI_TROUBLE(terrimp_camera, up),
+        TERRIMPI_TROUBLE(terrimp_camera, fov_y_rad),
+        TERRIMPI_TROUBLE(terrimp_camera, width_px),
+        TERRIMPI_TROUBLE(terrimp_camera, height_px),
+        TERRIMPI_TROUBLE(terrimp_camera, z_near),
+        TERRIMPI_TROUBLE(terrimp_camera, z_far),
+        TERRIMPI_TROUBLE(terrimp_camera, orthographic),
+        TERRIMPI_TROUBLE(terrimp_camera, sides),
+        TERRIMPI_TROUBLE(terrimp_camera, reach)
+    };
+    terrimp_camera good, bad;
+    if (!camera)
+        return "the descriptor";
+    memset(&good, 0, sizeof good);
+    good.forward[2] = -1.0f;
+    good.width_px = good.height_px = 1;
+    good.z_near = 1.0f;
+    bad = *camera;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_camera_try, NULL);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
+
+/* The sides of a resolved camera's screen at distance 1: left, right, down, up. */
+static void terrimpi_camera_sides(const terrimp_camera *camera, float sides[4])
+{
+    memcpy(sides, camera->sides, sizeof camera->sides);
+    if (terrimpi_camera_has_sides(camera))
+        return;
+    sides[3] = TERRIMP_TANF(camera->fov_y_rad * 0.5f);
+    sides[1] = sides[3] * (float)camera->width_px / (float)camera->height_px;
+    sides[0] = -sides[1];
+    sides[2] = -sides[3];
+}
+
+/* How far the screen reaches to either side of forward, up or down from it, at distance 1. */
 static void terrimpi_camera_tangents(const terrimp_camera *camera, float *tan_x, float *tan_y)
 {
-    *tan_y = TERRIMP_TANF(camera->fov_y_rad * 0.5f);
-    *tan_x = *tan_y * (float)camera->width_px / (float)camera->height_px;
+    float sides[4];
+    terrimpi_camera_sides(camera, sides);
+    *tan_x = terrimpi_max(-sides[0], sides[1]);
+    *tan_y = terrimpi_max(-sides[2], sides[3]);
 }
 
 /* The frustum of a resolved camera, as that of a capture. */
 static void terrimpi_camera_capture(const terrimp_camera *camera, terrimp_capture *out)
 {
+    float sides[4];
     memcpy(out->eye, camera->eye, sizeof out->eye);
     memcpy(out->up, camera->up, sizeof out->up);
     memcpy(out->forward, camera->forward, sizeof out->forward);
     terrimpi_cross(camera->forward, camera->up, out->right);
     out->z_near = camera->z_near;
     out->z_far = camera->z_far;
-    terrimpi_camera_tangents(camera, &out->tan_right, &out->tan_up);
-    out->tan_left = -out->tan_right;
-    out->tan_down = -out->tan_up;
+    terrimpi_camera_sides(camera, sides);
+    out->tan_left = sides[0];
+    out->tan_right = sides[1];
+    out->tan_down = sides[2];
+    out->tan_up = sides[3];
+    out->orthographic = camera->orthographic != 0;
 }
 
 TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera, float view[16],
@@ -3867,9 +4137,12 @@ TERRIMP_API terrimp_result terrimp_camera_matrices(const terrimp_camera *camera,
 /* terrimp_camera_pixel_factor of a resolved camera. */
 static float terrimpi_camera_pixel_factor(const terrimp_camera *camera)
 {
-    float tan_x, tan_y;
-    terrimpi_camera_tangents(camera, &tan_x, &tan_y);
-    return (float)camera->height_px / (2.0f * tan_y);
+    float sides[4], factor;
+    terrimpi_camera_sides(camera, sides);
+    factor = (float)camera->height_px / (sides[3] - sides[2]);
+    return terrimpi_camera_has_sides(camera)
+               ? terrimpi_max(factor, (float)camera->width_px / (sides[1] - sides[0]))
+               : factor;
 }
 
 TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *camera, float *factor)
@@ -3881,24 +4154,51 @@ TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *cam
     return TERRIMP_OK;
 }
 
-/* terrimp_camera_frustum of a resolved camera. */
+/* terrimp_camera_frustum of a resolved camera. A side's plane holds the eye, or runs along forward
+   beside it. */
 static void terrimpi_camera_frustum(const terrimp_camera *camera, terrimp_frustum *frustum)
 {
     terrimp_capture c;
-    int i;
+    float sides[4], along;
+    int i, k;
     terrimpi_camera_capture(camera, &c);
+    terrimpi_camera_sides(camera, sides);
     memset(frustum, 0, sizeof *frustum);
+    along = c.orthographic ? 0.0f : 1.0f;
     for (i = 0; i < 3; i++) {
         frustum->eye[i] = c.eye[i];
-        frustum->plane[0][i] = c.right[i] - c.forward[i] * c.tan_left;
-        frustum->plane[1][i] = c.forward[i] * c.tan_right - c.right[i];
-        frustum->plane[2][i] = c.up[i] - c.forward[i] * c.tan_down;
-        frustum->plane[3][i] = c.forward[i] * c.tan_up - c.up[i];
         frustum->plane[4][i] = c.forward[i];
         frustum->plane[5][i] = -c.forward[i];
     }
     frustum->plane[4][3] = -c.z_near;
     frustum->plane[5][3] = c.z_far;
+    for (k = 0; k < 4; k++) {
+        const float *axis = k < 2 ? c.right : c.up;
+        float sign = k & 1 ? -1.0f : 1.0f, *plane = frustum->plane[k];
+        for (i = 0; i < 3; i++)
+            plane[i] = sign * (axis[i] - c.forward[i] * (along * sides[k]));
+        plane[3] = (along - 1.0f) * sign * sides[k];
+    }
+    for (k = 0; k < 6 && camera->reach > 0.0f; k++)
+        frustum->plane[k][3] += camera->reach * terrimpi_length(frustum->plane[k]);
+}
+
+/* Where decisions about a resolved camera's picture of a box are made from; returns K there. About
+   an orthographic one they are made from so far away that all directions to the box are alike to
+   2^-16, and nothing in it, or about it by half its size, is farther than K counts with. */
+static float terrimpi_camera_stand(const terrimp_camera *camera, const terrimp_box *all,
+                                   float eye[3])
+{
+    float factor = terrimpi_camera_pixel_factor(camera), size, away;
+    int i;
+    memcpy(eye, camera->eye, sizeof camera->eye);
+    if (!camera->orthographic)
+        return factor;
+    size = terrimp_box_farthest(all, all->min);
+    away = terrimpi_min(65536.0f * size, 0.1f * TERRIMPI_CAMERA_FARTHEST);
+    for (i = 0; i < 3; i++)
+        eye[i] = all->min[i] + (all->max[i] - all->min[i]) * 0.5f - camera->forward[i] * away;
+    return factor * (away + size);
 }
 
 TERRIMP_API terrimp_result terrimp_camera_frustum(const terrimp_camera *camera,
@@ -3953,6 +4253,29 @@ TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point
     return terrimpi_length(d);
 }
 
+/* Moves the sides of a box out. */
+static void terrimpi_camera_grow(terrimp_box *box, float by)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        box->min[i] -= by;
+        box->max[i] += by;
+    }
+}
+
+/* From the least to the largest depth of a box along a direction from an eye. */
+static void terrimpi_camera_depths(const terrimp_box *box, const float eye[3],
+                                   const float forward[3], float *first, float *last)
+{
+    int i;
+    *first = *last = 0.0f;
+    for (i = 0; i < 3; i++) {
+        float f = forward[i];
+        *first += f * ((f > 0.0f ? box->min[i] : box->max[i]) - eye[i]);
+        *last += f * ((f > 0.0f ? box->max[i] : box->min[i]) - eye[i]);
+    }
+}
+
 /* Corner i of a box (bit k of i: the maximum along axis k), relative to a point. */
 static void terrimpi_camera_box_corner(const terrimp_box *box, int i, const float point[3],
                                        float corner[3])
@@ -3964,7 +4287,7 @@ static void terrimpi_camera_box_corner(const terrimp_box *box, int i, const floa
 
 /* Fits the sides and clip distances of a capture to points, with a hair's breadth more, so that
    rounding leaves none outside and a flat box has a volume. Returns 0 when the cosine between
-   forward and the way to one of them is not above `least`. */
+   forward and the way to one of them is not above `least`, unless the capture is orthographic. */
 static int terrimpi_camera_fit_sides(terrimp_capture *c, const float *xyz, uint32_t count,
                                      float least)
 {
@@ -3976,12 +4299,18 @@ static int terrimpi_camera_fit_sides(terrimp_capture *c, const float *xyz, uint3
         float p[3], length, z, x, y;
         terrimpi_sub(xyz + 3u * i, c->eye, p);
         z = terrimpi_dot(c->forward, p);
+        x = terrimpi_dot(c->right, p);
+        y = terrimpi_dot(c->up, p);
         length = terrimpi_length(p);
-        if (!(z > least * length))
-            return 0;
-        slope = terrimpi_max(slope, length / z);
-        x = terrimpi_dot(c->right, p) / z;
-        y = terrimpi_dot(c->up, p) / z;
+        if (c->orthographic) {
+            slope = terrimpi_max(slope, length);
+        } else {
+            if (!(z > least * length))
+                return 0;
+            slope = terrimpi_max(slope, length / z);
+            x /= z;
+            y /= z;
+        }
         c->z_near = terrimpi_min(c->z_near, z);
         c->z_far = terrimpi_max(c->z_far, z);
         c->tan_left = terrimpi_min(c->tan_left, x);
@@ -3989,27 +4318,35 @@ static int terrimpi_camera_fit_sides(terrimp_capture *c, const float *xyz, uint3
         c->tan_down = terrimpi_min(c->tan_down, y);
         c->tan_up = terrimpi_max(c->tan_up, y);
     }
-    c->z_near *= 1.0f - 1e-6f * slope;
-    c->z_far *= 1.0f + 1e-6f * slope;
+    if (c->orthographic) { /* of a flat box, too, there is a volume */
+        c->z_near -= 1e-6f * slope;
+        c->z_far += 1e-6f * slope;
+    } else {
+        c->z_near *= 1.0f - 1e-6f * slope;
+        c->z_far *= 1.0f + 1e-6f * slope;
+    }
     terrimpi_widen(&c->tan_left, &c->tan_right, slope);
     terrimpi_widen(&c->tan_down, &c->tan_up, slope);
     return 1;
 }
 
-/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error. */
+/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error; orthographic,
+   as terrimp_capture_fit_along, where forward is not NULL. */
 static terrimp_result terrimpi_camera_fit(const terrimp_box *box, const float eye[3],
-                                          terrimp_capture *c)
+                                          const float forward[3], terrimp_capture *c)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
     static const float origin[3] = {0.0f, 0.0f, 0.0f};
     float corners[8][3];
     int i;
-    TERRIMPI_REFUSE(terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
+    TERRIMPI_REFUSE(!forward && terrimp_box_distance(box, eye) <= 0.0f, TERRIMP_E_INSIDE);
+    c->orthographic = forward ? 1 : 0;
     for (i = 0; i < 3; i++) {
         c->eye[i] = eye[i];
-        c->forward[i] = (box->min[i] - eye[i]) * 0.5f + (box->max[i] - eye[i]) * 0.5f;
+        c->forward[i] = forward ? forward[i] : (box->min[i] - eye[i]) * 0.5f +
+                                                   (box->max[i] - eye[i]) * 0.5f;
     }
-    TERRIMPI_REFUSE(!terrimpi_normalize(c->forward), TERRIMP_E_INSIDE);
+    TERRIMPI_REFUSE(!terrimpi_normalize(c->forward), forward ? TERRIMP_E_RANGE : TERRIMP_E_INSIDE);
     memcpy(c->up, c->forward[1] * c->forward[1] > 0.9999f ? minus_z : y_axis, sizeof c->up);
     terrimpi_basis(c->forward, c->up, c->right);
     for (i = 0; i < 8; i++)
@@ -4018,19 +4355,35 @@ static terrimp_result terrimpi_camera_fit(const terrimp_box *box, const float ey
     return terrimpi_camera_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture)
+static terrimp_result terrimpi_capture_fit_checked(const terrimp_box *box, const float eye[3],
+                                                   const float forward[3],
+                                                   terrimp_capture *capture)
 {
     terrimp_capture c;
     TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-                    !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite3(eye) || (forward && !terrimpi_finite3(forward)),
+                    TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
                     box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_CAMERA_FARTHEST ||
                     terrimp_box_farthest(box, eye) > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
-    TERRIMPI_TRY(terrimpi_camera_fit(box, eye, &c));
+    TERRIMPI_TRY(terrimpi_camera_fit(box, eye, forward, &c));
     *capture = c;
     return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture)
+{
+    return terrimpi_capture_fit_checked(box, eye, NULL, capture);
+}
+
+TERRIMP_API terrimp_result terrimp_capture_fit_along(const terrimp_box *box, const float eye[3],
+                                                     const float forward[3],
+                                                     terrimp_capture *capture)
+{
+    TERRIMPI_REFUSE(!forward, TERRIMP_E_NULL);
+    return terrimpi_capture_fit_checked(box, eye, forward, capture);
 }
 
 /* Fits the sides alone. */
@@ -4079,10 +4432,23 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     memset(projection, 0, 16 * sizeof *projection);
     projection[0] = 2.0f / width;
     projection[5] = 2.0f / height;
+    if (c->orthographic) {
+        projection[10] = (depth_zero_to_one ? -1.0f : -2.0f) / depth;
+        projection[12] = -(c->tan_right + c->tan_left) / width;
+        projection[13] = -(c->tan_up + c->tan_down) / height;
+        projection[14] = -(depth_zero_to_one ? c->z_near : c->z_far + c->z_near) / depth;
+        projection[15] = 1.0f;
+        return TERRIMP_OK;
+    }
     projection[8] = (c->tan_right + c->tan_left) / width;
     projection[9] = (c->tan_up + c->tan_down) / height;
     projection[10] = -(depth_zero_to_one ? c->z_far : c->z_far + c->z_near) / depth;
     projection[11] = -1.0f;
+    if (c->z_far > TERRIMPI_CAMERA_FARTHEST) { /* without a far plane */
+        projection[10] = -1.0f;
+        projection[14] = (depth_zero_to_one ? -1.0f : -2.0f) * c->z_near;
+        return TERRIMP_OK;
+    }
     projection[14] = (depth_zero_to_one ? -c->z_far : -2.0f * c->z_far) * c->z_near / depth;
     return TERRIMP_OK;
 }
@@ -4216,6 +4582,19 @@ static void terrimpi_tree_box(const terrimp_quadtree *t, const terrimp_node *n, 
     box->max[1] = high;
     box->min[2] = terrimpi_tree_z(t, n->level, j);
     box->max[2] = terrimpi_tree_z(t, n->level, j + t->chunk_quads);
+}
+
+TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, uint32_t level,
+                                                 float x, float z, terrimp_node *node)
+{
+    uint32_t i, j;
+    TERRIMPI_REFUSE(!tree || !node, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(level >= tree->level_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_locate(&tree->field, x, z, &i, &j), TERRIMP_E_MISS);
+    *node = terrimpi_tree_at(tree, level, (i / tree->chunk_quads) >> level,
+                             (j / tree->chunk_quads) >> level);
+    return TERRIMP_OK;
 }
 
 /* ---- what is kept of it ---- */
@@ -4679,6 +5058,7 @@ typedef struct terrimpi_mip_frame {
     terrimp_geomip_view *view;
     terrimp_frustum frustum;
     float eye[3], forward[3];
+    float reach;               /* of the camera */
     float heading[2];          /* x, z; unit length */
     float level, steep;
     float along, across;       /* largest tangents on the screen, in the direction in which y is
@@ -4695,12 +5075,15 @@ typedef struct terrimpi_mip_frame {
 static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera *camera,
                                     float margin)
 {
-    float right[3], seen[3], aside[3], tan_x, tan_y;
+    float right[3], seen[3], aside[3], tan_x = 0.0f, tan_y = 0.0f;
     terrimpi_cross(camera->forward, camera->up, right);
-    terrimpi_camera_tangents(camera, &tan_x, &tan_y);
+    if (camera->orthographic)
+        margin = 1.0f / 65536.0f; /* see terrimpi_camera_stand */
+    else
+        terrimpi_camera_tangents(camera, &tan_x, &tan_y);
     tan_x += margin;
     tan_y += margin;
-    memcpy(f->eye, camera->eye, sizeof f->eye);
+    f->reach = camera->reach;
     f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
     if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
         return;
@@ -4798,6 +5181,7 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    terrimpi_camera_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
     measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
@@ -4961,7 +5345,7 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     wanted[1] = v->tolerance_px;
     wanted[2] = v->morph_ratio;
     wanted[3] = v->rule == TERRIMP_GEOMIP_DISTANCE ? pixel_factor / f->cos2 : pixel_factor;
-    wanted[4] = 1.0f;
+    wanted[4] = 1.0f + (float)(f->tree->edits & 0xffffffu);
     f->factor = wanted[3];
     if (f->tree->pages) /* they say what those below ask of them */
         return;
@@ -4970,6 +5354,40 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     memcpy(v->distances_for, wanted, sizeof wanted);
     terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
                            v->distances);
+}
+
+/* The one description of a view's block. */
+static size_t terrimpi_mip_layout(const terrimp_quadtree *tree, uint32_t draw_capacity,
+                                  unsigned char *base, terrimp_geomip_view *view)
+{
+    terrimpi_arena a = terrimpi_arena_at(base);
+    size_t count = tree->node_count;
+    memset(view, 0, sizeof *view);
+    view->draw_capacity = draw_capacity;
+    view->distances = (float *)terrimpi_take(&a, count, sizeof *view->distances);
+    view->marks = (terrimp_geomip_mark *)terrimpi_take(&a, count, sizeof *view->marks);
+    view->draws = (terrimp_geomip_draw *)terrimpi_take(&a, draw_capacity, sizeof *view->draws);
+    return a.ok ? a.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_geomip_view_bytes(const terrimp_quadtree *tree, uint32_t draw_capacity)
+{
+    terrimp_geomip_view view;
+    return tree && draw_capacity ? terrimpi_mip_layout(tree, draw_capacity, NULL, &view) : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_geomip_view_init(const terrimp_quadtree *tree,
+                                                    uint32_t draw_capacity, void *memory,
+                                                    size_t bytes, terrimp_geomip_view *view)
+{
+    size_t needed = terrimp_geomip_view_bytes(tree, draw_capacity);
+    TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(draw_capacity == 0, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
+    TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
+    memset(memory, 0, needed);
+    terrimpi_mip_layout(tree, draw_capacity, (unsigned char *)memory, view);
+    return TERRIMP_OK;
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
@@ -4990,8 +5408,12 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
 static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tree,
                               terrimp_geomip_view *view, const terrimp_camera *camera, float scale)
 {
-    float pixel_factor = terrimpi_camera_pixel_factor(camera);
+    terrimp_node root = terrimpi_tree_root(tree);
+    float pixel_factor;
+    terrimp_box all;
     uint32_t level;
+    terrimpi_mip_box(tree, &root, &all);
+    pixel_factor = terrimpi_camera_stand(camera, &all, f->eye);
     terrimpi_camera_frustum(camera, &f->frustum);
     f->tree = tree;
     f->view = view;
@@ -5245,10 +5667,10 @@ static void terrimpi_impostor_texture_matrix(const terrimp_capture *capture,
     offset[1] = (float)slot->y / (float)atlas_height + scale[1];
     offset[2] = 0.5f;
     /* Row i of the result: scale[i] * row i of P V + offset[i] * row 3 of P V, where row 3 is the
-       distance along forward: the q that s and t are divided by. */
+       distance along forward, or 1: the q that s and t are divided by. */
     for (column = 0; column < 4; column++) {
         const float *v = view + column * 4;
-        float q = -v[2];
+        float q = capture->orthographic ? v[3] : -v[2];
         for (row = 0; row < 3; row++) {
             float clip = projection[row] * v[0] + projection[4 + row] * v[1] +
                          projection[8 + row] * v[2] + projection[12 + row] * v[3];
@@ -5278,7 +5700,7 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
 
 /* A place at the distance z along forward is z (forward + x right + y up) from the capture's eye,
    with tangents x and y that grow with s and t; and 1 / z grows with the depth, from 1 / z_near to
-   1 / z_far. So (place, 1) / z is linear in all three. */
+   1 / z_far. So (place, 1) / z is linear in all three. Of an orthographic capture the place is. */
 static void terrimpi_impostor_place_matrix(const terrimp_capture *c, const terrimp_rect *slot,
                                            uint32_t atlas_width, uint32_t atlas_height,
                                            float matrix[16])
@@ -5286,16 +5708,18 @@ static void terrimpi_impostor_place_matrix(const terrimp_capture *c, const terri
     float across = (c->tan_right - c->tan_left) / (float)slot->width;
     float upward = (c->tan_up - c->tan_down) / (float)slot->height;
     float x = c->tan_left - across * (float)slot->x, y = c->tan_down - upward * (float)slot->y;
+    float depth = c->orthographic ? c->z_far - c->z_near : 0.0f;
+    float ahead = c->orthographic ? c->z_near : 1.0f;
     int i;
     for (i = 0; i < 3; i++) {
         matrix[i] = c->right[i] * across * (float)atlas_width;
         matrix[4 + i] = c->up[i] * upward * (float)atlas_height;
-        matrix[8 + i] = 0.0f;
-        matrix[12 + i] = c->forward[i] + c->right[i] * x + c->up[i] * y;
+        matrix[8 + i] = c->forward[i] * depth;
+        matrix[12 + i] = c->forward[i] * ahead + c->right[i] * x + c->up[i] * y;
     }
     matrix[3] = matrix[7] = 0.0f;
-    matrix[11] = 1.0f / c->z_far - 1.0f / c->z_near;
-    matrix[15] = 1.0f / c->z_near;
+    matrix[11] = c->orthographic ? 0.0f : 1.0f / c->z_far - 1.0f / c->z_near;
+    matrix[15] = c->orthographic ? 1.0f : 1.0f / c->z_near;
 }
 
 /* From places relative to one eye to those relative to another. */
@@ -5433,23 +5857,26 @@ static float terrimpi_impostor_largest_sine(const terrimp_box *box, const float 
    whose sine is |PQ| sin(APB) / |QB|, and in the triangle ABP the law of sines gives
    sin(APB) = |AB| sin(BAP) / |BP|. With d the distance from B to the box, which holds P:
    |BP| >= d, |QB| >= d - error. The tangent of that angle times K is the distance in pixels at the
-   middle of the screen. */
+   middle of the screen. For all eyes within `reach` of B: d shrinks by that, and the angle APB
+   grows by one whose sine is at most reach / d. */
 static float terrimpi_impostor_parallax_error(const terrimp_box *box, float error,
                                               const float captured_eye[3], const float eye[3],
-                                              float pixel_factor)
+                                              float reach, float pixel_factor)
 {
     float move[3], move_length, distance, sine;
     terrimpi_sub(eye, captured_eye, move);
     move_length = terrimpi_length(move);
-    if (!(move_length > 0.0f) || !(error > 0.0f))
+    if (!(move_length + reach > 0.0f) || !(error > 0.0f))
         return 0.0f;
-    distance = terrimp_box_distance(box, eye);
+    distance = terrimp_box_distance(box, eye) - reach;
     sine = 1.0f;
-    if (distance > error)
-        sine = error / (distance - error) *
-               terrimpi_min(1.0f, move_length / distance *
-                                      terrimpi_impostor_largest_sine(box, captured_eye, move,
-                                                                     move_length));
+    if (distance > error) {
+        float turn = reach / distance;
+        if (move_length > 0.0f)
+            turn += move_length / distance *
+                    terrimpi_impostor_largest_sine(box, captured_eye, move, move_length);
+        sine = error / (distance - error) * terrimpi_min(1.0f, turn);
+    }
     return sine < 0.999f ? pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine)
                          : TERRIMPI_INFINITY;
 }
@@ -5461,7 +5888,7 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
     TERRIMPI_TRY(terrimpi_impostor_check_eyes(box, captured_eye, eye, error_px));
     TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
-    *error_px = terrimpi_impostor_parallax_error(box, error, captured_eye, eye, pixel_factor);
+    *error_px = terrimpi_impostor_parallax_error(box, error, captured_eye, eye, 0.0f, pixel_factor);
     return TERRIMP_OK;
 }
 
@@ -5697,7 +6124,7 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
     TERRIMPI_REFUSE(!capture || !xyz || !indices || !split, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite(reach) || !terrimpi_finite(overlap), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(vertex_count == 0 || index_count % 3u != 0, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f || capture->orthographic, TERRIMP_E_RANGE);
     for (i = 0; i < index_count; i++)
         TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
     terrimpi_impostor_split(capture, xyz, vertex_count, indices, index_count, reach, overlap,
@@ -6200,6 +6627,8 @@ struct terrimp_terrain {
     terrimpi_mesh *meshes;                 /* [node_count] */
     uint32_t *points;                      /* [node_count][vertex_limit] */
     uint32_t *corners;                     /* [node_count][index_limit / 4] four indices each */
+    uint32_t *stale;                       /* a bit for each node that edits have left; NULL for a
+                                              bake: none */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6245,6 +6674,37 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
     *out = d;
     return TERRIMP_OK;
 }
+
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_terrain_try(const void *context, void *desc)
+{
+    (void)context;
+    return terrimp_terrain_desc_resolve((const terrimp_terrain_desc *)desc,
+                                        (terrimp_terrain_desc *)desc);
+}
+
+TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, chunk_quads),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, triangle_budget),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, proud),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, height_low),
+        TERRIMPI_TROUBLE(terrimp_terrain_desc, height_high)
+    };
+    terrimp_terrain_desc good, bad;
+    if (!desc)
+        return "the descriptor";
+    if (terrimp_heightfield_trouble(&desc->field))
+        return terrimp_heightfield_trouble(&desc->field);
+    memset(&good, 0, sizeof good);
+    bad = *desc;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_terrain_try, NULL);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
 
 /* Vertices and indices of the floor, and of its ground alone. */
 static uint32_t terrimpi_floor_ground_vertices(const terrimp_terrain *t)
@@ -6514,6 +6974,16 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
 }
 
 /* ---- edits ---- */
+
+static uint32_t terrimpi_terrain_stale_words(const terrimp_terrain *t)
+{
+    return t->tree.node_count / 32u + 1u;
+}
+
+static int terrimpi_terrain_stale(const terrimp_terrain *t, uint32_t node)
+{
+    return t->stale && (t->stale[node / 32u] >> node % 32u & 1u) != 0;
+}
 
 /* The nodes of a level that some samples belong to: columns and rows, first and last. */
 typedef struct terrimpi_terrain_touched {
@@ -7453,7 +7923,8 @@ static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
     s->error = error;
     s->low = low + 4e-7f * (terrimpi_abs(s->eye) +
                             terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
-    return terrimpi_stand_over(s, tree, camera->eye) &&
+    return !camera->orthographic && !(camera->reach > 0.0f) &&
+           terrimpi_stand_over(s, tree, camera->eye) &&
            terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) ==
                TERRIMP_OK &&
            s->eye > ground + s->low && terrimpi_stand_clip(s, tree, capture);
@@ -8710,6 +9181,7 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
 typedef struct terrimpi_capture_plan {
     terrimp_node node;
     terrimp_box box;
+    float eye[3];           /* it is made from, or from far along it: see terrimpi_camera_stand */
     terrimp_capture camera; /* of all layers: they differ in their clip distances */
     float z_near[TERRIMPI_CAPTURE_LAYERS], z_far[TERRIMPI_CAPTURE_LAYERS];
     uint32_t layer_count;
@@ -8725,14 +9197,25 @@ typedef struct terrimpi_capture_draw {
 
 /* ---- the camera ---- */
 
+/* What the places of an orthographic picture of a node are relative to. */
+static void terrimpi_capture_origin(const terrimp_terrain *t, const terrimp_node *node,
+                                    float origin[3])
+{
+    terrimp_box box;
+    float height = 0.5f * (t->desc.height_low + t->desc.height_high);
+    terrimpi_tree_box(&t->tree, node, height, height, &box);
+    memcpy(origin, box.min, sizeof box.min);
+}
+
 /* Fits the camera around a node's mesh, which is in xyz, and says how many texels the picture needs
-   at so many for a unit of size at distance 1. Returns 0 when no camera fits. */
-static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], const float *xyz,
-                                uint32_t vertex_count, float density, uint32_t largest,
-                                terrimp_capture *camera, uint32_t size[2])
+   at so many for a unit of size at distance 1. It looks along forward, if that is not NULL. Returns
+   0 when no camera fits. */
+static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], const float *forward,
+                                const float *xyz, uint32_t vertex_count, float density,
+                                uint32_t largest, terrimp_capture *camera, uint32_t size[2])
 {
     float width, height;
-    if (terrimpi_camera_fit(box, eye, camera) != TERRIMP_OK ||
+    if (terrimpi_camera_fit(box, eye, forward, camera) != TERRIMP_OK ||
         !terrimpi_camera_tighten(camera, xyz, vertex_count))
         return 0;
     width = (camera->tan_right - camera->tan_left) * density;
@@ -8783,6 +9266,14 @@ static uint32_t terrimpi_capture_source(const terrimp_quadtree *tree, const terr
     return level;
 }
 
+/* The sine of the angle at which a picture's camera looks down on its node, about. */
+static float terrimpi_capture_sine(const terrimpi_capture_plan *plan)
+{
+    const terrimp_capture *c = &plan->camera;
+    float drop = c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]);
+    return terrimpi_abs(c->orthographic ? c->forward[1] : drop / c->z_far);
+}
+
 /* The border of neighbours that a picture needs: so many texels, in world units. At a grazing angle
    a texel is as many times longer on the ground as the sine of that angle is smaller. */
 static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
@@ -8793,9 +9284,9 @@ static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi
     uint32_t quads = t->desc.chunk_quads, width = 0, widths = terrimpi_terrain_apron_count(quads);
     float per_texel_x = (c->tan_right - c->tan_left) / (float)size[0];
     float per_texel_y = (c->tan_up - c->tan_down) / (float)size[1];
-    float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
-    float sine = terrimpi_max(drop / c->z_far, 0.1f);
-    float reach = texels * c->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
+    float sine = terrimpi_max(terrimpi_capture_sine(plan), 0.1f);
+    float reach = texels * (c->orthographic ? 1.0f : c->z_far) *
+                  terrimpi_max(per_texel_x, per_texel_y / sine);
     float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << plan->source);
     while (width < widths && (float)terrimpi_terrain_apron_quads(quads, width) * step < reach)
         width++;
@@ -8822,7 +9313,8 @@ static void terrimpi_capture_spread(const terrimp_terrain *t, terrimpi_capture_p
     plan->border = terrimpi_capture_border(t, plan, size, texels);
     border = 1.5f * terrimpi_capture_reach(t, plan) *
              terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
-    c->z_near = terrimpi_max(c->z_near * 0.5f, c->z_near - border);
+    c->z_near = c->orthographic ? c->z_near - border
+                                : terrimpi_max(c->z_near * 0.5f, c->z_near - border);
     c->z_far += border;
     plan->z_near[0] = c->z_near;
     plan->z_far[0] = c->z_far;
@@ -8872,19 +9364,14 @@ static float terrimpi_capture_end(const terrimpi_capture_plan *plan, uint32_t la
 static int terrimpi_capture_in_layer(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                      uint32_t node, uint32_t layer)
 {
-    const float *f = plan->camera.forward, *eye = plan->camera.eye;
     terrimp_node place;
     terrimp_box box;
-    float first = 0.0f, last = 0.0f;
-    int i;
+    float first, last;
     if (plan->layer_count == 1u)
         return 1;
     place = terrimpi_tree_node(&t->tree, node);
     terrimpi_terrain_node_box(t, &place, &box);
-    for (i = 0; i < 3; i++) {
-        first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - eye[i]);
-        last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - eye[i]);
-    }
+    terrimpi_camera_depths(&box, plan->camera.eye, plan->camera.forward, &first, &last);
     return first < terrimpi_capture_end(plan, layer) && last > plan->z_near[layer];
 }
 
@@ -8923,7 +9410,7 @@ static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_c
                                       terrimpi_capture_draw draws[TERRIMPI_CAPTURE_DRAWS])
 {
     const terrimp_heightfield *field = &t->desc.field;
-    const float *eye = plan->camera.eye;
+    const float *eye = plan->eye;
     uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
     uint32_t i, j, k, count = 0;
     float step = (float)(quads << plan->source);
@@ -9112,13 +9599,21 @@ typedef struct terrimpi_frame {
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
     terrimp_camera camera;         /* resolved */
+    float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
+    float pixel_factor;            /* K from there */
+    float side_px;                 /* pixels of a unit of a fitted frustum's side: K, too, or */
     int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
-    float pixel_factor;
     terrimpi_motion motion;
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
+
+/* From the closest of a frame's eyes to a box. */
+static float terrimpi_view_distance(const terrimpi_frame *f, const terrimp_box *box)
+{
+    return terrimpi_max(0.0f, terrimp_box_distance(box, f->eye) - f->camera.reach);
+}
 
 /* ---- settings ---- */
 
@@ -9207,6 +9702,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         d.ground_rule = TERRIMP_GEOMIP_PICTURE;
     TERRIMPI_DEFAULT(d.atlas_size, 4096);
     TERRIMPI_DEFAULT(d.atlas_count, 1);
+    TERRIMPI_DEFAULT(d.max_slot, d.atlas_size / 2u);
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     chunks = terrain->tree.level_first[1];
@@ -9215,7 +9711,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
-                    d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
+                    d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -9224,6 +9721,49 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     *out = d;
     return TERRIMP_OK;
 }
+
+#ifndef TERRIMP_NO_TROUBLE
+
+static terrimp_result terrimpi_view_try(const void *context, void *desc)
+{
+    return terrimp_view_desc_resolve((const terrimp_terrain *)context,
+                                     (const terrimp_view_desc *)desc,
+                                     (terrimp_view_desc *)desc);
+}
+
+TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
+                                                  const terrimp_view_desc *desc)
+{
+    static const terrimpi_trouble_field fields[] = {
+        TERRIMPI_TROUBLE(terrimp_view_desc, mode),
+        TERRIMPI_TROUBLE(terrimp_view_desc, tolerance_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, ground_tolerance_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, ground_rule),
+        TERRIMPI_TROUBLE(terrimp_view_desc, morph_ratio),
+        TERRIMPI_TROUBLE(terrimp_view_desc, fade_start),
+        TERRIMPI_TROUBLE(terrimp_view_desc, fade_end),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_angle_rad),
+        TERRIMPI_TROUBLE(terrimp_view_desc, texels_per_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, impostor_px),
+        TERRIMPI_TROUBLE(terrimp_view_desc, atlas_size),
+        TERRIMPI_TROUBLE(terrimp_view_desc, atlas_count),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, hider),
+        TERRIMPI_TROUBLE(terrimp_view_desc, joined),
+        TERRIMPI_TROUBLE(terrimp_view_desc, costs)
+    };
+    terrimp_view_desc good, bad;
+    if (!terrain || !desc)
+        return "the descriptor";
+    memset(&good, 0, sizeof good);
+    bad = *desc;
+    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
+                            terrimpi_view_try, terrain);
+}
+
+#endif /* TERRIMP_NO_TROUBLE */
 
 /* ---- the pictures: a cache ---- */
 
@@ -9245,7 +9785,7 @@ typedef struct terrimpi_cache_picture {
     uint8_t expired;          /* the host wants it renewed, */
     uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
-    float eye[3];             /* of the capture */
+    float eye[3];             /* of the capture's plan */
     float angle_rad, parallax_px, urgency;
     float sharpness;          /* texels per unit of size at distance 1 */
     float cost;               /* of the capture */
@@ -9419,6 +9959,25 @@ static int terrimpi_cache_shows(const terrimpi_cache_picture *picture, uint32_t 
 
 /* ---- what is in sight ---- */
 
+/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
+   of the mean square, which 95 of 100 samples keep to. */
+static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
+{
+    const terrimpi_mesh *mesh = &f->terrain->meshes[node];
+    return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
+               ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
+               : mesh->error;
+}
+
+/* The sine of the view angle up to which a picture may be used, by both limits. */
+static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float closest)
+{
+    float sine = TERRIMP_SINF(f->desc->max_angle_rad), error = terrimpi_view_mesh_error(f, node);
+    sine = terrimpi_min(sine, f->desc->tolerance_px * terrimpi_max(closest - error, 0.0f) /
+                                  terrimpi_max(error * f->pixel_factor, 1e-20f));
+    return f->camera.reach > 0.0f ? terrimpi_max(sine - f->camera.reach / closest, 0.0f) : sine;
+}
+
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
     TERRIMPI_CULL_IMPOSTOR = 2, /* the impostor cut does, */
@@ -9473,6 +10032,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
         return 0;
+    if (f->camera.reach > 0.0f &&
+        f->camera.reach > terrimpi_view_sine(f, node->number, closest) * closest)
+        return 0; /* too much of what a picture may be off goes to how far eyes are apart */
     if (node->level == 0)
         return 1;
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
@@ -9555,7 +10117,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     cull->count = cull->ground_count = cull->impostor_count = cull->hidden_count = 0;
-    terrimpi_tree_begin(&walk, &f->terrain->tree, f->camera.eye, TERRIMP_PLANES_ALL);
+    terrimpi_tree_begin(&walk, &f->terrain->tree, f->eye, TERRIMP_PLANES_ALL);
     while (terrimpi_tree_next(&walk, &v)) {
         terrimpi_cull_node *n = &cull->nodes[cull->count];
         int planes = v.planes % below, done = v.planes / below;
@@ -9569,7 +10131,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         n->number = v.node.number;
         n->level = (uint8_t)v.node.level;
         n->planes = (uint8_t)planes;
-        n->closest = terrimp_box_distance(&box, f->camera.eye);
+        n->closest = terrimpi_view_distance(f, &box);
         n->cuts = (uint8_t)terrimpi_cull_cuts(f, cache, mip, &v.node, planes, n->closest, &done);
         cull->ground_count += n->cuts & TERRIMPI_CULL_GROUND;
         cull->impostor_count += n->cuts & TERRIMPI_CULL_IMPOSTOR ? 1u : 0u;
@@ -9645,24 +10207,6 @@ static float terrimpi_cost_capture(const terrimp_costs *c, float texels, float t
 
 /* ---- how good pictures are, and how long they last ---- */
 
-/* The error that a node's coarse mesh counts with: the largest one for a bound, else twice the root
-   of the mean square, which 95 of 100 samples keep to. */
-static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
-{
-    const terrimpi_mesh *mesh = terrimpi_mesh_of(f->terrain, node);
-    return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
-               ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
-               : mesh->error;
-}
-
-/* The sine of the view angle up to which a picture may be used, by both limits. */
-static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float closest)
-{
-    float sine = TERRIMP_SINF(f->desc->max_angle_rad), error = terrimpi_view_mesh_error(f, node);
-    return terrimpi_min(sine, f->desc->tolerance_px * terrimpi_max(closest - error, 0.0f) /
-                                  terrimpi_max(error * f->pixel_factor, 1e-20f));
-}
-
 /* How many frames a new picture of a node would last. */
 static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float closest)
 {
@@ -9700,7 +10244,7 @@ static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *nod
     const float *way = f->motion.away[0];
     float ahead, reach = closest * terrimpi_view_sine(f, node->number, closest);
     uint32_t i;
-    memcpy(eye, f->camera.eye, sizeof f->camera.eye);
+    memcpy(eye, f->eye, sizeof f->eye);
     if (f->desc->no_lookahead || !(terrimpi_length(way) > 0.0f))
         return;
     ahead = terrimpi_motion_speed(&f->motion, (1.0f + TERRIMPI_VIEW_AHEAD) * reach);
@@ -9708,7 +10252,18 @@ static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *nod
     for (i = 0; i < 3u; i++)
         eye[i] += way[i] / terrimpi_length(way) * ahead;
     if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
-        memcpy(eye, f->camera.eye, sizeof f->camera.eye);
+        memcpy(eye, f->eye, sizeof f->eye);
+}
+
+/* The direction of an orthographic picture that is made from far along `eye`. */
+static void terrimpi_view_along(const terrimpi_frame *f, const float eye[3], float forward[3])
+{
+    float away = f->pixel_factor / f->side_px, step;
+    int i;
+    for (i = 0; i < 3; i++) {
+        step = eye[i] - f->eye[i];
+        forward[i] = f->camera.forward[i] - step / away;
+    }
 }
 
 /* How good a picture made from an eye is from the present one: its view angle and parallax error;
@@ -9718,9 +10273,13 @@ static float terrimpi_view_error(const terrimpi_frame *f, const terrimp_node *no
 {
     terrimp_box box;
     terrimpi_terrain_node_box(f->terrain, node, &box);
-    *angle_rad = terrimpi_impostor_view_angle(&box, captured_eye, f->camera.eye);
+    *angle_rad = terrimpi_impostor_view_angle(&box, captured_eye, f->eye);
+    if (f->camera.reach > 0.0f)
+        *angle_rad += TERRIMP_ASINF(terrimpi_min(
+            1.0f, f->camera.reach / terrimpi_max(terrimp_box_distance(&box, f->eye), 1e-20f)));
     *parallax_px = terrimpi_impostor_parallax_error(&box, terrimpi_view_mesh_error(f, node->number),
-                                                    captured_eye, f->camera.eye, f->pixel_factor);
+                                                    captured_eye, f->eye, f->camera.reach,
+                                                    f->pixel_factor);
     return terrimpi_max(*angle_rad / f->desc->max_angle_rad,
                         *parallax_px / f->desc->tolerance_px);
 }
@@ -10272,8 +10831,8 @@ static void terrimpi_view_look_ahead(terrimp_view *v, const terrimpi_frame *f,
         measure = terrimpi_mip_split_ratio(mip, node, &planes);
         terrimpi_terrain_node_box(v->terrain, node, &box);
         for (k = 0; k < 3u; k++)
-            eye[k] = f->camera.eye[k] + away[k] * frames;
-        now = terrimp_box_distance(&box, f->camera.eye);
+            eye[k] = f->eye[k] + away[k] * frames;
+        now = terrimp_box_distance(&box, f->eye);
         soon = terrimp_box_distance(&box, eye);
         if (measure * now * now >= soon * soon)
             terrimpi_view_want_children(v, &f->frustum, node, TERRIMP_WANT_AHEAD,
@@ -10424,14 +10983,18 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
                                        terrimpi_candidate *c)
 {
     const terrimp_costs *costs = &f->desc->costs;
-    float k = f->pixel_factor, density = f->desc->texels_per_px;
+    float k = f->side_px, density = f->desc->texels_per_px;
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
     uint32_t quads, source;
     int is_known;
     terrimpi_terrain_node_box(f->terrain, &c->node, &box);
-    if (terrimpi_camera_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
+    if (terrimpi_terrain_stale(f->terrain, c->node.number)) /* its mesh is not of this ground */
+        return 0;
+    if (terrimpi_camera_fit(&box, f->camera.eye,
+                            f->camera.orthographic ? f->camera.forward : NULL, &camera) !=
+        TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
@@ -10563,7 +11126,7 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
     uint32_t i, count;
     if (node->level == 0)
         return 0;
-    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.camera.eye, children);
+    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.eye, children);
     for (i = 0; i < count; i++) {
         const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
         if (!p || p->layer_count == 0 ||
@@ -10595,7 +11158,7 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
         terrimpi_terrain_node_box(v->terrain, &node, &box);
-        if (terrimp_box_distance(&box, v->frame.camera.eye) >= v->desc.fade_start &&
+        if (terrimpi_view_distance(&v->frame, &box) >= v->desc.fade_start &&
             terrimpi_view_impostor_add(v, &node))
             return 1;
     }
@@ -10671,6 +11234,8 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
     memcpy(command.eye, picture->eye, sizeof command.eye);
+    if (v->frame.camera.orthographic)
+        terrimpi_capture_origin(v->terrain, &picture->node, command.eye);
     picture->drawn_count++;
     for (k = 0; k < picture->layer_count; k++) {
         layer = v->desc.sorted ? picture->layer_count - 1u - k : k;
@@ -10681,7 +11246,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_impostor_place_from(command.place_matrix, picture->eye, v->frame.camera.eye);
+            terrimpi_impostor_place_from(command.place_matrix, command.eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
@@ -10774,7 +11339,8 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
-    if (f->desc->no_splits || terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER ||
+    if (f->desc->no_splits || f->camera.orthographic ||
+        terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER ||
         !(sine * closest > 0.0f) ||
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
@@ -10811,10 +11377,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     const terrimpi_frame *f = &v->frame;
     const terrimp_costs *costs = &f->desc->costs;
     terrimpi_capture_plan *plan = &job->plan;
-    float eye[3], distance, split = 0.0f;
+    float origin[3], forward[3], distance, split = 0.0f;
+    int parallel = f->camera.orthographic;
     float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
-    uint32_t size[2], i, largest = terrimpi_max_u32(
-        TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
+    uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
@@ -10829,14 +11395,19 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->node = c->node;
     plan->layer_count = 1;
     terrimpi_terrain_node_box(f->terrain, &c->node, &plan->box);
-    terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, eye);
+    terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, plan->eye);
+    memcpy(origin, plan->eye, sizeof origin);
+    if (parallel) {
+        terrimpi_capture_origin(f->terrain, &c->node, origin);
+        terrimpi_view_along(f, plan->eye, forward);
+    }
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     terrimpi_mesh_write(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
-    if (!terrimpi_capture_aim(&plan->box, eye, v->mesh_xyz, mesh.vertex_count,
-                              f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
-                              size))
+    if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->mesh_xyz,
+                              mesh.vertex_count, f->side_px * f->desc->texels_per_px, largest,
+                              &plan->camera, size))
         return 0;
-    distance = terrimp_box_distance(&plan->box, eye);
+    distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
@@ -10981,8 +11552,7 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
         return;
     p->judged = f->number;
     p->layers_now = (uint8_t)job->plan.layer_count;
-    p->urgency = terrimpi_view_error(f, &p->node, job->plan.camera.eye, &p->angle_rad,
-                                     &p->parallax_px);
+    p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
@@ -11023,7 +11593,7 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
                 terrimpi_view_has_pages(v, v->capture_draws, job->draw_count, 2.0f);
     if (!has_pages ||
-        terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
+        terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
         v->open = 0;
@@ -11068,6 +11638,46 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- a frame ---- */
 
+/* Whether a point lies over the terrain, or beyond sides where another one goes on. */
+static int terrimpi_view_inside(const terrimpi_frame *f, const terrimp_box *box,
+                                const float point[3])
+{
+    uint32_t beyond = 0;
+    beyond |= point[2] < box->min[2] ? 1u << TERRIMP_SIDE_Z0 : 0u;
+    beyond |= point[2] > box->max[2] ? 1u << TERRIMP_SIDE_Z1 : 0u;
+    beyond |= point[0] < box->min[0] ? 1u << TERRIMP_SIDE_X0 : 0u;
+    beyond |= point[0] > box->max[0] ? 1u << TERRIMP_SIDE_X1 : 0u;
+    return (beyond & ~f->desc->joined) == 0;
+}
+
+/* Whether all rays of an orthographic camera come in through the top of the terrain's box, and go
+   out through its bottom. */
+static int terrimpi_view_through(const terrimpi_frame *f)
+{
+    const float *forward = f->camera.forward;
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
+    terrimp_capture c;
+    terrimp_box box;
+    int corner, top, k;
+    if (!(forward[1] < 0.0f))
+        return 0;
+    terrimpi_camera_capture(&f->camera, &c);
+    terrimpi_terrain_node_box(f->terrain, &root, &box);
+    for (corner = 0; corner < 4; corner++)
+        for (top = 0; top < 2; top++) {
+            float at[3], way;
+            for (k = 0; k < 3; k++)
+                at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
+                        c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
+            way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
+            for (k = 0; k < 3; k++)
+                at[k] += forward[k] * way;
+            if (!terrimpi_view_inside(f, &box, at))
+                return 0;
+        }
+    return 1;
+}
+
 /* Whether the floor is to be drawn: where pictures are, while the eye is on or over the ground. A
    ray that starts there passes through the ground before it meets the floor or a wall, which are
    below the ground everywhere; one that comes in below the terrain's outer border, or starts under
@@ -11075,11 +11685,20 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 static int terrimpi_view_over(const terrimpi_frame *f)
 {
     const float *eye = f->camera.eye;
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
+    terrimp_box box;
     float ground;
     uint32_t level; /* of the finest ground that is here */
-    return terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level) ==
+    terrimp_result result;
+    if (f->camera.orthographic)
+        return terrimpi_view_through(f);
+    terrimpi_terrain_node_box(f->terrain, &root, &box);
+    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    if (result == TERRIMP_E_MISS)
+        return terrimpi_view_inside(f, &box, eye);
+    return result ==
                TERRIMP_OK &&
-           eye[1] >= ground;
+           eye[1] - f->camera.reach >= ground;
 }
 
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
@@ -11094,7 +11713,8 @@ static void terrimpi_view_list(terrimp_view *v)
     }
     for (i = 0; i < v->draw_count; i++)
         impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
-    if (impostors > 0 && terrimpi_view_over(&v->frame))
+    if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+        terrimpi_view_over(&v->frame))
         terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, 0);
 }
 
@@ -11128,7 +11748,8 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
 static void terrimpi_view_count_frame(terrimp_view *v)
 {
     terrimp_stats *s = &v->stats;
-    float tan_x, tan_y;
+    const terrimp_camera *c = &v->frame.camera;
+    float tan_x, tan_y, first, last;
     uint32_t i;
     for (i = 0; i < v->draw_count; i++)
         terrimpi_view_count_draw(v, &v->draws[i], s);
@@ -11140,13 +11761,19 @@ static void terrimpi_view_count_frame(terrimp_view *v)
         terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
         terrimp_box box;
         terrimpi_terrain_node_box(v->terrain, &node, &box);
-        if (i == 0 || v->regions[i].closest < s->z_near)
-            s->z_near = v->regions[i].closest;
-        s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->frame.camera.eye));
+        first = v->regions[i].closest;
+        last = terrimp_box_farthest(&box, c->eye);
+        if (c->orthographic) {
+            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
+            first -= c->reach;
+        }
+        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
+        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
     }
     /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(&v->frame.camera, &tan_x, &tan_y);
-    s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
+    terrimpi_camera_tangents(c, &tan_x, &tan_y);
+    if (!c->orthographic)
+        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
     for (i = 0; i < v->desc.atlas_count; i++)
         s->texels_used += v->cache.atlases[i].texels_used;
     s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
@@ -11158,13 +11785,17 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
                                           const terrimp_camera *camera)
 {
     terrimpi_frame f = *before;
+    terrimp_node root = terrimpi_tree_root(&f.terrain->tree);
+    terrimp_box all;
     float step[3];
     uint32_t i;
     f.number++;
     f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
-    f.pixel_factor = terrimpi_camera_pixel_factor(camera);
+    terrimpi_terrain_node_box(f.terrain, &root, &all);
+    f.pixel_factor = terrimpi_camera_stand(camera, &all, f.eye);
+    f.side_px = terrimpi_camera_pixel_factor(camera);
     f.light_speed += (f.light_step - f.light_speed) / 16.0f;
     f.light_step = 0.0f;
     if (f.number == 1u) {
@@ -11172,8 +11803,10 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
         return f;
     }
     for (i = 0; i < 3u; i++)
-        step[i] = camera->eye[i] - before->camera.eye[i];
-    terrimpi_motion_step(&f.motion, step, TERRIMPI_VIEW_JUMP * f.desc->fade_start);
+        step[i] = f.eye[i] - before->eye[i];
+    terrimpi_motion_step(&f.motion, step,
+                         TERRIMPI_VIEW_JUMP * (camera->orthographic ? f.pixel_factor / f.side_px
+                                                                    : f.desc->fade_start));
     return f;
 }
 
@@ -11194,6 +11827,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         return TERRIMP_E_PAGE;
     }
     TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
+    if (!frame.camera.orthographic != !view->frame.camera.orthographic)
+        terrimp_view_invalidate(view); /* no picture is of use to a camera of the other kind */
     view->frame = frame;
     view->cache.frame = frame.number;
     view->outdated = 0;
@@ -11230,7 +11865,7 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
     p->cost = job->cost;
     p->expired = job->expired;
     memcpy(p->light, job->light, sizeof p->light);
-    memcpy(p->eye, job->plan.camera.eye, sizeof p->eye);
+    memcpy(p->eye, job->plan.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
@@ -12383,6 +13018,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     sorted->depth = -1;
     sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    TERRIMPI_REFUSE(c.orthographic || c.z_far > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
     for (k = 0; k < 3; k++) {
         const terrimp_heightfield *f = &sorted->desc.field;
         float quads = (float)sorted->desc.page_quads;
@@ -14241,6 +14877,142 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
     return terrimpi_simp_run(desc, NULL, scratch, scratch_bytes, mesh);
 }
 
+/* --- a tile by one call --- */
+
+#define TERRIMPI_SIMP_POINTS 52u /* of a border of the largest budget */
+
+/* The largest vertical distance of a tile's samples to the triangles of a mesh. */
+static float terrimpi_simp_largest_error(const terrimp_simplify_desc *desc,
+                                         const terrimp_mesh *mesh)
+{
+    float most = 0.0f;
+    uint32_t i, k;
+    for (i = 0; i < mesh->surface_index_count; i += 3u) {
+        int64_t p[3][2], low[2], high[2], at[2], all;
+        float h[3];
+        for (k = 0; k < 3u; k++) {
+            const terrimp_mesh_vertex *v = &mesh->vertices[mesh->indices[i + k]];
+            p[k][0] = v->x;
+            p[k][1] = v->z;
+            h[k] = v->height;
+        }
+        for (k = 0; k < 2u; k++) {
+            low[k] = p[0][k] < p[1][k] ? p[0][k] : p[1][k];
+            low[k] = low[k] < p[2][k] ? low[k] : p[2][k];
+            high[k] = p[0][k] > p[1][k] ? p[0][k] : p[1][k];
+            high[k] = high[k] > p[2][k] ? high[k] : p[2][k];
+        }
+        all = terrimpi_twice_area(p[0], p[1], p[2]);
+        for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+            for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
+                int64_t b = terrimpi_twice_area(p[2], p[0], at);
+                int64_t c = terrimpi_twice_area(p[0], p[1], at);
+                float miss = desc->heights[at[1] * (int64_t)desc->cols + at[0]] - h[0];
+                if (b < 0 || c < 0 || b + c > all)
+                    continue;
+                miss -= ((h[1] - h[0]) * (float)b + (h[2] - h[0]) * (float)c) / (float)all;
+                most = terrimpi_max(most, terrimpi_abs(miss));
+            }
+    }
+    return most;
+}
+
+/* Simplifies the four borders of a tile. */
+static terrimp_result terrimpi_simp_borders(terrimp_simplify_desc *desc, float *line,
+                                            terrimp_border_point (*points)[TERRIMPI_SIMP_POINTS])
+{
+    uint32_t limit = terrimpi_terrain_border_points(desc->triangle_budget), k;
+    int side;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        uint32_t along = terrimpi_along_x(side) ? 1u : desc->cols;
+        uint32_t count = terrimpi_along_x(side) ? desc->cols : desc->rows;
+        uint32_t first = side == TERRIMP_SIDE_Z1   ? (desc->rows - 1u) * desc->cols
+                         : side == TERRIMP_SIDE_X1 ? desc->cols - 1u : 0u;
+        for (k = 0; k < count; k++)
+            line[k] = desc->heights[first + k * along];
+        TERRIMPI_TRY(terrimp_border_simplify(line, count, limit, points[side],
+                                             TERRIMPI_SIMP_POINTS,
+                                             &desc->borders[side].point_count));
+        desc->borders[side].points = points[side];
+    }
+    return TERRIMP_OK;
+}
+
+/* Scratch: the tile, a border of it, then that of the simplifier. */
+static size_t terrimpi_simp_field_layout(uint32_t cols, uint32_t rows, uint32_t budget, void *base,
+                                         float **tile, float **line, void **rest)
+{
+    terrimpi_arena a = terrimpi_arena_at((unsigned char *)base);
+    size_t bytes = terrimp_simplify_scratch_bytes(cols, rows, budget);
+    if (bytes == 0 || (budget > 0 && budget < 6u))
+        return 0;
+    *rest = terrimpi_take(&a, bytes, 1);
+    *tile = (float *)terrimpi_take(&a, (size_t)cols * rows, sizeof **tile);
+    *line = (float *)terrimpi_take(&a, TERRIMP_MAX_TILE_DIM, sizeof **line);
+    return a.ok ? a.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
+                                                        uint32_t triangle_budget)
+{
+    float *tile, *line;
+    void *rest;
+    return terrimpi_simp_field_layout(cols, rows, triangle_budget, NULL, &tile, &line, &rest);
+}
+
+TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
+                                                  const terrimp_rect *samples,
+                                                  uint32_t triangle_budget, float max_error,
+                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
+                                                  float *error)
+{
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][TERRIMPI_SIMP_POINTS];
+    terrimp_simplify_desc desc;
+    float *tile, *line, off;
+    uint32_t low = 2, high, border = 0;
+    size_t needed;
+    void *rest;
+    int side;
+    TERRIMPI_REFUSE(!field || !samples || !mesh, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(max_error), TERRIMP_E_NOT_FINITE);
+    needed = terrimpi_simp_field_layout(samples->width, samples->height, triangle_budget, scratch,
+                                        &tile, &line, &rest);
+    TERRIMPI_REFUSE(needed == 0 || max_error < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(samples->x > field->width - samples->width || field->width < samples->width ||
+                    samples->y > field->depth - samples->height ||
+                    field->depth < samples->height, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
+    TERRIMPI_TRY(terrimp_heightfield_read(field, samples->x, samples->y, samples->width,
+                                          samples->height, 1, tile));
+    memset(&desc, 0, sizeof desc);
+    desc.heights = tile;
+    desc.cols = samples->width;
+    desc.rows = samples->height;
+    desc.triangle_budget = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET;
+    TERRIMPI_TRY(terrimpi_simp_borders(&desc, line, points));
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        border += desc.borders[side].point_count - 1u;
+    high = desc.triangle_budget;
+    low = terrimpi_max_u32(low, border - 2u);
+    TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
+    off = terrimpi_simp_largest_error(&desc, mesh);
+    while (max_error > 0.0f && off <= max_error && low < high) { /* high is enough; is this? */
+        desc.triangle_budget = low + (high - low) / 2u;
+        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
+        if (terrimpi_simp_largest_error(&desc, mesh) <= max_error)
+            high = desc.triangle_budget;
+        else
+            low = desc.triangle_budget + 1u;
+    }
+    if (desc.triangle_budget != high) {
+        desc.triangle_budget = high;
+        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
+    }
+    if (error)
+        *error = terrimpi_simp_largest_error(&desc, mesh);
+    return TERRIMP_OK;
+}
+
 /* --- skirts (Hess 4.2) --- */
 
 static terrimp_result terrimpi_raise_check_surface(const terrimp_mesh *mesh)
@@ -15543,6 +16315,7 @@ TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
     arrays = terrimpi_terrain_layout(&t, NULL);
     terrimpi_place(&at, 1, sizeof t, &ok);
     at = terrimpi_add(at, arrays, &ok);
+    at = terrimpi_add(at, terrimpi_terrain_stale_words(&t) * sizeof *t.stale, &ok);
     return ok && arrays ? at : 0;
 }
 
@@ -15569,11 +16342,14 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
     terrimpi_place(&at, 1, sizeof t, &ok);
-    terrimpi_terrain_layout(&t, (unsigned char *)memory + at);
+    at += terrimpi_terrain_layout(&t, (unsigned char *)memory + at);
+    t.stale = (uint32_t *)(void *)((unsigned char *)memory + at);
     *(terrimp_terrain *)memory = t;
     *terrain = (terrimp_terrain *)memory;
     return TERRIMP_OK;
 }
+
+#define TERRIMPI_BUILD_EDIT_STEP 128u /* above it a node's heights stand for those of a part */
 
 /* The room that vertices get below and above the samples, as a part of their range: heights fitted
    to one side of a ridge swing over on the other. */
@@ -15664,27 +16440,180 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
 
 /* ---- edits ---- */
 
+/* Widens what is known of a node's ground for samples of a rectangle that have changed. A sample is
+   as far from its triangle as heights within two of the level's steps differ, at most; it counts
+   for the root mean square once, or twice on a row of vertices. */
+static void terrimpi_build_edit_ground(terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                 uint32_t number, const terrimp_rect *rect, float low, float high)
+{
+    terrimp_geomip_node *n = &t->tree.nodes[number];
+    uint32_t step = 1u << p->level, x = rect->x - terrimpi_min_u32(rect->x, 2u * step);
+    uint32_t z = rect->y - terrimpi_min_u32(rect->y, 2u * step);
+    float share, off;
+    n->low = terrimpi_min(n->low, low);
+    n->high = terrimpi_max(n->high, high);
+    if (p->level == 0)
+        return;
+    off = n->high - n->low;
+    if (step <= TERRIMPI_BUILD_EDIT_STEP &&
+        terrimpi_field_range(&t->desc.field,
+                             terrimpi_rect(x, z, rect->x - x + rect->width + 2u * step,
+                                           rect->y - z + rect->height + 2u * step),
+                             0, &low, &high) == TERRIMP_OK)
+        off = terrimpi_min(off, high - low);
+    share = 2.0f * (float)(rect->width + 2u * step) * (float)(rect->height + 2u * step) /
+            ((float)(p->span_x + 1u) * (float)(p->span_z + 1u));
+    n->rms = TERRIMP_SQRTF(n->rms * n->rms + terrimpi_min(share, 1.0f) * off * off);
+    n->error = terrimpi_max(n->error, off);
+}
+
+/* The same for its coarse mesh, of which the triangles over the rectangle count. */
+static void terrimpi_build_edit_mesh(terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                     uint32_t number, const terrimp_rect *rect, float low,
+                                     float high)
+{
+    terrimpi_mesh *mesh = &t->meshes[number];
+    float least = TERRIMPI_FLOAT_MAX, most = -TERRIMPI_FLOAT_MAX, off, share;
+    uint32_t i, k;
+    for (i = 0; i < 3u * terrimpi_mesh_triangles(mesh); i += 3u) {
+        uint32_t x0 = 0xffffffffu, z0 = x0, x1 = 0, z1 = 0;
+        float heights[3];
+        for (k = 0; k < 3u; k++) {
+            uint32_t corner = terrimpi_mesh_corner(t, number, i + k);
+            terrimpi_mesh_point_steps v = terrimpi_mesh_point(t, p, number, corner);
+            uint32_t x = p->x + terrimpi_lattice(v.x, p->level, p->span_x);
+            uint32_t z = p->z + terrimpi_lattice(v.z, p->level, p->span_z);
+            x0 = terrimpi_min_u32(x0, x);
+            z0 = terrimpi_min_u32(z0, z);
+            x1 = terrimpi_max_u32(x1, x);
+            z1 = terrimpi_max_u32(z1, z);
+            heights[k] = v.height;
+        }
+        if (x1 < rect->x || x0 >= rect->x + rect->width || z1 < rect->y ||
+            z0 >= rect->y + rect->height)
+            continue;
+        for (k = 0; k < 3u; k++) {
+            least = terrimpi_min(least, heights[k]);
+            most = terrimpi_max(most, heights[k]);
+        }
+    }
+    if (least > most)
+        return;
+    off = terrimpi_max(high - least, most - low);
+    share = (float)rect->width * (float)rect->height /
+            ((float)(p->span_x + 1u) * (float)(p->span_z + 1u));
+    mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms +
+                                    terrimpi_min(share, 1.0f) * off * off);
+    mesh->error = terrimpi_max(mesh->error, off);
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
+                                                const terrimp_rect *samples)
+{
+    terrimp_rect rect;
+    uint32_t level, x, z;
+    float low, high;
+    TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
+    TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
+    rect = *samples;
+    rect.width = terrimpi_min_u32(rect.width, terrain->desc.field.width - rect.x);
+    rect.height = terrimpi_min_u32(rect.height, terrain->desc.field.depth - rect.y);
+    TERRIMPI_TRY(terrimpi_field_range(&terrain->desc.field, rect, 0, &low, &high));
+    TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
+    terrain->tree.edits++;
+    for (level = 0; level < terrain->tree.level_count; level++) {
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, &rect, level, 0);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++) {
+                uint32_t node = terrimpi_tree_at(&terrain->tree, level, x, z).number;
+                terrimpi_terrain_tile p = terrimpi_terrain_tile_of(terrain, node);
+                terrimpi_build_edit_ground(terrain, &p, node, &rect, low, high);
+                terrimpi_build_edit_mesh(terrain, &p, node, &rect, low, high);
+                terrimpi_build_hold(&terrain->meshes[node], low, high);
+                terrain->stale[node / 32u] |= 1u << node % 32u;
+            }
+    }
+    return TERRIMP_OK;
+}
+
+/* Notes that a node and its coarse mesh hold what another one holds. */
+static void terrimpi_build_hold_node(terrimp_terrain *t, uint32_t node, uint32_t held)
+{
+    terrimp_geomip_node *n = &t->tree.nodes[node];
+    const terrimp_geomip_node *h = &t->tree.nodes[held];
+    n->low = terrimpi_min(n->low, h->low);
+    n->high = terrimpi_max(n->high, h->high);
+    n->error = terrimpi_max(n->error, h->error);
+    terrimpi_build_hold(&t->meshes[node], t->meshes[held].low, t->meshes[held].high);
+}
+
+/* Builds a node anew whose children are as they should be. Those above it are wide enough until it
+   is their turn. */
+static terrimp_result terrimpi_build_refine(terrimp_terrain *t, uint32_t number, void *scratch,
+                                           size_t bytes)
+{
+    static const float nowhere[3] = {0.0f, 0.0f, 0.0f};
+    terrimp_node node = terrimpi_tree_node(&t->tree, number), children[4];
+    uint32_t i, count = 0;
+    t->mesh_triangle_count -= terrimpi_mesh_triangles(&t->meshes[number]);
+    TERRIMPI_TRY(terrimp_terrain_build_node(t, number, scratch, bytes));
+    t->mesh_triangle_count += terrimpi_mesh_triangles(&t->meshes[number]);
+    if (node.level > 0)
+        count = terrimpi_tree_children(&t->tree, &node, nowhere, children);
+    for (i = 0; i < count; i++)
+        terrimpi_build_hold_node(t, number, children[i].number);
+    terrimpi_build_hold(&t->meshes[number], t->tree.nodes[number].low, t->tree.nodes[number].high);
+    for (i = number; i + 1u < t->tree.node_count; i = terrimpi_tree_parent_number(&t->tree, i))
+        terrimpi_build_hold_node(t, terrimpi_tree_parent_number(&t->tree, i), i);
+    t->stale[number / 32u] &= ~(1u << number % 32u);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint32_t *nodes,
+                                                  uint32_t count, uint32_t *done, void *scratch,
+                                                  size_t bytes)
+{
+    terrimpi_build build;
+    uint32_t node;
+    TERRIMPI_REFUSE(!terrain || !done, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built || terrain->baked, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    *done = 0;
+    terrain->tree.edits++;
+    for (node = 0; node < terrain->tree.node_count && *done < count; node++) {
+        if (terrain->stale[node / 32u] == 0)
+            node |= 31u;
+        if (node >= terrain->tree.node_count || !terrimpi_terrain_stale(terrain, node))
+            continue;
+        TERRIMPI_TRY(terrimpi_build_refine(terrain, node, scratch, bytes));
+        if (nodes)
+            nodes[*done] = node;
+        ++*done;
+    }
+    return TERRIMP_OK;
+}
+
+static int terrimpi_build_any_stale(const terrimp_terrain *t)
+{
+    uint32_t i, any = 0;
+    for (i = 0; t->stale && i < terrimpi_terrain_stale_words(t); i++)
+        any |= t->stale[i];
+    return any != 0;
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, void *scratch,
                                                    size_t bytes)
 {
     terrimpi_build build;
-    uint32_t level, x, z;
-    float low, high;
+    uint32_t done;
     TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
                                       terrimpi_build_layout(&terrain->desc, NULL, &build)));
-    TERRIMPI_TRY(terrimpi_field_range(&terrain->desc.field, *samples, 0, &low, &high));
-    TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
-    for (level = 0; level < terrain->tree.level_count; level++) {
-        terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, level, 0);
-        for (z = in.z0; z <= in.z1; z++)
-            for (x = in.x0; x <= in.x1; x++)
-                TERRIMPI_TRY(terrimp_terrain_build_node(
-                    terrain, terrimpi_tree_at(&terrain->tree, level, x, z).number, scratch, bytes));
-    }
-    return terrimp_terrain_build_finish(terrain);
+    TERRIMPI_TRY(terrimp_terrain_edit(terrain, samples));
+    return terrimp_terrain_refine(terrain, NULL, terrain->tree.node_count, &done, scratch, bytes);
 }
 
 /* ---- a terrain by one call ---- */
@@ -15847,7 +16776,8 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     terrimpi_bake bake;
     size_t arrays;
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrain->built || !terrain->meshes, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrain->built || !terrain->meshes || terrimpi_build_any_stale(terrain),
+                    TERRIMP_E_STATE);
     arrays = terrimpi_bake_array_bytes(terrain);
     TERRIMPI_REFUSE(arrays == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_REFUSE(bytes < sizeof bake + arrays, TERRIMP_E_CAPACITY);

@@ -1611,9 +1611,11 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
     scene_close(&s);
 }
 
+#include "render_camera.h"
 #include "render_hidden.h"
 #include "render_scene.h"
 #include "render_holes.h"
+#include "render_tiles.h"
 #include "render_light.h"
 
 int main(int argc, char **argv)
@@ -1630,6 +1632,8 @@ int main(int argc, char **argv)
     RUN(a_real_tile_looks_like_the_full_mesh);
     RUN(houses_and_seas_meet_the_terrain);
     RUN(what_ridges_hide_shows_no_pixel);
+    RUN(no_camera_sees_a_hole);
+    RUN(terrains_side_by_side_leave_no_gap);
     RUN(pictures_lit_when_drawn_are_like_new_ones);
     RUN(renewed_light_does_not_pop);
     RUN(pictures_in_two_parts_show_what_ridges_hide);

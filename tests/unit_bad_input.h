@@ -414,8 +414,16 @@ static void cameras_are_refused(void)
         bad = good;
         bad.z_far = not_finite(i);
         check_camera_refused(TERRIMP_E_NOT_FINITE, &bad);
+        bad = good;
+        bad.reach = not_finite(i);
+        check_camera_refused(TERRIMP_E_NOT_FINITE, &bad);
+        for (k = 0; k < 4; k++) {
+            bad = good;
+            bad.sides[k] = not_finite(i);
+            check_camera_refused(TERRIMP_E_NOT_FINITE, &bad);
+        }
     }
-    for (i = 0; i < 14; i++) {
+    for (i = 0; i < 22; i++) {
         bad = good;
         switch (i) {
         case 0: memset(bad.forward, 0, sizeof bad.forward); break;
@@ -429,8 +437,16 @@ static void cameras_are_refused(void)
         case 8: bad.z_near = 0.0f; break;
         case 9: bad.z_near = -1.0f; break;
         case 10: bad.z_far = bad.z_near; break;
-        case 11: bad.z_far = 0.0f; break;
+        case 11: bad.z_far = 0.5f * bad.z_near; break;
         case 12: bad.z_far = -1.0f; break;
+        case 13: bad.sides[1] = 1.0f; break; /* no height */
+        case 14: bad.sides[0] = 1.0f, bad.sides[1] = 1.000001f, bad.sides[3] = 1.0f; break;
+        case 15: bad.sides[0] = 1.0f, bad.sides[1] = -1.0f, bad.sides[3] = 1.0f; break;
+        case 16: bad.sides[1] = 1.0f, bad.sides[3] = 1.1e4f; break;
+        case 17: bad.reach = -1.0f; break;
+        case 18: bad.orthographic = 1; break; /* without sides */
+        case 19: bad.orthographic = 1, bad.sides[1] = bad.sides[3] = 1.1e18f; break;
+        case 20: bad.orthographic = 1, bad.sides[1] = bad.sides[3] = 1.0f, bad.z_far = 0.0f; break;
         default: bad.fov_y_rad = FLT_MAX; break;
         }
         check_camera_refused(TERRIMP_E_RANGE, &bad);
@@ -1087,8 +1103,9 @@ static void check_huge_cameras(terrimp_view *view, const terrimp_callbacks *all,
         bad.eye[i % 3] *= 1.001f;
         GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
         bad = *camera;
-        bad.z_far = 1.001e18f;
-        GIVES(TERRIMP_E_RANGE, terrimp_view_update(view, &bad));
+        bad.z_far = 1.001e18f; /* without a far plane */
+        GIVES(TERRIMP_OK, terrimp_view_update(view, &bad));
+        GIVES(TERRIMP_OK, terrimp_view_render(view, all));
     }
 }
 

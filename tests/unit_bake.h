@@ -595,6 +595,109 @@ static void rebuilt_terrains_equal_those_built_anew(void)
     }
 }
 
+static void bake_change_samples(land *l, const terrimp_rect *rect)
+{
+    uint32_t x, z, width = l->desc.field.width;
+    float low = random_float(-10.0f, 250.0f), high = low + random_magnitude(0.5f, 50.0f);
+    for (z = rect->y; z < l->desc.field.depth && z - rect->y < rect->height; z++)
+        for (x = rect->x; x < width && x - rect->x < rect->width; x++)
+            l->samples[(size_t)z * width + x] = random_float(low, high);
+}
+
+/* Boxes and errors of a terrain hold all that is known of one that has been built anew, and the
+   errors of its meshes are no less than those of the meshes as they are. */
+static void check_edit_bounds(land *l, const terrimp_terrain *anew)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(l->terrain);
+    const terrimp_quadtree *exact = terrimp_terrain_tree(anew);
+    uint32_t node, i;
+    CHECK(terrimp_terrain_get_info(l->terrain, &l->info) == TERRIMP_OK);
+    CHECK(terrimp_terrain_fill_meshes(l->terrain, l->xyz, l->info.mesh_vertex_count * 3u,
+                                      l->indices, l->info.mesh_index_count) == TERRIMP_OK);
+    for (node = 0; node < l->info.node_count; node++) {
+        const terrimp_geomip_node *has = &tree->nodes[node], *is = &exact->nodes[node];
+        uint32_t first[2], last[2], cols;
+        float *heights = mesh_heights(l, node);
+        double worst = 0.0, squares = 0.0, count;
+        terrimp_mesh_info mesh;
+        CHECK(has->low <= is->low && has->high >= is->high && has->error >= is->error);
+        CHECK(has->rms >= is->rms * (1.0f - 1e-5f));
+        CHECK(terrimp_terrain_get_mesh(l->terrain, node, &mesh) == TERRIMP_OK);
+        check_chunk_box(l, node);
+        land_span(l, node, first, last);
+        cols = last[0] - first[0] + 1u;
+        count = (double)cols * (last[1] - first[1] + 1u);
+        for (i = 0; i < (uint32_t)count; i++) {
+            double miss = fabs((double)heights[i] -
+                               (double)land_sample(l, first[0] + i % cols, first[1] + i / cols));
+            worst = fmax(worst, miss);
+            squares += miss * miss;
+        }
+        CHECK(worst <= (double)mesh.error * (1.0 + 1e-4) + 3e-3);
+        CHECK(sqrt(squares / count) <= (double)mesh.error_rms * (1.0 + 1e-4) + 3e-3);
+        free(heights);
+    }
+    check_hierarchy(l);
+}
+
+/* Between edits and slices of the rest all bounds hold; after the last slice the terrain is, byte
+   for byte, one that is built anew. */
+static void edits_in_slices_end_as_what_is_built_anew(void)
+{
+    static const uint32_t sizes[][3] = {{131, 100, 8}, {70, 59, 4}, {257, 40, 16}, {3, 90, 4}};
+    size_t i;
+    for (i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        land l;
+        void *scratch;
+        size_t scratch_bytes, bytes;
+        uint32_t slice, done = 0, nodes[7], most = 0;
+        unsigned char *block[2];
+        terrimp_terrain *anew = NULL;
+        land_prepare(&l, sizes[i][0], sizes[i][1], TERRIMP_FORMAT_F32, LAND_HILLS);
+        l.desc.chunk_quads = sizes[i][2];
+        l.desc.height_low = -10.0f;
+        l.desc.height_high = 300.0f;
+        if (!land_build(&l)) {
+            land_free(&l);
+            continue;
+        }
+        scratch_bytes = terrimp_terrain_scratch_bytes(&l.desc);
+        scratch = malloc(scratch_bytes);
+        bytes = terrimp_bake_bytes(l.terrain);
+        block[0] = (unsigned char *)malloc(bytes);
+        block[1] = (unsigned char *)malloc(bytes);
+        for (slice = 0; slice < check_rounds(14u, 60u) || done == most; slice++) {
+            if (slice < 10u && random_range(0, 2)) {
+                terrimp_rect rect;
+                rect.x = random_range(0, sizes[i][0] - 1u);
+                rect.y = random_range(0, sizes[i][1] - 1u);
+                rect.width = random_range(1, 17);
+                rect.height = random_range(1, 17);
+                bake_change_samples(&l, &rect);
+                CHECK(terrimp_terrain_edit(l.terrain, &rect) == TERRIMP_OK);
+                CHECK(terrimp_bake_write(l.terrain, block[0], bytes, 0) == TERRIMP_E_STATE);
+                terrimp_terrain_destroy(anew);
+                CHECK(terrimp_terrain_create(&l.desc, NULL, &anew) == TERRIMP_OK);
+            } else {
+                most = random_range(1, 7);
+                CHECK(terrimp_terrain_refine(l.terrain, nodes, most, &done, scratch,
+                                             scratch_bytes) == TERRIMP_OK);
+                CHECK(done <= most && (done < 2u || nodes[0] < nodes[done - 1u]));
+            }
+            if (anew)
+                check_edit_bounds(&l, anew);
+        }
+        CHECK(terrimp_bake_write(l.terrain, block[0], bytes, 0) == TERRIMP_OK);
+        CHECK(terrimp_bake_write(anew, block[1], bytes, 0) == TERRIMP_OK);
+        CHECK(memcmp(block[0], block[1], bytes) == 0);
+        free(block[0]);
+        free(block[1]);
+        free(scratch);
+        terrimp_terrain_destroy(anew);
+        land_free(&l);
+    }
+}
+
 /* What cannot be rebuilt is refused, and the terrain stays as it was. */
 static void bad_edits_change_nothing(void)
 {
@@ -616,6 +719,12 @@ static void bad_edits_change_nothing(void)
         *sample = (float)NAN;
         CHECK(terrimp_terrain_rebuild(t, &rect, scratch, scratch_bytes) == TERRIMP_E_NOT_FINITE);
         *sample = old;
+        CHECK(terrimp_terrain_edit(b.opened, &rect) == TERRIMP_E_STATE);
+        CHECK(terrimp_terrain_edit(NULL, &rect) == TERRIMP_E_NULL);
+        CHECK(terrimp_terrain_refine(b.opened, NULL, 1, &count, scratch, scratch_bytes) ==
+              TERRIMP_E_STATE);
+        CHECK(terrimp_terrain_refine(t, NULL, 1, NULL, scratch, scratch_bytes) == TERRIMP_E_NULL);
+        CHECK(terrimp_terrain_refine(t, NULL, 1, &count, scratch, 8) == TERRIMP_E_MEMORY);
         CHECK(terrimp_terrain_rebuild(NULL, &rect, scratch, scratch_bytes) == TERRIMP_E_NULL);
         CHECK(terrimp_terrain_rebuild(t, NULL, scratch, scratch_bytes) == TERRIMP_E_NULL);
         CHECK(terrimp_terrain_rebuild(t, &rect, NULL, scratch_bytes) == TERRIMP_E_NULL);
@@ -687,6 +796,7 @@ static void bake_tests(void)
     RUN(bakes_may_have_company);
     RUN(terrains_of_any_scale_are_refused_or_open);
     RUN(rebuilt_terrains_equal_those_built_anew);
+    RUN(edits_in_slices_end_as_what_is_built_anew);
     RUN(bad_edits_change_nothing);
 }
 

@@ -20,6 +20,85 @@ static void random_camera(float reach, terrimp_camera *camera)
     camera->depth_zero_to_one = (int)random_range(0, 1);
 }
 
+enum { CAMERA_OFF_CENTRE, CAMERA_ORTHOGRAPHIC, CAMERA_REACH, CAMERA_KINDS };
+
+/* Makes a camera one of another kind, which sees about as much: for an orthographic one `size` is
+   that of what it looks at, and `reach` how far eyes may be apart. */
+static void camera_become(terrimp_camera *camera, int kind, float size, float reach)
+{
+    float wide = kind == CAMERA_ORTHOGRAPHIC ? size * random_magnitude(0.02f, 1.0f)
+                                             : random_magnitude(0.02f, 2.0f);
+    float high = wide * random_float(0.9f, 1.1f) * (float)camera->height_px /
+                 (float)camera->width_px;
+    camera->orthographic = kind == CAMERA_ORTHOGRAPHIC;
+    camera->reach = random_range(0, 1) || kind == CAMERA_REACH ? random_float(0.0f, reach) : 0.0f;
+    memset(camera->sides, 0, sizeof camera->sides);
+    if (kind == CAMERA_REACH)
+        return;
+    camera->sides[0] = wide * random_float(-1.0f, 0.5f);
+    camera->sides[1] = camera->sides[0] + wide;
+    camera->sides[2] = high * random_float(-1.0f, 0.5f);
+    camera->sides[3] = camera->sides[2] + high;
+    if (kind == CAMERA_ORTHOGRAPHIC) {
+        camera->z_near = random_float(-2.0f, -1.0f) * size;
+        camera->z_far = 4.0f * size;
+    } else if (random_range(0, 1)) {
+        camera->z_far = random_range(0, 1) ? 0.0f : 3e38f;
+    }
+}
+
+/* A point at shares of the way between the sides, at a depth, is that far across the screen; and
+   it is in the frustum, for all eyes within reach of the one that is asked. */
+static void cameras_of_every_kind_place_known_points(void)
+{
+    int i, k;
+    for (i = 0; i < 3000; i++) {
+        terrimp_camera camera, c;
+        terrimp_frustum frustum;
+        terrimp_box point;
+        float view[16], projection[16], factor, larger;
+        double p[3], seen[4], clip[4], right[3], forward[3], up[3], x, y, depth, across, high, end;
+        random_camera(10.0f, &camera);
+        camera_become(&camera, i & 1, 100.0f, 3.0f);
+        CHECK(terrimp_camera_resolve(&camera, &c) == TERRIMP_OK);
+        CHECK(terrimp_camera_resolve(&c, &camera) == TERRIMP_OK);
+        CHECK(memcmp(&camera, &c, sizeof c) == 0);
+        CHECK(terrimp_camera_matrices(&camera, view, projection) == TERRIMP_OK);
+        CHECK(terrimp_camera_pixel_factor(&c, &factor) == TERRIMP_OK);
+        larger = fmaxf((float)c.width_px / (c.sides[1] - c.sides[0]),
+                       (float)c.height_px / (c.sides[3] - c.sides[2]));
+        CHECK(fabsf(factor - larger) < 1e-5f * larger);
+        oracle_widen(c.forward, forward);
+        oracle_widen(c.up, up);
+        oracle_cross(forward, up, right);
+        x = (double)random_float(-1.0f, 1.0f);
+        y = (double)random_float(-1.0f, 1.0f);
+        end = (double)(c.z_far < 1e18f ? c.z_far : 1000.0f * c.z_near);
+        depth = (double)c.z_near + (end - (double)c.z_near) * (double)random_float(0.01f, 0.99f);
+        across = (double)c.sides[0] + 0.5 * (x + 1.0) * (double)(c.sides[1] - c.sides[0]);
+        high = (double)c.sides[2] + 0.5 * (y + 1.0) * (double)(c.sides[3] - c.sides[2]);
+        for (k = 0; k < 3; k++)
+            p[k] = (double)c.eye[k] + depth * forward[k] +
+                   (c.orthographic ? 1.0 : depth) * (across * right[k] + high * up[k]);
+        oracle_transform(view, p, seen);
+        oracle_transform4(projection, seen, clip);
+        CHECK(fabs(clip[0] / clip[3] - x) < 1e-2 && fabs(clip[1] / clip[3] - y) < 1e-2);
+        CHECK(clip[2] <= clip[3] && clip[2] >= (c.depth_zero_to_one ? 0.0 : -clip[3]));
+        if (fabs(x) > 0.99 || fabs(y) > 0.99)
+            continue;
+        for (k = 0; k < 3; k++)
+            point.min[k] = point.max[k] = (float)p[k];
+        CHECK(terrimp_camera_frustum(&c, &frustum) == TERRIMP_OK);
+        CHECK(terrimp_frustum_test(&frustum, &point, TERRIMP_PLANES_ALL) == 0);
+        random_vector(0.0f, c.reach, c.eye); /* the same seen from an eye within reach */
+        for (k = 0; k < 3; k++)
+            c.eye[k] = camera.eye[k] + c.eye[k] * 0.999f;
+        CHECK(terrimp_camera_frustum(&c, &frustum) == TERRIMP_OK);
+        CHECK(terrimp_frustum_test(&frustum, &point, TERRIMP_PLANES_ALL) !=
+              TERRIMP_PLANES_OUTSIDE);
+    }
+}
+
 static void camera_defaults_are_those_of_the_table(void)
 {
     terrimp_camera camera, out;
@@ -650,6 +729,7 @@ static void capture_fit_takes_flat_boxes_and_points(void)
 static void camera_tests(void)
 {
     RUN(camera_defaults_are_those_of_the_table);
+    RUN(cameras_of_every_kind_place_known_points);
     RUN(camera_limits_are_accepted_at_their_ends);
     RUN(camera_axes_are_orthonormal);
     RUN(camera_up_leans_towards_the_wanted_one);

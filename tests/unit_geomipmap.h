@@ -2,7 +2,7 @@
 #ifndef UNIT_GEOMIPMAP_H
 #define UNIT_GEOMIPMAP_H
 
-#include "unit_oracle.h"
+#include "unit_camera.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -503,6 +503,13 @@ static void mip_random_camera(const mip_scene *s, terrimp_camera *camera)
     camera->z_far = 5000.0f;
 }
 
+/* The same, but orthographic, off-centre, or the middle of eyes that are some way apart. */
+static void mip_any_camera(const mip_scene *s, terrimp_camera *camera)
+{
+    mip_random_camera(s, camera);
+    camera_become(camera, (int)random_range(0, CAMERA_KINDS - 1), 200.0f, 100.0f);
+}
+
 static void mip_random_settings(mip_scene *s)
 {
     s->view.rule = (int)random_range(0, TERRIMP_GEOMIP_RULE_COUNT - 1);
@@ -571,7 +578,10 @@ static void selections_tile_the_view_and_neighbours_fit(void)
             uint8_t *levels;
             uint32_t triangles = 0;
             mip_random_settings(&s);
-            mip_random_camera(&s, &camera);
+            if (frame % 2u)
+                mip_any_camera(&s, &camera);
+            else
+                mip_random_camera(&s, &camera);
             CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
             CHECK(s.view.draws_needed == s.view.draw_count);
             levels = mip_levels(&s);
@@ -612,7 +622,7 @@ static void mip_miss_on_screen(mip_drawn *d, uint32_t x, uint32_t z, float heigh
             clip[r] = (double)d->matrix[r] * at[0] + (double)d->matrix[4 + r] * at[1] +
                       (double)d->matrix[8 + r] * at[2] + (double)d->matrix[12 + r];
         w = clip[3];
-        if (k == 0 && (w < (double)d->camera->z_near || fabs(clip[0]) > w || fabs(clip[1]) > w))
+        if (k == 0 && (clip[2] < -w || fabs(clip[0]) > w || fabs(clip[1]) > w))
             return; /* not in view */
         p[k][0] = clip[0] / w * 0.5 * (double)d->camera->width_px;
         p[k][1] = clip[1] / w * 0.5 * (double)d->camera->height_px;
@@ -661,11 +671,85 @@ static void mip_measure_screen(mip_scene *s, const terrimp_camera *camera, const
         mip_triangles(indices, s->tree.chunk_quads, TERRIMP_FORM_LIST, draw->pattern,
                       mip_draw_triangle, &d);
         *worst = d.worst > *worst ? d.worst : *worst;
-        if (draw->node.level > 0 && draw->pattern == 0 && draw->morph == 0.0f && d.worst > 0.01f) {
+        if (draw->node.level > 0 && draw->pattern == 0 && draw->morph == 0.0f && d.worst > 0.01f &&
+            camera->reach == 0.0f) {
             CHECK(d.worst <= draw->error_px * 1.001f + 0.01f);
             *share = d.worst / draw->error_px > *share ? d.worst / draw->error_px : *share;
         }
     }
+}
+
+/* Moves a camera's eye by less than its reach; what is predicted for all eyes within reach is no
+   less for any node that both draw than what is predicted for that eye alone. */
+static void mip_move_within_reach(mip_scene *s, terrimp_camera *camera)
+{
+    float *alone = (float *)calloc(s->tree.node_count, sizeof *alone), apart[3];
+    terrimp_camera moved = *camera;
+    uint32_t i;
+    random_vector(0.0f, camera->reach, apart);
+    for (i = 0; i < 3u; i++)
+        moved.eye[i] += 0.999f * apart[i];
+    moved.reach = 0.0f;
+    CHECK(terrimp_geomip_select(&s->tree, &s->view, &moved) == TERRIMP_OK);
+    for (i = 0; i < s->view.draw_count; i++)
+        alone[s->view.draws[i].node.number] = s->view.draws[i].error_px;
+    CHECK(terrimp_geomip_select(&s->tree, &s->view, camera) == TERRIMP_OK);
+    for (i = 0; i < s->view.draw_count; i++)
+        CHECK(s->view.draws[i].error_px >= 0.9999f * alone[s->view.draws[i].node.number]);
+    memcpy(camera->eye, moved.eye, sizeof moved.eye);
+    free(alone);
+}
+
+/* A view in one block selects what one of separate arrays does. */
+static void a_view_in_one_block_selects_the_same(void)
+{
+    terrimp_geomip_view view;
+    terrimp_camera camera;
+    mip_scene s;
+    size_t bytes;
+    void *memory;
+    mip_make(&s, 193, 161, 8);
+    mip_random_camera(&s, &camera);
+    bytes = terrimp_geomip_view_bytes(&s.tree, s.view.draw_capacity);
+    memory = malloc(bytes);
+    memset(memory, 0x5a, bytes);
+    CHECK(terrimp_geomip_view_bytes(&s.tree, 0) == 0 && terrimp_geomip_view_bytes(NULL, 9) == 0);
+    CHECK(terrimp_geomip_view_init(&s.tree, s.view.draw_capacity, memory, bytes - 1u, &view) ==
+          TERRIMP_E_MEMORY);
+    CHECK(terrimp_geomip_view_init(&s.tree, s.view.draw_capacity, memory, bytes, &view) ==
+          TERRIMP_OK);
+    CHECK(terrimp_geomip_select(&s.tree, &view, &camera) == TERRIMP_OK);
+    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+    CHECK(view.draw_count == s.view.draw_count && view.triangle_count == s.view.triangle_count);
+    CHECK(memcmp(view.draws, s.view.draws, view.draw_count * sizeof *view.draws) == 0);
+    free(memory);
+    mip_free(&s);
+}
+
+/* The node of a position holds it; beside the field there is none. */
+static void the_node_of_a_position_holds_it(void)
+{
+    mip_scene s;
+    int i;
+    mip_make(&s, 193, 161, 8);
+    for (i = 0; i < 3000; i++) {
+        const terrimp_heightfield *f = &s.tree.field;
+        uint32_t level = random_range(0, s.tree.level_count - 1u);
+        float end_x = f->origin_x + (float)(f->width - 1u) * f->spacing_x;
+        float end_z = f->origin_z + (float)(f->depth - 1u) * f->spacing_z;
+        float x = random_range(0, 9) ? random_float(f->origin_x, end_x) : end_x;
+        float z = random_range(0, 9) ? random_float(f->origin_z, end_z) : end_z;
+        terrimp_node node = {0, 0, 0, 0};
+        terrimp_box box;
+        CHECK(terrimp_quadtree_find(&s.tree, level, x, z, &node) == TERRIMP_OK);
+        CHECK(node.level == level && node.number == s.tree.level_first[level] +
+                                                        node.z * s.tree.level_x[level] + node.x);
+        CHECK(terrimp_geomip_box(&s.tree, node.number, &box) == TERRIMP_OK);
+        CHECK(x >= box.min[0] && x <= box.max[0] && z >= box.min[2] && z <= box.max[2]);
+        CHECK(terrimp_quadtree_find(&s.tree, level, end_x + 1.0f, z, &node) == TERRIMP_E_MISS);
+        CHECK(terrimp_quadtree_find(&s.tree, s.tree.level_count, x, z, &node) == TERRIMP_E_RANGE);
+    }
+    mip_free(&s);
 }
 
 static void no_sample_in_view_is_further_off_than_predicted(void)
@@ -674,14 +758,17 @@ static void no_sample_in_view_is_further_off_than_predicted(void)
     mip_scene s;
     uint16_t *indices = mip_filled(8, TERRIMP_FORM_LIST);
     mip_make(&s, 193, 161, 8);
-    for (frame = 0; frame < 200u; frame++) {
+    for (frame = 0; frame < 400u; frame++) {
         terrimp_camera camera;
         float worst, share;
         mip_random_settings(&s);
-        mip_random_camera(&s, &camera);
+        if (frame % 2u)
+            mip_any_camera(&s, &camera);
+        else
+            mip_random_camera(&s, &camera);
         s.view.rule = frame % 3u ? TERRIMP_GEOMIP_BOUND : TERRIMP_GEOMIP_DISTANCE;
         s.view.morph_ratio = 0.0f;
-        CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
+        mip_move_within_reach(&s, &camera);
         mip_measure_screen(&s, &camera, indices, &worst, &share);
         CHECK(worst <= s.view.tolerance_px * 1.001f + 0.01f);
         close += share > 0.5f;
@@ -1241,6 +1328,8 @@ static void geomipmap_tests(void)
     RUN(patterns_refuse_bad_sizes);
     RUN(a_node_knows_its_largest_error_and_that_of_finer_neighbours_beside_it);
     RUN(selections_tile_the_view_and_neighbours_fit);
+    RUN(a_view_in_one_block_selects_the_same);
+    RUN(the_node_of_a_position_holds_it);
     RUN(no_sample_in_view_is_further_off_than_predicted);
     RUN(a_real_tile_keeps_within_a_pixel);
     RUN(a_jittering_camera_does_not_flicker);

@@ -606,8 +606,82 @@ static void simplifier_refuses_bad_input(void)
     simp_free(t);
 }
 
+/* One call gives what the steps give: neighbours meet, the error is that of brute force and keeps
+   to the one that is asked for with fewer triangles than the budget, and voids are refused. */
+static void a_rectangle_of_a_field_simplifies_by_one_call(void)
+{
+    static simp_case t, whole;
+    int i;
+    for (i = 0; i < 24; i++) {
+        terrimp_heightfield field;
+        terrimp_rect rect[2];
+        uint32_t budget = i % 4 == 0 ? 0 : random_range(40, 700), side, k, spent = 0;
+        float found = -1.0f, loose, edge[2][200];
+        memset(edge, 0, sizeof edge);
+        simp_fill(&whole, random_range(70, 120), random_range(20, 60), (uint32_t)i % 3u * 3u);
+        memset(&field, 0, sizeof field);
+        field.samples = whole.heights;
+        field.width = whole.cols;
+        field.depth = whole.rows;
+        rect[0].x = rect[0].y = rect[1].y = 0;
+        rect[0].width = rect[1].x = random_range(20, 50);
+        rect[0].width++; /* they share a column */
+        rect[1].width = random_range(2, whole.cols - rect[1].x);
+        rect[0].height = rect[1].height = random_range(4, whole.rows);
+        for (side = 0; side < 2u; side++) {
+            size_t bytes = terrimp_simplify_field_scratch_bytes(rect[side].width,
+                                                                rect[side].height, budget);
+            void *scratch = malloc(bytes);
+            double above, below, rms;
+            memset(&t, 0, sizeof t);
+            t.cols = rect[side].width;
+            t.rows = rect[side].height;
+            CHECK(terrimp_heightfield_read(&field, rect[side].x, 0, t.cols, t.rows, 1,
+                                           t.heights) == TERRIMP_OK);
+            CHECK(terrimp_mesh_capacity(budget, &t.mesh.vertex_capacity,
+                                        &t.mesh.index_capacity) == TERRIMP_OK);
+            t.mesh.vertices = (terrimp_mesh_vertex *)malloc(t.mesh.vertex_capacity *
+                                                            sizeof *t.mesh.vertices);
+            t.mesh.indices = (uint16_t *)malloc(t.mesh.index_capacity * sizeof *t.mesh.indices);
+            CHECK(terrimp_simplify_field(&field, &rect[side], budget, 0.0f, scratch, bytes,
+                                         &t.mesh, &found) == TERRIMP_OK);
+            simp_brute_errors(&t, &above, &below, &rms);
+            CHECK(fabs((double)found - fmax(above, below)) <= 1e-4 * (double)found + 1e-4);
+            CHECK(simp_covers(&t));
+            spent = t.mesh.surface_index_count;
+            for (k = 0; k < t.mesh.border_vertex_count; k++) {
+                const terrimp_mesh_vertex *v = &t.mesh.vertices[k];
+                if (v->x == (side ? 0 : t.cols - 1u))
+                    edge[side][v->z] = v->height;
+            }
+            loose = 2.0f * found + 0.5f;
+            CHECK(terrimp_simplify_field(&field, &rect[side], budget, loose, scratch, bytes,
+                                         &t.mesh, &found) == TERRIMP_OK);
+            CHECK(found <= loose && t.mesh.surface_index_count <= spent);
+            simp_brute_errors(&t, &above, &below, &rms);
+            CHECK(fmax(above, below) <= (double)loose * 1.0001 + 1e-4);
+            field.has_no_data = 1;
+            field.no_data = t.heights[t.cols + 1u];
+            CHECK(terrimp_simplify_field(&field, &rect[side], budget, 0.0f, scratch, bytes,
+                                         &t.mesh, NULL) == TERRIMP_E_VOID);
+            field.has_no_data = 0;
+            CHECK(terrimp_simplify_field(&field, &rect[side], 5, 0.0f, scratch, bytes, &t.mesh,
+                                         NULL) == TERRIMP_E_RANGE);
+            CHECK(terrimp_simplify_field(&field, &rect[side], budget, 0.0f, scratch, bytes - 1u,
+                                         &t.mesh, NULL) == TERRIMP_E_MEMORY);
+            free(scratch);
+            simp_free(&t);
+        }
+        CHECK(memcmp(edge[0], edge[1], sizeof edge[0]) == 0);
+        rect[1].width = whole.cols + 1u;
+        CHECK(terrimp_simplify_field(&field, &rect[1], budget, 0.0f, edge, sizeof edge, &t.mesh,
+                                     NULL) == TERRIMP_E_RANGE);
+    }
+}
+
 static void simplifier_tests(void)
 {
+    RUN(a_rectangle_of_a_field_simplifies_by_one_call);
     RUN(border_keeps_its_ends_rises_and_beats_straight_lines);
     RUN(coarse_mesh_covers_the_tile_one_to_one_within_budget);
     RUN(tightest_budget_leaves_no_inner_vertex);
