@@ -288,8 +288,8 @@ typedef struct terrimp_heightfield {
     float no_data;          /* the sample value that means no data, when has_no_data */
     int has_no_data;        /* nonzero: samples equal to no_data are voids; F32 NaN is one too */
     int wrap;               /* nonzero: the field repeats without end, its last column and row being
-                               the first ones of the next. Heights, normals, rays and Sorted know
-                               of it; a terrain is one repetition */
+                               the first ones of the next. Heights, normals, rays, Sorted and views
+                               know of it; a terrain is one repetition */
 } terrimp_heightfield;
 
 /* Every function below takes the descriptor as it was filled in, or as resolve wrote it. The
@@ -1189,6 +1189,8 @@ typedef struct terrimp_ground_command {
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
+    float offset[2];      /* [wu] x and z to be added to its vertices: 0, but in a terrain that
+                             wraps. All that commands say in world units is with that offset */
 } terrimp_ground_command;
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
@@ -1282,6 +1284,12 @@ typedef struct terrimp_view_desc {
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
+    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
+                               repetitions along each axis, with the eye's in the middle. The
+                               field's quads are multiples of chunk_quads; nodes are drawn up to the
+                               level at which its chunks are no multiple of theirs. It takes 44 bytes more
+                               for each node that it has by that. No walls then
+                               [Limits: odd, 3..15; 65537 samples along an axis] [Default 0 -> 3] */
     const void *walls;      /* of the terrain's quadtree, aligned to 4, built, outliving the view:
                                what lies behind a ridge is neither drawn nor captured. The view
                                takes 28 KiB more [Default NULL -> nothing is hidden so] */
@@ -1309,6 +1317,7 @@ typedef struct terrimp_impostor_command {
                              picture has there, 0..1, to the place relative to the frame's eye,
                              times a factor. For a host that keeps the depth of its atlases and
                              writes that place's own: see terrimp_place_matrix. Else 0 */
+    float offset[2];      /* [wu] as for ground */
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
@@ -1321,6 +1330,7 @@ typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
+    float offset[2]; /* [wu] as for ground; one floor for each repetition */
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1384,7 +1394,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0;
+              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
+              before, or 0;
               walls and exact_depth only if the view was made with them
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
@@ -4345,6 +4356,8 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_nod
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    if (split2 >= TERRIMPI_MIP_MOST)
+        return split2; /* at no distance; or it cannot be drawn at all */
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
     measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
@@ -5693,6 +5706,9 @@ struct terrimp_terrain {
     terrimpi_mesh *meshes;                 /* [node_count] */
     uint32_t *points;                      /* [node_count][vertex_limit] */
     uint32_t *corners;                     /* [node_count][index_limit / 4] four indices each */
+    uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
+                                              which a node is a repetition. NULL: itself */
+    uint32_t tiles;                        /* then: repetitions along each axis */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -5877,12 +5893,18 @@ static float terrimpi_border_height(const terrimp_terrain *t, uint32_t steps)
     return t->range_low + t->range_step * (float)steps;
 }
 
+/* The node of the built terrain that a node is, or repeats. */
+static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
+{
+    return t->real ? t->real[node] : node;
+}
+
 /* Vertex i of a node's mesh. */
 static terrimpi_point terrimpi_mesh_point(const terrimp_terrain *t, const terrimpi_patch *p,
                                           uint32_t node, uint32_t i)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
-    uint32_t word = t->points[(size_t)node * t->vertex_limit + i];
+    uint32_t word = t->points[(size_t)terrimpi_real_node(t, node) * t->vertex_limit + i];
     terrimpi_point point;
     point.x = word & 0xffu;
     point.z = word >> 8 & 0xffu;
@@ -5900,6 +5922,7 @@ static terrimpi_point terrimpi_mesh_point(const terrimp_terrain *t, const terrim
 /* Index i of a node's mesh. */
 static uint32_t terrimpi_mesh_corner(const terrimp_terrain *t, uint32_t node, uint32_t i)
 {
+    node = terrimpi_real_node(t, node);
     return t->corners[(size_t)node * (t->index_limit / 4u) + i / 4u] >> i % 4u * 8u & 0xffu;
 }
 
@@ -5945,6 +5968,7 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
     uint32_t rim = t->desc.no_lower_skirts ? 0u : terrimpi_mesh_border(mesh);
+    node = terrimpi_real_node(t, node);
     info->base_vertex = node * t->vertex_stride;
     info->vertex_count = terrimpi_mesh_vertices(mesh) + rim;
     info->first_index = node * t->index_stride;
@@ -7535,7 +7559,7 @@ static uint32_t terrimpi_capture_side(const terrimpi_capture_row *row, uint32_t 
 static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                       terrimpi_capture_draw draws[TERRIMPI_CAPTURE_DRAWS])
 {
-    const terrimp_heightfield *field = &t->desc.field;
+    const terrimp_heightfield *field = &t->tree.field;
     const float *eye = plan->camera.eye;
     uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
     uint32_t i, j, k, count = 0;
@@ -7579,33 +7603,55 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. */
+/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
+   the one in the middle is. */
+static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
+                                 const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    if (!t->real)
+        return;
+    offset[0] = middle[0] + terrimpi_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+}
+
+/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. `middle` is
+   added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                   const terrimpi_capture_draw *draws, uint32_t from, uint32_t to,
-                                  uint32_t layer, terrimp_capture_command *command,
-                                  int depth_zero_to_one, const terrimp_callbacks *callbacks)
+                                  uint32_t layer, const float middle[2],
+                                  terrimp_capture_command *command, int depth_zero_to_one,
+                                  const terrimp_callbacks *callbacks)
 {
     const terrimp_heightfield *field = &t->desc.field;
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
+    terrimp_node place;
     camera.z_far = terrimpi_capture_end(plan, layer);
-    command->node = plan->node.number;
+    camera.eye[0] += middle[0];
+    camera.eye[2] += middle[1];
+    command->node = terrimpi_real_node(t, plan->node.number);
     command->level = plan->node.level;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
-    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x;
-    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z;
-    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x;
-    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z;
+    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x + middle[0];
+    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z + middle[1];
+    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
+    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (; from < to; from++) {
         if (!terrimpi_capture_in_layer(t, plan, draws[from].node, layer))
             continue;
-        ground.node = draws[from].node;
+        place = terrimpi_tree_node(&t->tree, draws[from].node);
+        terrimpi_tile_offset(t, &place, middle, ground.offset);
+        ground.node = terrimpi_real_node(t, draws[from].node);
         ground.first_index = draws[from].first_index;
         ground.index_count = draws[from].index_count;
         callbacks->draw_ground(callbacks->user, &ground);
@@ -7717,6 +7763,7 @@ typedef struct terrimpi_frame {
     int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
     float pixel_factor;
+    float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
 } terrimpi_frame;
 
@@ -7814,7 +7861,10 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.atlas_count, 1);
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
+    TERRIMPI_DEFAULT(d.wrap_tiles, 3);
     chunks = terrain->tree.level_first[1];
+    if (terrain->desc.field.wrap && !terrain->real)
+        chunks *= d.wrap_tiles * d.wrap_tiles;
     TERRIMPI_DEFAULT(d.max_ground,
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
@@ -7823,6 +7873,15 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
+                    TERRIMP_E_RANGE);
+    if (terrain->desc.field.wrap) {
+        const terrimp_heightfield *f = &terrain->desc.field;
+        TERRIMPI_REFUSE(d.walls || (f->width - 1u) % terrain->desc.chunk_quads ||
+                        (f->depth - 1u) % terrain->desc.chunk_quads ||
+                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
+                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
+    }
     *out = d;
     return TERRIMP_OK;
 }
@@ -8066,7 +8125,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_IMPOSTORS_ALWAYS)
+    if (impostors == TERRIMPI_IMPOSTORS_ALWAYS ||
+        terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0) /* of no repetition */
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
@@ -8395,7 +8455,8 @@ typedef struct terrimpi_job {
 } terrimpi_job;
 
 struct terrimp_view {
-    const terrimp_terrain *terrain;
+    const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
+                                               wraps */
     uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
@@ -8415,11 +8476,55 @@ struct terrimp_view {
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
     terrimp_stats stats;
+    terrimp_terrain tiled;         /* repetitions of one that wraps: then `terrain` is this */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain)
+{
+    terrimp_terrain *t = &v->tiled;
+    terrimp_heightfield field = terrain->desc.field;
+    v->terrain = terrain;
+    if (!field.wrap)
+        return;
+    *t = *terrain;
+    t->tiles = v->desc.wrap_tiles;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+    v->terrain = t;
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
 
 /* ---- memory ---- */
 
@@ -8487,7 +8592,15 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->draws = (terrimpi_draw *)terrimpi_take(&l, ground + impostors + 1u, sizeof *v->draws);
+    v->draws = (terrimpi_draw *)terrimpi_take(
+        &l, ground + impostors + (v->terrain == &v->tiled ?
+                                  v->desc.wrap_tiles * v->desc.wrap_tiles : 1u), sizeof *v->draws);
+    if (v->terrain == &v->tiled) {
+        terrimp_terrain *t = &v->tiled;
+        t->real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *t->real);
+        t->meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *t->meshes);
+        t->tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *t->tree.nodes);
+    }
     v->cull.horizon = NULL;
     if (v->desc.walls)
         v->cull.horizon = (terrimp_horizon *)terrimpi_take(&l, 1, sizeof *v->cull.horizon);
@@ -8499,7 +8612,7 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     terrimp_view v;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    v.terrain = terrain;
+    terrimpi_tiled_begin(&v, terrain);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -8520,7 +8633,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    v.terrain = terrain;
+    terrimpi_tiled_begin(&v, terrain);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -8529,8 +8642,13 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
-    v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
+    v.built = terrain;
+    if (terrain->desc.field.wrap) {
+        terrimpi_tiled_fill(&v.tiled, terrain);
+        v.terrain = &made->tiled;
+    }
+    v.frame.terrain = v.terrain;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
@@ -8548,10 +8666,12 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
-                    d.max_captures != has->max_captures || (d.walls && !view->cull.horizon) ||
+                    d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
+                    (d.walls && !view->cull.horizon) ||
                     (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
@@ -8588,6 +8708,80 @@ static void terrimpi_view_cancel(terrimp_view *v)
     }
 }
 
+/* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
+   node that a node was, or node_count when it was none. */
+static uint32_t terrimpi_tiled_before(const terrimp_terrain *t, const terrimp_node *n, int32_t x,
+                                      int32_t z)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t was_x = n->x + (uint32_t)(x * (int32_t)(tree->level_x[n->level] / t->tiles));
+    uint32_t was_z = n->z + (uint32_t)(z * (int32_t)(tree->level_z[n->level] / t->tiles));
+    if (terrimpi_mesh_triangles(&t->meshes[n->number]) == 0 ||
+        !terrimpi_tree_has(tree, n->level, was_x, was_z))
+        return tree->node_count;
+    return terrimpi_tree_at(tree, n->level, was_x, was_z).number;
+}
+
+static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
+{
+    const terrimp_terrain *t = v->terrain;
+    uint32_t count = t->tree.node_count, k;
+    int up = z > 0 || (z == 0 && x > 0);
+    terrimpi_picture *p;
+    float way[2];
+    way[0] = (float)x * terrimpi_period(&t->desc.field, 0);
+    way[1] = (float)z * terrimpi_period(&t->desc.field, 1);
+    v->frame.camera.eye[0] -= way[0];
+    v->frame.camera.eye[2] -= way[1];
+    v->outdated = 1; /* its draws are of nodes that are elsewhere now */
+    terrimpi_view_cancel(v);
+    if (v->open)
+        terrimpi_job_cancel(&v->cache, &v->jobs[0]);
+    v->open = 0;
+    for (k = 0; k < count; k++) { /* from which they come is later in this direction */
+        terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
+        uint32_t was = terrimpi_tiled_before(t, &n, x, z);
+        int is = was < count;
+        v->kind_of[n.number] = is ? v->kind_of[was] : (unsigned char)TERRIMPI_KIND_GROUND;
+        v->ground.marks[n.number].measure = is ? v->ground.marks[was].measure : 0.0f;
+        v->ground.marks[n.number].frame = is ? v->ground.marks[was].frame : 0;
+    }
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+        if (p->seen)
+            v->cache.of_node[p->node.number] = TERRIMPI_NO_PICTURE;
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
+        terrimp_node n = p->node;
+        uint32_t now = p->seen ? terrimpi_tiled_before(t, &n, -x, -z) : count;
+        if (!p->seen)
+            continue;
+        if (now == count) {
+            uint16_t *at = &v->cache.of_node[n.number], other = *at;
+            terrimpi_cache_drop(&v->cache, p);
+            *at = other;
+            continue;
+        }
+        p->node = terrimpi_tree_node(&t->tree, now);
+        p->eye[0] -= way[0];
+        p->eye[2] -= way[1];
+        v->cache.of_node[now] = (uint16_t)(p - v->cache.pictures);
+    }
+}
+
+/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
+   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
+static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
+                                 int32_t went[2])
+{
+    const terrimp_heightfield *field = &v->terrain->desc.field;
+    int k;
+    for (k = 0; k < 2 && v->terrain->real; k++) {
+        float period = terrimpi_period(field, k), step;
+        middle[k] = period * terrimpi_wrap(field, k, &camera->eye[2 * k]);
+        step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
+        went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
@@ -8604,15 +8798,23 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     const terrimp_quadtree *tree;
     terrimpi_picture *p;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
-    tree = &view->terrain->tree;
+    tree = &view->built->tree;
     TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
+    if (view->terrain->real)
+        terrimpi_tiled_fill(&view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++) {
-        if (!terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
+        uint32_t tiles = view->terrain->real ? view->desc.wrap_tiles : 1u, k;
+        for (k = 0; k < tiles * tiles; k++)
+            if (terrimpi_cache_shows(p, tree->chunk_quads,
+                                     x + k % tiles * (tree->field.width - 1u),
+                                     z + k / tiles * (tree->field.depth - 1u), cols, rows))
+                break;
+        if (k == tiles * tiles)
             continue;
         if (view->open && view->jobs[0].picture == p) {
             terrimpi_job_cancel(&view->cache, &view->jobs[0]);
@@ -8929,7 +9131,8 @@ static void terrimpi_ground_emit(const terrimp_view *v, const terrimpi_draw *dra
     terrimp_pattern pattern;
     terrimpi_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    command.node = ground->node.number;
+    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    command.node = terrimpi_real_node(v->terrain, ground->node.number);
     command.level = ground->node.level;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
@@ -8948,7 +9151,8 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    command.node = picture->node.number;
+    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    command.node = terrimpi_real_node(v->terrain, picture->node.number);
     command.level = picture->node.level;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
@@ -8956,6 +9160,8 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
     memcpy(command.eye, picture->eye, sizeof command.eye);
+    command.eye[0] += v->frame.middle[0];
+    command.eye[2] += v->frame.middle[1];
     picture->drawn_count++;
     for (k = 0; k < picture->layer_count; k++) {
         layer = v->desc.sorted ? picture->layer_count - 1u - k : k;
@@ -8976,13 +9182,19 @@ static void terrimpi_floor_emit(const terrimp_view *v, const terrimpi_draw *draw
                                 const terrimp_callbacks *callbacks)
 {
     terrimp_floor_command command;
-    (void)draw;
     if (!callbacks->draw_floor)
         return;
     memset(&command, 0, sizeof command);
-    command.base_vertex = v->terrain->tree.node_count * v->terrain->vertex_stride;
-    command.first_index = v->terrain->tree.node_count * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_indices(v->terrain);
+    command.base_vertex = v->built->tree.node_count * v->terrain->vertex_stride;
+    command.first_index = v->built->tree.node_count * v->terrain->index_stride;
+    command.index_count = terrimpi_floor_indices(v->built);
+    if (v->terrain->real) { /* its first chunk says of which repetition */
+        uint32_t tiles = v->terrain->tiles;
+        terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
+                                              v->built->tree.level_x[0], draw->index / tiles *
+                                              v->built->tree.level_z[0]);
+        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+    }
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -9358,7 +9570,8 @@ static void terrimpi_view_list(terrimp_view *v)
     for (i = 0; i < v->draw_count; i++)
         impostors += v->draws[i].kind == TERRIMPI_KIND_IMPOSTOR ? 1u : 0u;
     if (impostors > 0 && terrimpi_view_over(&v->frame))
-        terrimpi_view_add(v, TERRIMPI_KIND_FLOOR, 0);
+        for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
+            terrimpi_view_add(v, TERRIMPI_KIND_FLOOR, i);
 }
 
 /* What a draw adds to the statistics. */
@@ -9383,7 +9596,7 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_draw 
         s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
     } else {
         s->draws++;
-        s->triangles += terrimpi_floor_indices(v->terrain) / 3u;
+        s->triangles += terrimpi_floor_indices(v->built) / 3u;
     }
 }
 
@@ -9441,11 +9654,16 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, spread = 0.0f, drawn = 0.0f;
+    float reuse, spread = 0.0f, drawn = 0.0f, middle[2] = {0.0f, 0.0f};
+    int32_t went[2] = {0, 0};
     uint32_t i;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
+    terrimpi_tiled_enter(view, &resolved, middle, went);
+    if (went[0] || went[1])
+        terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
+    memcpy(frame.middle, middle, sizeof middle);
     TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
     view->frame = frame;
     view->cache.frame = frame.number;
@@ -9507,7 +9725,8 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
         command.clear = job->from == 0;
         command.complete = job->to == job->draw_count;
         terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
-                              &command, v->frame.camera.depth_zero_to_one, callbacks);
+                              v->frame.middle, &command, v->frame.camera.depth_zero_to_one,
+                              callbacks);
     }
     job->from = job->to;
     if (job->to < job->draw_count)
