@@ -1287,12 +1287,17 @@ typedef struct terrimp_view_desc {
     uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
                                repetitions along each axis, with the eye's in the middle. The
                                field's quads are multiples of chunk_quads; nodes are drawn up to the
-                               level at which its chunks are no multiple of theirs. It takes 44 bytes more
-                               for each node that it has by that. No walls then
-                               [Limits: odd, 3..15; 65537 samples along an axis] [Default 0 -> 3] */
+                               level at which its chunks are no multiple of theirs. It takes 44
+                               bytes more for each node that it has by that. No walls then
+                               [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
     const void *walls;      /* of the terrain's quadtree, aligned to 4, built, outliving the view:
                                what lies behind a ridge is neither drawn nor captured. The view
                                takes 28 KiB more [Default NULL -> nothing is hidden so] */
+    float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
+                               and captures are predicted to cost. The ground is coarsened until
+                               they fit, and made finer again when that is predicted to fit, too; as
+                               many captures are made as leave no frame dearer
+                               [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_costs costs;
 } terrimp_view_desc;
 
@@ -1365,7 +1370,8 @@ typedef struct terrimp_stats {
     uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
-    float ground_tolerance_px;   /* what max_ground made of it */
+    float ground_tolerance_px;   /* what max_ground and max_cost made of it */
+    float cost;                  /* of the frame, predicted: all but what is shaded either way */
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
@@ -1417,6 +1423,14 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
               before the first update, and after invalidate and touch until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
+
+/* The max_cost of the next frames from what the last one took, for a host that measures: at most a
+   twentieth less or a fiftieth more, the same within 3 % of the target. No clock inside, and it
+   settles where time rises with cost, and no faster than it does. A pause costs one step.
+
+   cost        that the frame was allowed; ms that it took; target_ms that it should take. What is
+               not above 0, or not finite: the cost stays */
+TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
 /* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
@@ -7687,7 +7701,11 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
-#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; when costs fall with the square
+                                         of that, for max_cost */
+#define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
+#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
+#define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
 #define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
 #define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
                                          exceed this */
@@ -7835,6 +7853,7 @@ static terrimp_result terrimpi_view_settings(const terrimp_terrain *t, terrimp_v
                           &result);
     terrimpi_view_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
     terrimpi_view_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
+    terrimpi_view_setting(&d->max_cost, 0.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
@@ -8472,7 +8491,9 @@ struct terrimp_view {
     uint32_t open;                 /* 1 + the job of which pieces are missing */
     int outdated;                  /* what this frame would draw has been forgotten */
     terrimp_geomip_view ground;
-    float ground_scale;            /* of its tolerance: 1, or more when max_ground is short */
+    float ground_scale;            /* of its tolerance: 1, or more when max_ground or max_cost are
+                                      short */
+    float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
     terrimp_stats stats;
@@ -8901,7 +8922,6 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_view_make_regions(v, NULL);
         return TERRIMP_OK;
     }
-    v->ground_scale = terrimpi_max(1.0f, v->ground_scale * TERRIMPI_VIEW_FINER);
     for (;;) {
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
@@ -9329,7 +9349,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
-    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
+    job->in_pieces = f->desc->max_capture_triangles ||
+                     ((job->triangles > room ||
+                       (f->desc->max_cost > 0.0f &&
+                        c->capture_cost > costs->triangle * (float)room)) && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -9446,6 +9469,14 @@ static uint32_t terrimpi_spending_left(const terrimpi_frame *f, const terrimpi_s
     return left;
 }
 
+/* The same for a certain one, when max_cost counts what its pixels cost, too. */
+static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
+                                       const terrimpi_job *job)
+{
+    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
+    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
+}
+
 /* Adds a job, or a piece of one, of which the draws are in draws. A picture that will be complete
    is judged anew: it is drawn in this frame. */
 static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
@@ -9475,9 +9506,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
     if (v->job_count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
+        (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
         (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
         !terrimpi_job_prepare(v, c, room, job))
         return 0;
+    room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
          s->texels + job->texels > d->max_capture_texels) ||
         (job->triangles > room && v->open)) {
@@ -9507,7 +9540,9 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     v->job_count = 1;
     job->picture->seen = v->frame.number;
     terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
-    terrimpi_job_cut(v->capture_draws, terrimpi_spending_left(&v->frame, s), job);
+    terrimpi_job_cut(v->capture_draws,
+                     terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job),
+                     job);
     terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
 }
 
@@ -9520,6 +9555,8 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     uint32_t i, count, put_off = 0, due = 0;
     memset(&s, 0, sizeof s);
     s.allowance = terrimpi_max(TERRIMPI_VIEW_SPREAD * spread, drawn);
+    if (v->desc.max_cost > 0.0f)
+        s.allowance = terrimpi_clamp(v->desc.max_cost - drawn, 0.0f, s.allowance);
     s.spread = spread;
     if (v->open)
         terrimpi_view_continue(v, &s);
@@ -9535,6 +9572,7 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
         v->stats.captures += v->jobs[i].plan.layer_count;
         v->stats.splits += v->jobs[i].plan.layer_count - 1u;
     }
+    v->stats.cost = drawn + s.cost;
     v->stats.captured_texels = s.texels;
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
@@ -9650,13 +9688,36 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
+/* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
+   that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
+static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
+                                        float *drawn)
+{
+    float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
+    float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    uint32_t tries, i;
+    if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
+        v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
+    for (tries = 0;; tries++) {
+        TERRIMPI_TRY(terrimpi_view_cut(v, f));
+        v->frame = *f;
+        *spread = *drawn = 0.0f;
+        for (i = 0; i < v->region_count; i++)
+            terrimpi_view_decide(v, &v->regions[i], spread, drawn);
+        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+        if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
+            tries == TERRIMPI_VIEW_TRIES)
+            return TERRIMP_OK;
+        v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera)
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, spread = 0.0f, drawn = 0.0f, middle[2] = {0.0f, 0.0f};
+    float reuse, spread, drawn, middle[2] = {0.0f, 0.0f};
     int32_t went[2] = {0, 0};
-    uint32_t i;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
     terrimpi_tiled_enter(view, &resolved, middle, went);
@@ -9664,8 +9725,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
-    TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
-    view->frame = frame;
+    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
     view->cache.frame = frame.number;
     view->outdated = 0;
     terrimpi_view_cancel(view);
@@ -9675,8 +9735,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     if (!terrimpi_view_full(&view->desc))
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
-    for (i = 0; i < view->region_count; i++)
-        terrimpi_view_decide(view, &view->regions[i], &spread, &drawn);
     terrimpi_view_schedule(view, spread, drawn);
     terrimpi_view_list(view);
     terrimpi_view_count_frame(view);
@@ -9765,6 +9823,16 @@ TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terr
     TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
     *stats = view->stats;
     return TERRIMP_OK;
+}
+
+TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms)
+{
+    float next = cost * terrimpi_clamp(target_ms / ms, 0.95f, 1.02f);
+    if (!terrimpi_finite2(ms, target_ms) || !terrimpi_finite2(cost, next) || !(ms > 0.0f) ||
+        !(target_ms > 0.0f) || !(cost > 0.0f) ||
+        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+        return cost;
+    return next;
 }
 
 #ifndef TERRIMP_NO_MALLOC
@@ -10668,14 +10736,10 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 
 TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
 {
-    float ratio = target_ms / ms, next;
-    if (!terrimpi_finite2(ms, target_ms) || !(ms > 0.0f) || !(target_ms > 0.0f) ||
-        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+    float now = (float)(triangles ? triangles : 1u), next = terrimp_view_pace(now, ms, target_ms);
+    if (!(next > now || next < now) || next >= 4294967040.0f)
         return triangles;
-    next = (float)triangles * terrimpi_clamp(ratio, 0.95f, 1.02f);
-    if (next >= 4294967040.0f)
-        return triangles;
-    return ratio > 1.0f ? triangles + (uint32_t)(next - (float)triangles) + 1u : (uint32_t)next;
+    return next > now ? triangles + (uint32_t)(next - now) + 1u : (uint32_t)next;
 }
 
 /* The three texels of a line that are mixed at one of them: before, itself, after. At an end where

@@ -752,6 +752,142 @@ static void views_that_wrap_repeat_after_a_period(void)
     CHECK(seams > 3 && impostors > 1000 && at_seam * 5 < seams * impostors / (2 * 4 * 120));
 }
 
+/* ---- the pace of views ---- */
+
+static void pace_capture(void *user, const terrimp_capture_command *c) { (void)user, (void)c; }
+static void pace_ground(void *user, const terrimp_ground_command *c) { (void)user, (void)c; }
+static void pace_impostor(void *user, const terrimp_impostor_command *c) { (void)user, (void)c; }
+
+static int pace_compare(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* What the frames of a flight that looks round cost, and how far the tolerance goes in a frame;
+   then the eye rests. Returns 99 % over median. */
+static float pace_fly(const land *l, terrimp_view_desc *d, float *median, float *mean,
+                      float *most, int *rests)
+{
+    enum { FRAMES = 400 };
+    static float costs[FRAMES];
+    terrimp_view *view = NULL;
+    int i;
+    float tolerance = 0.0f;
+    CHECK(terrimp_view_create(l->terrain, d, NULL, &view) == TERRIMP_OK);
+    *rests = 1;
+    for (i = 0; i < 40 + FRAMES + 200; i++) {
+        float t = i < 40 + FRAMES ? 0.01f * (float)i : 0.01f * (float)(40 + FRAMES);
+        terrimp_camera camera;
+        terrimp_callbacks draw;
+        terrimp_stats stats;
+        memset(&draw, 0, sizeof draw);
+        draw.begin_capture = draw.end_capture = pace_capture;
+        draw.draw_ground = pace_ground, draw.draw_impostor = pace_impostor;
+        memset(&camera, 0, sizeof camera);
+        camera.eye[0] = l->info.box.min[0] + 20.0f + 25.0f * t;
+        camera.eye[2] = l->info.box.min[2] + 60.0f + 12.0f * sinf(t);
+        camera.eye[1] = l->info.box.max[1] + 6.0f + 4.0f * sinf(3.0f * t);
+        camera.forward[0] = 1.0f + cosf(2.0f * t), camera.forward[2] = sinf(2.0f * t);
+        camera.forward[1] = -0.3f - 0.2f * cosf(1.3f * t);
+        camera.width_px = 640, camera.height_px = 480;
+        camera.z_near = 0.5f, camera.z_far = 900.0f;
+        CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(view, &stats) == TERRIMP_OK);
+        CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
+        if (i >= 40 && i < 40 + FRAMES)
+            costs[i - 40] = stats.cost;
+        if (i > 40 + FRAMES + 150)
+            *rests &= fabsf(stats.ground_tolerance_px - tolerance) <= 0.0f;
+        tolerance = stats.ground_tolerance_px;
+    }
+    terrimp_view_destroy(view);
+    qsort(costs, FRAMES, sizeof *costs, pace_compare);
+    *median = costs[FRAMES / 2];
+    for (i = 0, *mean = 0.0f; i < FRAMES; i++)
+        *mean += costs[i] / (float)FRAMES;
+    *most = costs[FRAMES - 1];
+    return costs[FRAMES * 99 / 100] / *median;
+}
+
+static void views_keep_to_their_cost(void)
+{
+    static land l;
+    int mode, turn;
+    for (turn = 0; turn < 2; turn++)
+        for (mode = TERRIMP_MODE_GEOMIP; mode <= TERRIMP_MODE_AUTO; mode += 2) {
+            terrimp_view_desc d;
+            float median, mean, most, least, limited, free_ratio, ratio;
+            int rests;
+            land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
+            l.desc.field.height_scale = 0.125f;
+            l.desc.chunk_quads = turn ? 8 : 16;
+            if (!land_build(&l))
+                return;
+            memset(&d, 0, sizeof d);
+            d.mode = mode;
+            d.ground_tolerance_px = 0.25f;
+            d.costs.capture = 100.0f;
+            free_ratio = pace_fly(&l, &d, &median, &mean, &most, &rests);
+            d.max_cost = 0.9f * mean;
+            ratio = pace_fly(&l, &d, &least, &limited, &most, &rests);
+            /* A picture is made in pieces of whole nodes, which some frames have no room for. */
+            if (mode == TERRIMP_MODE_AUTO)
+                CHECK(ratio < 0.5f * free_ratio && limited < 1.02f * d.max_cost);
+            else
+                CHECK(ratio <= 1.2f && most <= 1.05f * d.max_cost && rests);
+            CHECK(median > d.max_cost * 0.5f && least > 0.8f * d.max_cost);
+            land_free(&l);
+        }
+}
+
+static void views_without_end_or_of_a_cost_refuse_bad_input(void)
+{
+    static const uint32_t tiles[] = {1, 2, 4, 16, 17};
+    static land one, nine;
+    float bytes_of_walls = 0.0f;
+    terrimp_view_desc d, out;
+    terrimp_view *view = NULL;
+    uint32_t i;
+    order_tile(&one, &nine, 1);
+    if (!land_build(&one))
+        return;
+    memset(&d, 0, sizeof d);
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_OK && out.wrap_tiles == 3);
+    CHECK(out.max_ground == 9u * land_chunks(&one) && !(out.max_cost > 0.0f));
+    CHECK(terrimp_view_create(one.terrain, &d, NULL, &view) == TERRIMP_OK);
+    d.wrap_tiles = 5;
+    CHECK(terrimp_view_set(view, &d) == TERRIMP_E_RANGE);
+    terrimp_view_destroy(view);
+    for (i = 0; i < 5u; i++) {
+        d.wrap_tiles = tiles[i];
+        CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+        CHECK(terrimp_view_bytes(one.terrain, &d) == 0);
+    }
+    memset(&d, 0, sizeof d);
+    d.walls = &bytes_of_walls;
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    d.walls = NULL;
+    d.max_cost = -1.0f;
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    d.max_cost = not_a_number();
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_NOT_FINITE);
+    land_free(&one), land_free(&nine);
+    order_tile(&one, &nine, 1);
+    one.desc.field.width -= 2u; /* no multiple of a chunk */
+    if (!land_build(&one))
+        return;
+    memset(&d, 0, sizeof d);
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    land_free(&one), land_free(&nine);
+    CHECK(terrimp_view_pace(100.0f, 10.0f, 10.2f) <= 100.0f);
+    CHECK(terrimp_view_pace(100.0f, 20.0f, 10.0f) <= 95.1f);
+    CHECK(terrimp_view_pace(100.0f, 5.0f, 10.0f) >= 101.9f);
+    CHECK(terrimp_view_pace(100.0f, 0.0f, 10.0f) >= 100.0f);
+    CHECK(terrimp_view_pace(100.0f, not_a_number(), 10.0f) >= 100.0f);
+    CHECK(terrimp_view_pace(-3.0f, 5.0f, 10.0f) <= -3.0f);
+}
+
 static int order_compare(const void *a, const void *b)
 {
     return memcmp(a, b, 3u * sizeof(uint16_t));
@@ -1707,6 +1843,8 @@ static void sorted_tests(void)
     RUN(sorted_needs_no_depth_buffer);
     RUN(views_in_painters_order_need_no_depth_buffer);
     RUN(pictures_are_made_in_painters_order);
+    RUN(views_keep_to_their_cost);
+    RUN(views_without_end_or_of_a_cost_refuse_bad_input);
     RUN(views_that_wrap_show_what_nine_terrains_show);
     RUN(views_that_wrap_repeat_after_a_period);
     RUN(painters_order_has_the_triangles_of_the_pattern);
