@@ -2765,23 +2765,23 @@ static void terrimpi_widen(float *low, float *high, float slope)
    raw values; two different raw values may well share one world height. */
 
 /* Bytes of one sample of an effective format. */
-static size_t terrimpi_sample_bytes(int format)
+static size_t terrimpi_field_sample_bytes(int format)
 {
     return format == TERRIMP_FORMAT_U8 ? 1u : format == TERRIMP_FORMAT_F32 ? 4u : 2u;
 }
 
 /* The world coordinate of column or row i. Every use of a position goes through here, so that all
    agree on the rounded value. */
-static float terrimpi_line(float origin, float spacing, uint32_t i)
+static float terrimpi_field_line(float origin, float spacing, uint32_t i)
 {
     return terrimpi_float(origin + (float)i * spacing);
 }
 
 /* Checks one axis: 2^-23 is the step of a float relative to its value. */
-static terrimp_result terrimpi_axis_check(float origin, float spacing, uint32_t count)
+static terrimp_result terrimpi_field_check_axis(float origin, float spacing, uint32_t count)
 {
     float extent = (float)(count - 1u) * spacing;
-    float last = terrimpi_line(origin, spacing, count - 1u);
+    float last = terrimpi_field_line(origin, spacing, count - 1u);
     float reach = terrimpi_max(extent, terrimpi_max(-origin, terrimpi_max(origin, last)));
     TERRIMPI_REFUSE(!terrimpi_finite(origin) || !terrimpi_finite(spacing), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!(spacing > 0.0f) || !terrimpi_finite(reach) ||
@@ -2789,7 +2789,7 @@ static terrimp_result terrimpi_axis_check(float origin, float spacing, uint32_t 
     return TERRIMP_OK;
 }
 
-static terrimp_result terrimpi_heights_check(const terrimp_heightfield *field)
+static terrimp_result terrimpi_field_check_heights(const terrimp_heightfield *field)
 {
     float scale = field->height_scale, offset = field->height_offset;
     float height = scale * (field->format == TERRIMP_FORMAT_F32 ? 0.0f : 65535.0f);
@@ -2799,9 +2799,9 @@ static terrimp_result terrimpi_heights_check(const terrimp_heightfield *field)
     return TERRIMP_OK;
 }
 
-static terrimp_result terrimpi_memory_check(const terrimp_heightfield *field)
+static terrimp_result terrimpi_field_check_memory(const terrimp_heightfield *field)
 {
-    size_t size = terrimpi_sample_bytes(field->format);
+    size_t size = terrimpi_field_sample_bytes(field->format);
     size_t row = (size_t)field->width * size;
     int ok = 1;
     TERRIMPI_REFUSE(field->row_bytes < row || field->row_bytes % size != 0, TERRIMP_E_RANGE);
@@ -2810,7 +2810,7 @@ static terrimp_result terrimpi_memory_check(const terrimp_heightfield *field)
     return (uintptr_t)field->samples % size != 0 ? TERRIMP_E_ALIGN : TERRIMP_OK;
 }
 
-static int terrimpi_size_ok(uint32_t width, uint32_t depth)
+static int terrimpi_field_size_ok(uint32_t width, uint32_t depth)
 {
     return terrimpi_within_u32(width, 2u, TERRIMP_MAX_DIM) &&
            terrimpi_within_u32(depth, 2u, TERRIMP_MAX_DIM);
@@ -2822,31 +2822,31 @@ TERRIMP_API terrimp_result terrimp_heightfield_resolve(const terrimp_heightfield
     terrimp_heightfield field;
     TERRIMPI_REFUSE(in == NULL || out == NULL || in->samples == NULL, TERRIMP_E_NULL);
     field = *in;
-    TERRIMPI_REFUSE(!terrimpi_size_ok(field.width, field.depth) || field.format < 0 ||
+    TERRIMPI_REFUSE(!terrimpi_field_size_ok(field.width, field.depth) || field.format < 0 ||
                     field.format >= TERRIMP_FORMAT_COUNT, TERRIMP_E_RANGE);
     TERRIMPI_DEFAULT(field.format, TERRIMP_FORMAT_F32);
-    TERRIMPI_DEFAULT(field.row_bytes, field.width * terrimpi_sample_bytes(field.format));
+    TERRIMPI_DEFAULT(field.row_bytes, field.width * terrimpi_field_sample_bytes(field.format));
     TERRIMPI_DEFAULT(field.spacing_x, 1.0f);
     TERRIMPI_DEFAULT(field.spacing_z, 1.0f);
     TERRIMPI_DEFAULT(field.height_scale, 1.0f);
-    TERRIMPI_TRY(terrimpi_axis_check(field.origin_x, field.spacing_x, field.width));
-    TERRIMPI_TRY(terrimpi_axis_check(field.origin_z, field.spacing_z, field.depth));
-    TERRIMPI_TRY(terrimpi_heights_check(&field));
-    TERRIMPI_TRY(terrimpi_memory_check(&field));
+    TERRIMPI_TRY(terrimpi_field_check_axis(field.origin_x, field.spacing_x, field.width));
+    TERRIMPI_TRY(terrimpi_field_check_axis(field.origin_z, field.spacing_z, field.depth));
+    TERRIMPI_TRY(terrimpi_field_check_heights(&field));
+    TERRIMPI_TRY(terrimpi_field_check_memory(&field));
     *out = field;
     return TERRIMP_OK;
 }
 
 /* ---- samples of a resolved field, unchecked ---- */
 
-static const void *terrimpi_row(const terrimp_heightfield *field, uint32_t z)
+static const void *terrimpi_field_row(const terrimp_heightfield *field, uint32_t z)
 {
     return (const char *)field->samples + (size_t)z * field->row_bytes;
 }
 
-static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t z)
+static float terrimpi_field_raw(const terrimp_heightfield *field, uint32_t x, uint32_t z)
 {
-    const void *row = terrimpi_row(field, z);
+    const void *row = terrimpi_field_row(field, z);
     switch (field->format) {
     case TERRIMP_FORMAT_U8: return (float)((const uint8_t *)row)[x];
     case TERRIMP_FORMAT_U16: return (float)((const uint16_t *)row)[x];
@@ -2855,35 +2855,35 @@ static float terrimpi_raw(const terrimp_heightfield *field, uint32_t x, uint32_t
     }
 }
 
-static int terrimpi_is_void(const terrimp_heightfield *field, float raw)
+static int terrimpi_field_is_void(const terrimp_heightfield *field, float raw)
 {
     return field->has_no_data && (raw == field->no_data || terrimpi_bits(raw) > TERRIMPI_INFINITE);
 }
 
-static float terrimpi_world_height(const terrimp_heightfield *field, float raw)
+static float terrimpi_field_world_height(const terrimp_heightfield *field, float raw)
 {
     return terrimpi_float(field->height_offset + field->height_scale * raw);
 }
 
 /* The world height of sample (x, z); a void gives the height of its no-data value. */
-static float terrimpi_sample(const terrimp_heightfield *field, uint32_t x, uint32_t z)
+static float terrimpi_field_sample(const terrimp_heightfield *field, uint32_t x, uint32_t z)
 {
-    return terrimpi_world_height(field, terrimpi_raw(field, x, z));
+    return terrimpi_field_world_height(field, terrimpi_field_raw(field, x, z));
 }
 
 /* Reads out[cols] raw values of row z from column x on; columns beyond the last repeat it. */
-static void terrimpi_raw_row(const terrimp_heightfield *field, uint32_t x, uint32_t z,
-                             uint32_t cols, uint32_t stride, float *out)
+static void terrimpi_field_raw_row(const terrimp_heightfield *field, uint32_t x, uint32_t z,
+                                   uint32_t cols, uint32_t stride, float *out)
 {
     const uint32_t last = field->width - 1u;
     const uint32_t first = x < last ? x : last;
     const uint32_t steps = (last - first) / stride;
     const uint32_t inside = steps < cols ? steps + 1u : cols;
-    const void *row = terrimpi_row(field, z);
+    const void *row = terrimpi_field_row(field, z);
     float edge;
     uint32_t c;
     /* Two loops, for the one of stride 1 turns into vector instructions. */
-#define TERRIMPI_COPY(type)                                \
+#define TERRIMPI_FIELD_COPY(type)                          \
     if (stride == 1u)                                      \
         for (c = 0; c < inside; ++c)                       \
             out[c] = (float)((const type *)row)[first + c]; \
@@ -2892,37 +2892,38 @@ static void terrimpi_raw_row(const terrimp_heightfield *field, uint32_t x, uint3
             out[c] = (float)((const type *)row)[first + c * stride]
 
     switch (field->format) {
-    case TERRIMP_FORMAT_U8: TERRIMPI_COPY(uint8_t); break;
-    case TERRIMP_FORMAT_U16: TERRIMPI_COPY(uint16_t); break;
-    case TERRIMP_FORMAT_S16: TERRIMPI_COPY(int16_t); break;
-    default: TERRIMPI_COPY(float); break;
+    case TERRIMP_FORMAT_U8: TERRIMPI_FIELD_COPY(uint8_t); break;
+    case TERRIMP_FORMAT_U16: TERRIMPI_FIELD_COPY(uint16_t); break;
+    case TERRIMP_FORMAT_S16: TERRIMPI_FIELD_COPY(int16_t); break;
+    default: TERRIMPI_FIELD_COPY(float); break;
     }
-#undef TERRIMPI_COPY
+#undef TERRIMPI_FIELD_COPY
 
     if (inside < cols) {
-        edge = terrimpi_raw(field, last, z);
+        edge = terrimpi_field_raw(field, last, z);
         for (c = inside; c < cols; ++c)
             out[c] = edge;
     }
 }
 
 /* from + steps * stride, not beyond last. */
-static uint32_t terrimpi_step(uint32_t from, uint32_t last, uint32_t steps, uint32_t stride)
+static uint32_t terrimpi_field_step(uint32_t from, uint32_t last, uint32_t steps, uint32_t stride)
 {
     return steps > (last - from) / stride ? last : from + steps * stride;
 }
 
 /* Reads a [rows][cols] tile of world heights from sample (x, z) on at a stride; columns and rows
    beyond the last repeat it. Voids come out as the height of their no-data value. */
-static void terrimpi_heightfield_tile(const terrimp_heightfield *field, uint32_t x, uint32_t z,
-                                      uint32_t cols, uint32_t rows, uint32_t stride, float *out)
+static void terrimpi_field_tile(const terrimp_heightfield *field, uint32_t x, uint32_t z,
+                                uint32_t cols, uint32_t rows, uint32_t stride, float *out)
 {
     const float scale = field->height_scale, offset = field->height_offset;
     const uint32_t last = field->depth - 1u;
     uint32_t r, c;
     z = z < last ? z : last;
     for (r = 0; r < rows; ++r) {
-        terrimpi_raw_row(field, x, terrimpi_step(z, last, r, stride), cols, stride, out);
+        terrimpi_field_raw_row(field, x, terrimpi_field_step(z, last, r, stride), cols, stride,
+                               out);
         for (c = 0; c < cols; ++c)
             out[c] = offset + scale * out[c];
         out += cols;
@@ -2930,27 +2931,28 @@ static void terrimpi_heightfield_tile(const terrimp_heightfield *field, uint32_t
 }
 
 /* The result of a look at every sample of a tile. */
-typedef struct terrimpi_scan {
+typedef struct terrimpi_field_scan {
     int skip_voids;  /* given: voids are but counted, and low > high if there is nothing else */
     size_t voids;
     float low, high; /* raw range */
     uint32_t x, z;   /* the first bad sample, if the scan fails */
-} terrimpi_scan;
+} terrimpi_field_scan;
 
 /* Looks at count raw values; when one is bad, *bad says which. */
-static terrimp_result terrimpi_scan_values(const terrimp_heightfield *field, const float *raw,
-                                           uint32_t count, uint32_t *bad, terrimpi_scan *scan)
+static terrimp_result terrimpi_field_scan_values(const terrimp_heightfield *field, const float *raw,
+                                                 uint32_t count, uint32_t *bad,
+                                                 terrimpi_field_scan *scan)
 {
     uint32_t i;
     for (i = 0; i < count; ++i) {
-        if (terrimpi_is_void(field, raw[i])) {
+        if (terrimpi_field_is_void(field, raw[i])) {
             scan->voids++;
             if (scan->skip_voids)
                 continue;
             *bad = i;
             return TERRIMP_E_VOID;
         }
-        if (!terrimpi_finite(terrimpi_world_height(field, raw[i]))) {
+        if (!terrimpi_finite(terrimpi_field_world_height(field, raw[i]))) {
             *bad = i;
             return TERRIMP_E_NOT_FINITE;
         }
@@ -2960,10 +2962,11 @@ static terrimp_result terrimpi_scan_values(const terrimp_heightfield *field, con
     return TERRIMP_OK;
 }
 
-/* Scans a tile as terrimpi_heightfield_tile would read it; repeated samples get one look. */
-static terrimp_result terrimpi_scan_tile(const terrimp_heightfield *field, uint32_t x, uint32_t z,
-                                         uint32_t cols, uint32_t rows, uint32_t stride,
-                                         terrimpi_scan *scan)
+/* Scans a tile as terrimpi_field_tile would read it; repeated samples get one look. */
+static terrimp_result terrimpi_field_scan_tile(const terrimp_heightfield *field, uint32_t x,
+                                               uint32_t z,
+                                               uint32_t cols, uint32_t rows, uint32_t stride,
+                                               terrimpi_field_scan *scan)
 {
     float raw[256];
     const uint32_t last_x = field->width - 1u, last_z = field->depth - 1u;
@@ -2975,14 +2978,14 @@ static terrimp_result terrimpi_scan_tile(const terrimp_heightfield *field, uint3
     scan->voids = 0;
     cols = cols < most ? cols : most;
     for (r = 0; r < rows; ++r) {
-        row = terrimpi_step(z, last_z, r, stride);
+        row = terrimpi_field_step(z, last_z, r, stride);
         for (c = 0; c < cols; c += count) {
-            at = terrimpi_step(x, last_x, c, stride);
+            at = terrimpi_field_step(x, last_x, c, stride);
             count = cols - c < 256u ? cols - c : 256u;
-            terrimpi_raw_row(field, at, row, count, stride, raw);
-            result = terrimpi_scan_values(field, raw, count, &bad, scan);
+            terrimpi_field_raw_row(field, at, row, count, stride, raw);
+            result = terrimpi_field_scan_values(field, raw, count, &bad, scan);
             if (result != TERRIMP_OK) {
-                scan->x = terrimpi_step(at, last_x, bad, stride);
+                scan->x = terrimpi_field_step(at, last_x, bad, stride);
                 scan->z = row;
                 return result;
             }
@@ -2997,11 +3000,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfiel
                                                         uint32_t *x, uint32_t *z)
 {
     terrimp_heightfield f;
-    terrimpi_scan scan;
+    terrimpi_field_scan scan;
     terrimp_result result;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     scan.skip_voids = 0;
-    result = terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan);
+    result = terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan);
     if (result != TERRIMP_OK) {
         if (x != NULL)
             *x = scan.x;
@@ -3016,7 +3019,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
                                                     uint32_t stride, float *out)
 {
     terrimp_heightfield f;
-    terrimpi_scan scan;
+    terrimpi_field_scan scan;
     int ok = 1;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(out == NULL, TERRIMP_E_NULL);
@@ -3025,23 +3028,23 @@ TERRIMP_API terrimp_result terrimp_heightfield_read(const terrimp_heightfield *f
     (void)terrimpi_mul(terrimpi_mul(cols, rows, &ok), sizeof(float), &ok);
     TERRIMPI_REFUSE(!ok, TERRIMP_E_OVERFLOW);
     scan.skip_voids = 0;
-    TERRIMPI_TRY(terrimpi_scan_tile(&f, x, z, cols, rows, stride, &scan));
-    terrimpi_heightfield_tile(&f, x, z, cols, rows, stride, out);
+    TERRIMPI_TRY(terrimpi_field_scan_tile(&f, x, z, cols, rows, stride, &scan));
+    terrimpi_field_tile(&f, x, z, cols, rows, stride, out);
     return TERRIMP_OK;
 }
 
 /* The range of the world heights of a rectangle of samples, cut at the last column and row.
    Rounding keeps the order, and the scale is positive: the raw range maps to the exact one. */
-static terrimp_result terrimpi_height_range(const terrimp_heightfield *field, terrimp_rect samples,
-                                            int skip_voids, float *low, float *high)
+static terrimp_result terrimpi_field_range(const terrimp_heightfield *field, terrimp_rect samples,
+                                           int skip_voids, float *low, float *high)
 {
-    terrimpi_scan scan;
+    terrimpi_field_scan scan;
     scan.skip_voids = skip_voids;
-    TERRIMPI_TRY(terrimpi_scan_tile(field, samples.x, samples.y, samples.width, samples.height, 1,
-                                    &scan));
+    TERRIMPI_TRY(terrimpi_field_scan_tile(field, samples.x, samples.y, samples.width,
+                                          samples.height, 1, &scan));
     TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
-    *low = terrimpi_world_height(field, scan.low);
-    *high = terrimpi_world_height(field, scan.high);
+    *low = terrimpi_field_world_height(field, scan.low);
+    *high = terrimpi_field_world_height(field, scan.high);
     return TERRIMP_OK;
 }
 
@@ -3053,75 +3056,76 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(low == NULL || high == NULL, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0, TERRIMP_E_RANGE);
-    return terrimpi_height_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
+    return terrimpi_field_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
 }
 
 /* ---- queries on the surface ---- */
 
 /* One quad: heights of its corners and where it lies. */
-typedef struct terrimpi_quad {
+typedef struct terrimpi_field_quad {
     float h[4]; /* of (0, 0), (1, 0), (0, 1), (1, 1) */
     float x0, x1, z0, z1;
-} terrimpi_quad;
+} terrimpi_field_quad;
 
 /* Finds the quad that holds a coordinate along one axis; 0 when it is outside. The quotient is only
    a guess where the origin is distant; the lines themselves decide. */
-static int terrimpi_locate_along(float origin, float spacing, uint32_t count, float at,
-                                 uint32_t *quad)
+static int terrimpi_field_locate_along(float origin, float spacing, uint32_t count, float at,
+                                       uint32_t *quad)
 {
     float guess = (at - origin) / spacing;
     uint32_t i;
-    if (!(at >= origin && at <= terrimpi_line(origin, spacing, count - 1u)))
+    if (!(at >= origin && at <= terrimpi_field_line(origin, spacing, count - 1u)))
         return 0;
     i = (uint32_t)terrimpi_clamp(guess, 0.0f, (float)(count - 2u));
-    while (i > 0 && at < terrimpi_line(origin, spacing, i))
+    while (i > 0 && at < terrimpi_field_line(origin, spacing, i))
         --i;
-    while (i < count - 2u && at >= terrimpi_line(origin, spacing, i + 1u))
+    while (i < count - 2u && at >= terrimpi_field_line(origin, spacing, i + 1u))
         ++i;
     *quad = i;
     return 1;
 }
 
-static int terrimpi_locate(const terrimp_heightfield *f, float x, float z, uint32_t *i, uint32_t *j)
+static int terrimpi_field_locate(const terrimp_heightfield *f, float x, float z, uint32_t *i,
+                                 uint32_t *j)
 {
-    return terrimpi_locate_along(f->origin_x, f->spacing_x, f->width, x, i) &&
-           terrimpi_locate_along(f->origin_z, f->spacing_z, f->depth, z, j);
+    return terrimpi_field_locate_along(f->origin_x, f->spacing_x, f->width, x, i) &&
+           terrimpi_field_locate_along(f->origin_z, f->spacing_z, f->depth, z, j);
 }
 
 /* Fills quad; on E_VOID and E_NOT_FINITE, when it is a hole, only the place of it. */
-static terrimp_result terrimpi_quad_load(const terrimp_heightfield *field, uint32_t x, uint32_t z,
-                                         terrimpi_quad *quad)
+static terrimp_result terrimpi_field_quad_load(const terrimp_heightfield *field, uint32_t x,
+                                               uint32_t z, terrimpi_field_quad *quad)
 {
     float none = 0.0f;
     uint32_t i;
-    quad->x0 = terrimpi_line(field->origin_x, field->spacing_x, x);
-    quad->x1 = terrimpi_line(field->origin_x, field->spacing_x, x + 1u);
-    quad->z0 = terrimpi_line(field->origin_z, field->spacing_z, z);
-    quad->z1 = terrimpi_line(field->origin_z, field->spacing_z, z + 1u);
+    quad->x0 = terrimpi_field_line(field->origin_x, field->spacing_x, x);
+    quad->x1 = terrimpi_field_line(field->origin_x, field->spacing_x, x + 1u);
+    quad->z0 = terrimpi_field_line(field->origin_z, field->spacing_z, z);
+    quad->z1 = terrimpi_field_line(field->origin_z, field->spacing_z, z + 1u);
     for (i = 0; i < 4u; ++i) {
-        float raw = terrimpi_raw(field, x + (i & 1u), z + (i >> 1));
-        TERRIMPI_REFUSE(terrimpi_is_void(field, raw), TERRIMP_E_VOID);
-        quad->h[i] = terrimpi_world_height(field, raw);
+        float raw = terrimpi_field_raw(field, x + (i & 1u), z + (i >> 1));
+        TERRIMPI_REFUSE(terrimpi_field_is_void(field, raw), TERRIMP_E_VOID);
+        quad->h[i] = terrimpi_field_world_height(field, raw);
         none += 0.0f * quad->h[i];
     }
     return terrimpi_finite(none) ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
 
 /* Where a coordinate lies between two lines, 0..1. */
-static float terrimpi_fraction(float at, float low, float high)
+static float terrimpi_field_fraction(float at, float low, float high)
 {
     return high > low ? terrimpi_clamp((at - low) / (high - low), 0.0f, 1.0f) : 0.0f;
 }
 
 /* Which triangle: 1 is (0,0),(0,1),(1,1), towards +z; 0 is (0,0),(1,1),(1,0), towards +x. */
-static int terrimpi_quad_side(float u, float v)
+static int terrimpi_field_quad_side(float u, float v)
 {
     return v >= u;
 }
 
 /* The height of a triangle's plane at fractions u (x) and v (z). The weights make it exact at the
    corners, and on a shared edge both triangles compute the very same number. */
-static float terrimpi_quad_height(const terrimpi_quad *quad, int side, float u, float v)
+static float terrimpi_field_quad_height(const terrimpi_field_quad *quad, int side, float u, float v)
 {
     if (side)
         return quad->h[0] * (1.0f - v) + quad->h[2] * (v - u) + quad->h[3] * u;
@@ -3129,7 +3133,7 @@ static float terrimpi_quad_height(const terrimpi_quad *quad, int side, float u, 
 }
 
 /* Height gained per world unit along x and along z. */
-static void terrimpi_quad_slope(const terrimpi_quad *quad, int side, float slope[2])
+static void terrimpi_field_quad_slope(const terrimpi_field_quad *quad, int side, float slope[2])
 {
     float along_x = side ? quad->h[3] - quad->h[2] : quad->h[1] - quad->h[0];
     float along_z = side ? quad->h[2] - quad->h[0] : quad->h[3] - quad->h[1];
@@ -3138,10 +3142,10 @@ static void terrimpi_quad_slope(const terrimpi_quad *quad, int side, float slope
 }
 
 /* The upward unit normal of a triangle; 0 when its slope is beyond float. */
-static int terrimpi_quad_normal(const terrimpi_quad *quad, int side, float normal[3])
+static int terrimpi_field_quad_normal(const terrimpi_field_quad *quad, int side, float normal[3])
 {
     float n[3], slope[2];
-    terrimpi_quad_slope(quad, side, slope);
+    terrimpi_field_quad_slope(quad, side, slope);
     n[0] = -slope[0];
     n[1] = 1.0f;
     n[2] = -slope[1];
@@ -3152,63 +3156,63 @@ static int terrimpi_quad_normal(const terrimpi_quad *quad, int side, float norma
 }
 
 /* [wu] after which a field that wraps repeats itself. */
-static float terrimpi_period(const terrimp_heightfield *f, int axis)
+static float terrimpi_field_period(const terrimp_heightfield *f, int axis)
 {
     return axis == 0 ? f->spacing_x * (float)(f->width - 1u)
                      : f->spacing_z * (float)(f->depth - 1u);
 }
 
 /* Takes a coordinate to the repetition that the samples lie in; what it is moved by, in periods. */
-static float terrimpi_wrap(const terrimp_heightfield *f, int axis, float *at)
+static float terrimpi_field_wrap(const terrimp_heightfield *f, int axis, float *at)
 {
     float origin = axis == 0 ? f->origin_x : f->origin_z;
     float spacing = axis == 0 ? f->spacing_x : f->spacing_z;
     uint32_t last = (axis == 0 ? f->width : f->depth) - 1u;
-    float period = terrimpi_period(f, axis), away = (*at - origin) / period, whole;
+    float period = terrimpi_field_period(f, axis), away = (*at - origin) / period, whole;
     if (!f->wrap || !(terrimpi_abs(away) < 8388608.0f))
         return 0.0f;
     whole = (float)(int32_t)away;
     whole -= whole > away ? 1.0f : 0.0f;
-    *at = terrimpi_clamp(*at - whole * period, origin, terrimpi_line(origin, spacing, last));
+    *at = terrimpi_clamp(*at - whole * period, origin, terrimpi_field_line(origin, spacing, last));
     return whole;
 }
 
 /* What height and normal share: the quad at a world position and the place in it. */
-static terrimp_result terrimpi_surface(const terrimp_heightfield *field, float x, float z,
-                                       terrimpi_quad *quad, float *u, float *v)
+static terrimp_result terrimpi_field_surface(const terrimp_heightfield *field, float x, float z,
+                                             terrimpi_field_quad *quad, float *u, float *v)
 {
     terrimp_heightfield f;
     uint32_t i, j;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
-    (void)terrimpi_wrap(&f, 0, &x);
-    (void)terrimpi_wrap(&f, 1, &z);
-    TERRIMPI_REFUSE(!terrimpi_locate(&f, x, z, &i, &j), TERRIMP_E_MISS);
-    TERRIMPI_TRY(terrimpi_quad_load(&f, i, j, quad));
-    *u = terrimpi_fraction(x, quad->x0, quad->x1);
-    *v = terrimpi_fraction(z, quad->z0, quad->z1);
+    (void)terrimpi_field_wrap(&f, 0, &x);
+    (void)terrimpi_field_wrap(&f, 1, &z);
+    TERRIMPI_REFUSE(!terrimpi_field_locate(&f, x, z, &i, &j), TERRIMP_E_MISS);
+    TERRIMPI_TRY(terrimpi_field_quad_load(&f, i, j, quad));
+    *u = terrimpi_field_fraction(x, quad->x0, quad->x1);
+    *v = terrimpi_field_fraction(z, quad->z0, quad->z1);
     return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_height(const terrimp_heightfield *field, float x,
                                                       float z, float *height)
 {
-    terrimpi_quad quad;
+    terrimpi_field_quad quad;
     float u, v;
     TERRIMPI_REFUSE(height == NULL, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
-    *height = terrimpi_quad_height(&quad, terrimpi_quad_side(u, v), u, v);
+    TERRIMPI_TRY(terrimpi_field_surface(field, x, z, &quad, &u, &v));
+    *height = terrimpi_field_quad_height(&quad, terrimpi_field_quad_side(u, v), u, v);
     return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield *field, float x,
                                                       float z, float normal[3])
 {
-    terrimpi_quad quad;
+    terrimpi_field_quad quad;
     float u, v;
     TERRIMPI_REFUSE(normal == NULL, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_surface(field, x, z, &quad, &u, &v));
-    return terrimpi_quad_normal(&quad, terrimpi_quad_side(u, v), normal) ? TERRIMP_OK
+    TERRIMPI_TRY(terrimpi_field_surface(field, x, z, &quad, &u, &v));
+    return terrimpi_field_quad_normal(&quad, terrimpi_field_quad_side(u, v), normal) ? TERRIMP_OK
                                                                          : TERRIMP_E_NOT_FINITE;
 }
 
@@ -3220,24 +3224,25 @@ TERRIMP_API terrimp_result terrimp_heightfield_normal(const terrimp_heightfield 
    where it could be rounded to the other: no ray slips through between two triangles. */
 
 /* A point of the ray above one quad. */
-typedef struct terrimpi_ray_point {
+typedef struct terrimpi_field_ray_point {
     float t;    /* [wu] from the start of the walk */
     float y;
     float u, v; /* place in the quad */
     int above;  /* the surface: 1, or -1 for below; 0 while it is not known */
-} terrimpi_ray_point;
+} terrimpi_field_ray_point;
 
 /* The part of a ray above the field. */
-typedef struct terrimpi_ray {
+typedef struct terrimpi_field_ray {
     float start[3];
     float way[3];   /* unit length */
     float before;   /* [wu] from the caller's origin to start */
     float length;   /* [wu] from start to the end */
     float periods[2]; /* of a field that wraps, from start to where the caller's origin is */
-} terrimpi_ray;
+} terrimpi_field_ray;
 
 /* Narrows [*t0, *t1] to where start + t * way is within [low, high]; 0 when nothing is left. */
-static int terrimpi_ray_clip(float start, float way, float low, float high, float *t0, float *t1)
+static int terrimpi_field_ray_clip(float start, float way, float low, float high, float *t0,
+                                   float *t1)
 {
     float a, b;
     if (way == 0.0f)
@@ -3251,7 +3256,7 @@ static int terrimpi_ray_clip(float start, float way, float low, float high, floa
 
 /* Makes the way a unit vector; 0 when it is zero. Even the longest direction has a length once its
    largest component is 1. */
-static int terrimpi_ray_aim(const float direction[3], float way[3])
+static int terrimpi_field_ray_aim(const float direction[3], float way[3])
 {
     float largest = terrimpi_largest(direction);
     if (!(largest > 0.0f))
@@ -3263,21 +3268,21 @@ static int terrimpi_ray_aim(const float direction[3], float way[3])
 }
 
 /* The ray starts anew where it enters the field, so that later steps count from close by. */
-static int terrimpi_ray_enter(const terrimp_heightfield *field, const float origin[3],
-                              float max_distance, terrimpi_ray *ray)
+static int terrimpi_field_ray_enter(const terrimp_heightfield *field, const float origin[3],
+                                    float max_distance, terrimpi_field_ray *ray)
 {
-    float last_x = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
-    float last_z = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
+    float last_x = terrimpi_field_line(field->origin_x, field->spacing_x, field->width - 1u);
+    float last_z = terrimpi_field_line(field->origin_z, field->spacing_z, field->depth - 1u);
     float t0 = 0.0f, t1 = max_distance;
     memcpy(ray->start, origin, sizeof ray->start);
-    ray->periods[0] = terrimpi_wrap(field, 0, &ray->start[0]);
-    ray->periods[1] = terrimpi_wrap(field, 1, &ray->start[2]);
+    ray->periods[0] = terrimpi_field_wrap(field, 0, &ray->start[0]);
+    ray->periods[1] = terrimpi_field_wrap(field, 1, &ray->start[2]);
     ray->before = 0.0f;
     ray->length = max_distance;
     if (field->wrap)
         return 1;
-    if (!terrimpi_ray_clip(origin[0], ray->way[0], field->origin_x, last_x, &t0, &t1) ||
-        !terrimpi_ray_clip(origin[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
+    if (!terrimpi_field_ray_clip(origin[0], ray->way[0], field->origin_x, last_x, &t0, &t1) ||
+        !terrimpi_field_ray_clip(origin[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
         return 0;
     ray->start[0] = terrimpi_clamp(origin[0] + t0 * ray->way[0], field->origin_x, last_x);
     ray->start[1] = origin[1] + t0 * ray->way[1];
@@ -3288,128 +3293,133 @@ static int terrimpi_ray_enter(const terrimp_heightfield *field, const float orig
     /* A long way before rounds the length: what is left is measured from the new start. */
     t0 = 0.0f;
     t1 = terrimpi_max(max_distance - ray->before, 0.0f);
-    if (terrimpi_ray_clip(ray->start[0], ray->way[0], field->origin_x, last_x, &t0, &t1) &&
-        terrimpi_ray_clip(ray->start[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
+    if (terrimpi_field_ray_clip(ray->start[0], ray->way[0], field->origin_x, last_x, &t0, &t1) &&
+        terrimpi_field_ray_clip(ray->start[2], ray->way[2], field->origin_z, last_z, &t0, &t1))
         ray->length = t1;
     return 1;
 }
 
-static terrimpi_ray_point terrimpi_ray_at(const terrimpi_ray *ray, const terrimpi_quad *quad,
-                                          float t)
+static terrimpi_field_ray_point terrimpi_field_ray_at(const terrimpi_field_ray *ray,
+                                                      const terrimpi_field_quad *quad, float t)
 {
-    terrimpi_ray_point point;
+    terrimpi_field_ray_point point;
     point.t = t;
     point.y = ray->start[1] + t * ray->way[1];
-    point.u = terrimpi_fraction(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
-    point.v = terrimpi_fraction(ray->start[2] + t * ray->way[2], quad->z0, quad->z1);
+    point.u = terrimpi_field_fraction(ray->start[0] + t * ray->way[0], quad->x0, quad->x1);
+    point.v = terrimpi_field_fraction(ray->start[2] + t * ray->way[2], quad->z0, quad->z1);
     point.above = 0;
     return point;
 }
 
 /* Does the piece a..b, all above one triangle, meet it? Then *t is where. Else b knows its side. */
-static int terrimpi_ray_meets(const terrimpi_ray *ray, const terrimpi_quad *quad, int side,
-                              const terrimpi_ray_point *a, terrimpi_ray_point *b, float *t)
+static int terrimpi_field_ray_meets(const terrimpi_field_ray *ray, const terrimpi_field_quad *quad,
+                                    int side,
+                                    const terrimpi_field_ray_point *a, terrimpi_field_ray_point *b,
+                                    float *t)
 {
-    float gap_a = a->y - terrimpi_quad_height(quad, side, a->u, a->v);
-    float gap_b = b->y - terrimpi_quad_height(quad, side, b->u, b->v);
+    float gap_a = a->y - terrimpi_field_quad_height(quad, side, a->u, a->v);
+    float gap_b = b->y - terrimpi_field_quad_height(quad, side, b->u, b->v);
     int above = a->above != 0 ? a->above : (gap_a > 0.0f) - (gap_a < 0.0f);
     float slope[2], closing;
     b->above = (gap_b > 0.0f) - (gap_b < 0.0f);
     if (above != 0 && above == b->above)
         return 0;
-    terrimpi_quad_slope(quad, side, slope);
+    terrimpi_field_quad_slope(quad, side, slope);
     closing = slope[0] * ray->way[0] + slope[1] * ray->way[2] - ray->way[1];
     *t = terrimpi_clamp(a->t + gap_a / closing, a->t, b->t); /* a->t too if it lies in the plane */
     return 1;
 }
 
 /* The first meeting within one quad, between two points of the ray on its border. */
-static int terrimpi_ray_quad(const terrimpi_ray *ray, const terrimpi_quad *quad,
-                             const terrimpi_ray_point *a, terrimpi_ray_point *b, int *side,
-                             float *t)
+static int terrimpi_field_ray_quad(const terrimpi_field_ray *ray, const terrimpi_field_quad *quad,
+                                   const terrimpi_field_ray_point *a, terrimpi_field_ray_point *b,
+                                   int *side, float *t)
 {
     float off_a = a->v - a->u, off_b = b->v - b->u, s;
     const float *h = quad->h;
     float low = terrimpi_min(terrimpi_min(h[0], h[1]), terrimpi_min(h[2], h[3]));
     float high = terrimpi_max(terrimpi_max(h[0], h[1]), terrimpi_max(h[2], h[3]));
-    terrimpi_ray_point cut;
+    terrimpi_field_ray_point cut;
     b->above = terrimpi_min(a->y, b->y) > high ? 1 : terrimpi_max(a->y, b->y) < low ? -1 : 0;
     if (b->above != 0 && (a->above == 0 || a->above == b->above))
         return 0;
-    *side = terrimpi_quad_side(0.0f, off_a + off_b);
+    *side = terrimpi_field_quad_side(0.0f, off_a + off_b);
     if (!((off_a > 0.0f && off_b < 0.0f) || (off_a < 0.0f && off_b > 0.0f)))
-        return terrimpi_ray_meets(ray, quad, *side, a, b, t);
+        return terrimpi_field_ray_meets(ray, quad, *side, a, b, t);
 
     s = off_a / (off_a - off_b);
-    cut = terrimpi_ray_at(ray, quad, a->t + s * (b->t - a->t));
+    cut = terrimpi_field_ray_at(ray, quad, a->t + s * (b->t - a->t));
     cut.u = cut.v = a->u + s * (b->u - a->u);
     *side = off_a > 0.0f;
-    if (terrimpi_ray_meets(ray, quad, *side, a, &cut, t))
+    if (terrimpi_field_ray_meets(ray, quad, *side, a, &cut, t))
         return 1;
     *side = !*side;
-    return terrimpi_ray_meets(ray, quad, *side, &cut, b, t);
+    return terrimpi_field_ray_meets(ray, quad, *side, &cut, b, t);
 }
 
 /* Where the ray crosses the quad's border along one axis, counted from its start. */
-static float terrimpi_ray_leave(float start, float way, float low, float high)
+static float terrimpi_field_ray_leave(float start, float way, float low, float high)
 {
     if (way == 0.0f)
         return TERRIMPI_FLOAT_MAX;
     return ((way > 0.0f ? high : low) - start) / way;
 }
 
-static void terrimpi_ray_report(const terrimp_heightfield *field, const terrimpi_ray *ray,
-                                const terrimpi_quad *quad, int side, float t,
-                                terrimp_ray_hit *hit)
+static void terrimpi_field_ray_report(const terrimp_heightfield *field,
+                                      const terrimpi_field_ray *ray,
+                                      const terrimpi_field_quad *quad, int side, float t,
+                                      terrimp_ray_hit *hit)
 {
-    terrimpi_ray_point point = terrimpi_ray_at(ray, quad, t);
+    terrimpi_field_ray_point point = terrimpi_field_ray_at(ray, quad, t);
     hit->distance = ray->before + t;
     hit->position[0] = terrimpi_clamp(ray->start[0] + t * ray->way[0], quad->x0, quad->x1) +
-                       ray->periods[0] * terrimpi_period(field, 0);
-    hit->position[1] = terrimpi_quad_height(quad, side, point.u, point.v);
+                       ray->periods[0] * terrimpi_field_period(field, 0);
+    hit->position[1] = terrimpi_field_quad_height(quad, side, point.u, point.v);
     hit->position[2] = terrimpi_clamp(ray->start[2] + t * ray->way[2], quad->z0, quad->z1) +
-                       ray->periods[1] * terrimpi_period(field, 1);
-    if (!terrimpi_quad_normal(quad, side, hit->normal)) { /* steeper than float can say */
+                       ray->periods[1] * terrimpi_field_period(field, 1);
+    if (!terrimpi_field_quad_normal(quad, side, hit->normal)) { /* steeper than float can say */
         hit->normal[0] = hit->normal[2] = 0.0f;
         hit->normal[1] = 1.0f;
     }
 }
 
 /* Takes the ray into the next repetition of the field, to its first or last quad. */
-static void terrimpi_ray_repeat(const terrimp_heightfield *field, terrimpi_ray *ray, int axis,
-                                uint32_t *index)
+static void terrimpi_field_ray_repeat(const terrimp_heightfield *field, terrimpi_field_ray *ray,
+                                      int axis, uint32_t *index)
 {
     float step = ray->way[2 * axis] > 0.0f ? 1.0f : -1.0f;
-    ray->start[2 * axis] -= step * terrimpi_period(field, axis);
+    ray->start[2 * axis] -= step * terrimpi_field_period(field, axis);
     ray->periods[axis] += step;
     *index = step > 0.0f ? 0u : (axis == 0 ? field->width : field->depth) - 2u;
 }
 
 /* Walks from quad to quad until one is hit. Each turn takes a step along x or z and never back, so
    there are at most width + depth turns, in a field that wraps as many as the ray crosses quads. */
-static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, terrimpi_ray *ray,
-                                        uint32_t x, uint32_t z, terrimp_ray_hit *hit)
+static terrimp_result terrimpi_field_ray_walk(const terrimp_heightfield *field,
+                                              terrimpi_field_ray *ray,
+                                              uint32_t x, uint32_t z, terrimp_ray_hit *hit)
 {
-    terrimpi_quad quad;
-    terrimp_result loaded = terrimpi_quad_load(field, x, z, &quad);
-    terrimpi_ray_point enter = terrimpi_ray_at(ray, &quad, 0.0f);
+    terrimpi_field_quad quad;
+    terrimp_result loaded = terrimpi_field_quad_load(field, x, z, &quad);
+    terrimpi_field_ray_point enter = terrimpi_field_ray_at(ray, &quad, 0.0f);
     for (;;) {
-        float leave_x = terrimpi_ray_leave(ray->start[0], ray->way[0], quad.x0, quad.x1);
-        float leave_z = terrimpi_ray_leave(ray->start[2], ray->way[2], quad.z0, quad.z1);
+        float leave_x = terrimpi_field_ray_leave(ray->start[0], ray->way[0], quad.x0, quad.x1);
+        float leave_z = terrimpi_field_ray_leave(ray->start[2], ray->way[2], quad.z0, quad.z1);
         float next = terrimpi_min(leave_x, leave_z), t;
         int along_x = leave_x <= leave_z, ends = !(next < ray->length), side;
         float way = along_x ? ray->way[0] : ray->way[2];
         uint32_t *index = along_x ? &x : &z, last = (along_x ? field->width : field->depth) - 2u;
-        terrimpi_ray_point leave =
-            terrimpi_ray_at(ray, &quad, terrimpi_clamp(next, enter.t, ray->length));
+        terrimpi_field_ray_point leave =
+            terrimpi_field_ray_at(ray, &quad, terrimpi_clamp(next, enter.t, ray->length));
         float *across = along_x ? &leave.u : &leave.v;
         int at_end = *index == (way > 0.0f ? last : 0u);
 
         if (!ends) /* the border is crossed at exactly 0 or 1, whatever the rounding */
             *across = way > 0.0f ? 1.0f : 0.0f;
-        if (loaded == TERRIMP_OK && terrimpi_ray_quad(ray, &quad, &enter, &leave, &side, &t)) {
+        if (loaded == TERRIMP_OK && terrimpi_field_ray_quad(ray, &quad, &enter, &leave, &side,
+                                                            &t)) {
             if (hit != NULL) {
-                terrimpi_ray_report(field, ray, &quad, side, t, hit);
+                terrimpi_field_ray_report(field, ray, &quad, side, t, hit);
                 hit->x = x;
                 hit->z = z;
             }
@@ -3417,12 +3427,12 @@ static terrimp_result terrimpi_ray_walk(const terrimp_heightfield *field, terrim
         }
         TERRIMPI_REFUSE(ends || (at_end && !field->wrap), TERRIMP_E_MISS);
         if (at_end)
-            terrimpi_ray_repeat(field, ray, !along_x, index);
+            terrimpi_field_ray_repeat(field, ray, !along_x, index);
         else
             *index = way > 0.0f ? *index + 1u : *index - 1u;
         *across = 1.0f - *across;
         enter = leave;
-        loaded = terrimpi_quad_load(field, x, z, &quad);
+        loaded = terrimpi_field_quad_load(field, x, z, &quad);
     }
 }
 
@@ -3432,27 +3442,27 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
                                                        float max_distance, terrimp_ray_hit *hit)
 {
     terrimp_heightfield f;
-    terrimpi_ray ray;
+    terrimpi_field_ray ray;
     uint32_t x, z;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(origin == NULL || direction == NULL, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
                     !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_ray_aim(direction, ray.way) ||
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_field_ray_aim(direction, ray.way) ||
                     (f.wrap && max_distance > 1048576.0f * terrimpi_max(f.spacing_x, f.spacing_z)),
                     TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!terrimpi_ray_enter(&f, origin, max_distance, &ray) ||
-                    !terrimpi_locate(&f, ray.start[0], ray.start[2], &x, &z), TERRIMP_E_MISS);
-    return terrimpi_ray_walk(&f, &ray, x, z, hit);
+    TERRIMPI_REFUSE(!terrimpi_field_ray_enter(&f, origin, max_distance, &ray) ||
+                    !terrimpi_field_locate(&f, ray.start[0], ray.start[2], &x, &z), TERRIMP_E_MISS);
+    return terrimpi_field_ray_walk(&f, &ray, x, z, hit);
 }
 
 /* ==== Camera ============================================================= >>impl-camera */
 /* Based on: Hess 2010, section 3.2 (fitted frustum); de Boer 2000, sections 2.2 and 2.3.1.2. */
 
-#define TERRIMPI_FARTHEST 1e18f /* of coordinates: products of two distances stay finite */
+#define TERRIMPI_CAMERA_FARTHEST 1e18f /* of coordinates: products of two distances stay finite */
 
 /* Whether two vectors are of unit length and at a right angle, but for rounding. */
-static int terrimpi_orthonormal(const float a[3], const float b[3])
+static int terrimpi_camera_orthonormal(const float a[3], const float b[3])
 {
     return terrimpi_abs(terrimpi_dot(a, a) - 1.0f) < 4e-6f &&
            terrimpi_abs(terrimpi_dot(b, b) - 1.0f) < 4e-6f &&
@@ -3474,9 +3484,9 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
     TERRIMPI_REFUSE(!terrimpi_within(c.fov_y_rad, 0.001f, 3.1f) ||
                     !terrimpi_within_u32(c.width_px, 1u, 65536u) ||
                     !terrimpi_within_u32(c.height_px, 1u, 65536u) || c.z_near <= 0.0f ||
-                    c.z_far <= c.z_near || c.z_far > TERRIMPI_FARTHEST ||
-                    terrimpi_largest(c.eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
-    if (!terrimpi_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
+                    c.z_far <= c.z_near || c.z_far > TERRIMPI_CAMERA_FARTHEST ||
+                    terrimpi_largest(c.eye) > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
+    if (!terrimpi_camera_orthonormal(c.forward, c.up)) { /* what is resolved stays as it is */
         TERRIMPI_REFUSE(!terrimpi_normalize(c.forward), TERRIMP_E_RANGE);
         terrimpi_basis(c.forward, c.up, right);
     }
@@ -3606,8 +3616,8 @@ TERRIMP_API float terrimp_box_farthest(const terrimp_box *box, const float point
 }
 
 /* Corner i of a box (bit k of i: the maximum along axis k), relative to a point. */
-static void terrimpi_box_corner(const terrimp_box *box, int i, const float point[3],
-                                float corner[3])
+static void terrimpi_camera_box_corner(const terrimp_box *box, int i, const float point[3],
+                                       float corner[3])
 {
     int k;
     for (k = 0; k < 3; k++)
@@ -3617,7 +3627,8 @@ static void terrimpi_box_corner(const terrimp_box *box, int i, const float point
 /* Fits the sides and clip distances of a capture to points, with a hair's breadth more, so that
    rounding leaves none outside and a flat box has a volume. Returns 0 when the cosine between
    forward and the way to one of them is not above `least`. */
-static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t count, float least)
+static int terrimpi_camera_fit_sides(terrimp_capture *c, const float *xyz, uint32_t count,
+                                     float least)
 {
     float slope = 1.0f; /* of the steepest ray: its length over its depth */
     uint32_t i;
@@ -3648,8 +3659,8 @@ static int terrimpi_fit_sides(terrimp_capture *c, const float *xyz, uint32_t cou
 }
 
 /* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error. */
-static terrimp_result terrimpi_capture_fit(const terrimp_box *box, const float eye[3],
-                                           terrimp_capture *c)
+static terrimp_result terrimpi_camera_fit(const terrimp_box *box, const float eye[3],
+                                          terrimp_capture *c)
 {
     static const float y_axis[3] = {0.0f, 1.0f, 0.0f}, minus_z[3] = {0.0f, 0.0f, -1.0f};
     static const float origin[3] = {0.0f, 0.0f, 0.0f};
@@ -3664,9 +3675,9 @@ static terrimp_result terrimpi_capture_fit(const terrimp_box *box, const float e
     memcpy(c->up, c->forward[1] * c->forward[1] > 0.9999f ? minus_z : y_axis, sizeof c->up);
     terrimpi_basis(c->forward, c->up, c->right);
     for (i = 0; i < 8; i++)
-        terrimpi_box_corner(box, i, origin, corners[i]);
+        terrimpi_camera_box_corner(box, i, origin, corners[i]);
     /* Beyond a slope of 1000 a perspective picture is of no use, and its numbers degrade. */
-    return terrimpi_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
+    return terrimpi_camera_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
 }
 
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
@@ -3677,18 +3688,18 @@ TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const flo
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
                     !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
-                    box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_FARTHEST ||
-                    terrimp_box_farthest(box, eye) > TERRIMPI_FARTHEST, TERRIMP_E_RANGE);
-    TERRIMPI_TRY(terrimpi_capture_fit(box, eye, &c));
+                    box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_CAMERA_FARTHEST ||
+                    terrimp_box_farthest(box, eye) > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_camera_fit(box, eye, &c));
     *capture = c;
     return TERRIMP_OK;
 }
 
 /* Fits the sides alone. */
-static int terrimpi_capture_tighten(terrimp_capture *c, const float *xyz, uint32_t count)
+static int terrimpi_camera_tighten(terrimp_capture *c, const float *xyz, uint32_t count)
 {
     float z_near = c->z_near, z_far = c->z_far;
-    int fits = terrimpi_fit_sides(c, xyz, count, 0.0f);
+    int fits = terrimpi_camera_fit_sides(c, xyz, count, 0.0f);
     c->z_near = z_near;
     c->z_far = z_far;
     return fits;
@@ -3701,7 +3712,7 @@ TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, con
     TERRIMPI_REFUSE(!capture || !xyz, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
     c = *capture;
-    TERRIMPI_REFUSE(!terrimpi_capture_tighten(&c, xyz, count), TERRIMP_E_BEHIND);
+    TERRIMPI_REFUSE(!terrimpi_camera_tighten(&c, xyz, count), TERRIMP_E_BEHIND);
     *capture = c;
     return TERRIMP_OK;
 }
@@ -3846,12 +3857,14 @@ static uint32_t terrimpi_tree_row(const terrimp_quadtree *t, uint32_t level, uin
 /* World x and z of lattice position (i, j) of a level. */
 static float terrimpi_tree_x(const terrimp_quadtree *t, uint32_t level, uint32_t i)
 {
-    return terrimpi_line(t->field.origin_x, t->field.spacing_x, terrimpi_tree_col(t, level, i));
+    return terrimpi_field_line(t->field.origin_x, t->field.spacing_x,
+                               terrimpi_tree_col(t, level, i));
 }
 
 static float terrimpi_tree_z(const terrimp_quadtree *t, uint32_t level, uint32_t j)
 {
-    return terrimpi_line(t->field.origin_z, t->field.spacing_z, terrimpi_tree_row(t, level, j));
+    return terrimpi_field_line(t->field.origin_z, t->field.spacing_z,
+                               terrimpi_tree_row(t, level, j));
 }
 
 /* The box of a node whose heights are low to high. */
@@ -4166,7 +4179,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
     uint32_t i = x >> level, j = z >> level;
     uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
     uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
-    float a = terrimpi_sample(&t->field, x0, z0), d = terrimpi_sample(&t->field, x1, z1);
+    float a = terrimpi_field_sample(&t->field, x0, z0), d =
+        terrimpi_field_sample(&t->field, x1, z1);
     float b, c, u, v;
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
@@ -4175,8 +4189,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
                                                                   diagonal */
         return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
                          : terrimpi_mip_between(a, d, right, wide);
-    b = terrimpi_sample(&t->field, x1, z0);
-    c = terrimpi_sample(&t->field, x0, z1);
+    b = terrimpi_field_sample(&t->field, x1, z0);
+    c = terrimpi_field_sample(&t->field, x0, z1);
     if (right == 0)
         return terrimpi_mip_between(a, c, down, deep);
     if (down == 0)
@@ -4269,7 +4283,8 @@ typedef struct terrimpi_mip_frame {
 
 /* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
    at its edge may be drawn that far outside. */
-static void terrimpi_mip_aim(terrimpi_mip_frame *f, const terrimp_camera *camera, float margin)
+static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera *camera,
+                                    float margin)
 {
     float right[3], seen[3], aside[3], tan_x, tan_y;
     terrimpi_cross(camera->forward, camera->up, right);
@@ -4357,8 +4372,8 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 
 /* Square of a node's error over the tolerance, when it is drawn as it is; 0 when it is out of view.
    *planes: those to test against, and those that are left for its parts. */
-static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_node *node,
-                                  int *planes)
+static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp_node *node,
+                                      int *planes)
 {
     float d2, measure, split2 = f->view->distances[node->number];
     terrimp_box box;
@@ -4380,7 +4395,7 @@ static float terrimpi_mip_measure(const terrimpi_mip_frame *f, const terrimp_nod
 }
 
 /* Raises a node's measure, and enters the node into the list of its level. */
-static void terrimpi_mip_raise(terrimpi_mip_frame *f, const terrimp_node *node, float measure)
+static void terrimpi_mip_enter(terrimpi_mip_frame *f, const terrimp_node *node, float measure)
 {
     terrimp_geomip_mark *mark = &f->view->marks[node->number];
     if (mark->frame != f->view->frame) {
@@ -4393,7 +4408,7 @@ static void terrimpi_mip_raise(terrimpi_mip_frame *f, const terrimp_node *node, 
 }
 
 /* The measure that a node was given in this frame; less than 1: not split. */
-static float terrimpi_mip_marked(const terrimpi_mip_frame *f, uint32_t node)
+static float terrimpi_mip_ratio_of(const terrimpi_mip_frame *f, uint32_t node)
 {
     const terrimp_geomip_mark *mark = &f->view->marks[node];
     return mark->frame == f->view->frame ? mark->measure : 0.0f;
@@ -4412,12 +4427,12 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
     terrimpi_tree_begin(&walk, f->tree, f->eye, worth < 1.0f ? 0 : TERRIMP_PLANES_ALL);
     while (terrimpi_tree_next(&walk, &v)) {
         const terrimp_geomip_mark *mark = &f->view->marks[v.node.number];
-        float measure = v.node.level == 0 ? 0.0f : terrimpi_mip_measure(f, &v.node, &v.planes);
+        float measure = v.node.level == 0 ? 0.0f : terrimpi_mip_split_ratio(f, &v.node, &v.planes);
         if (mark->frame == f->view->frame - 1u && mark->measure >= 1.0f && worth >= 1.0f)
             measure *= stay * stay;
         if (measure < worth)
             continue;
-        terrimpi_mip_raise(f, &v.node, measure);
+        terrimpi_mip_enter(f, &v.node, measure);
         if (measure >= 1.0f && v.node.level > 1u)
             terrimpi_tree_enter(&walk, &v);
     }
@@ -4441,7 +4456,7 @@ static void terrimpi_mip_balance(terrimpi_mip_frame *f)
             for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
                 if (terrimpi_tree_beyond(t, &node, side, &beyond)) {
                     terrimp_node parent = terrimpi_tree_parent(t, &beyond);
-                    terrimpi_mip_raise(f, &parent, f->view->marks[number].measure);
+                    terrimpi_mip_enter(f, &parent, f->view->marks[number].measure);
                 }
         }
 }
@@ -4454,7 +4469,7 @@ static float terrimpi_mip_fraction(const terrimpi_mip_frame *f, const terrimp_no
     if (TERRIMPI_MIP_MORPH_MOST <= 1.0f || !(ratio > 1.0f) ||
         node->level + 1u >= f->tree->level_count)
         return 0.0f;
-    measure = terrimpi_mip_marked(f, terrimpi_tree_parent(f->tree, node).number);
+    measure = terrimpi_mip_ratio_of(f, terrimpi_tree_parent(f->tree, node).number);
     if (measure >= ratio * ratio)
         return 0.0f;
     return measure > 1.0f ? (ratio / TERRIMP_SQRTF(measure) - 1.0f) / (ratio - 1.0f) : 1.0f;
@@ -4473,7 +4488,7 @@ static void terrimpi_mip_side(const terrimpi_mip_frame *f, int side, terrimp_geo
     parent = terrimpi_tree_parent(f->tree, &beyond);
     if (parent.x == node->x / 2u && parent.z == node->z / 2u)
         return; /* a sibling, or its children: the same fraction, or 0 */
-    if (terrimpi_mip_marked(f, parent.number) < 1.0f) {
+    if (terrimpi_mip_ratio_of(f, parent.number) < 1.0f) {
         draw->pattern |= 1u << side;
         draw->side_coarse[side] = terrimpi_mip_fraction(f, &parent);
         draw->side[side] = 1.0f; /* they are left out */
@@ -4494,7 +4509,8 @@ static void terrimpi_mip_emit(terrimpi_mip_frame *f, const terrimp_node *node)
     draw->pattern = 0;
     draw->error_px = 0.0f;
     if (node->level > 0)
-        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_measure(f, node, &planes));
+        draw->error_px = v->tolerance_px * TERRIMP_SQRTF(terrimpi_mip_split_ratio(f, node,
+                                                                                  &planes));
     draw->morph = terrimpi_mip_fraction(f, node);
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         terrimpi_mip_side(f, side, draw);
@@ -4518,7 +4534,7 @@ static void terrimpi_mip_collect(terrimpi_mip_frame *f)
             if (v.planes == TERRIMP_PLANES_OUTSIDE)
                 continue;
         }
-        if (v.node.level == 0 || terrimpi_mip_marked(f, v.node.number) < 1.0f)
+        if (v.node.level == 0 || terrimpi_mip_ratio_of(f, v.node.number) < 1.0f)
             terrimpi_mip_emit(f, &v.node);
         else
             terrimpi_tree_enter(&walk, &v);
@@ -4569,7 +4585,7 @@ static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tre
     f->relief = view->rule == TERRIMP_GEOMIP_PICTURE ? 1.0f / scale : 1.0f / (scale * scale);
     for (level = 0; level < tree->level_count; level++)
         f->first[level] = tree->node_count;
-    terrimpi_mip_aim(f, camera, view->tolerance_px * scale / pixel_factor);
+    terrimpi_mip_set_camera(f, camera, view->tolerance_px * scale / pixel_factor);
     terrimpi_mip_refresh(f, pixel_factor);
     view->frame = view->frame + 1u == 0 ? 1u : view->frame + 1u; /* 0 is what fresh marks say */
     terrimpi_mip_mark_errors(f);
@@ -4626,7 +4642,7 @@ static void terrimpi_mip_vertex(const terrimp_quadtree *t, uint32_t level, uint3
 {
     uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
     int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
-    vertex->height = terrimpi_sample(&t->field, terrimpi_tree_col(t, level, i0 + i),
+    vertex->height = terrimpi_field_sample(&t->field, terrimpi_tree_col(t, level, i0 + i),
                                         terrimpi_tree_row(t, level, j0 + j));
     vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
     if ((along_x && along_z) || (!odd && (along_x || along_z)))
@@ -4666,8 +4682,9 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *
         for (i = 0; i <= tree->chunk_quads; i++) {
             if (xyz) {
                 *xyz++ = terrimpi_tree_x(tree, n.level, i0 + i);
-                *xyz++ = terrimpi_sample(&tree->field, terrimpi_tree_col(tree, n.level, i0 + i),
-                                         terrimpi_tree_row(tree, n.level, j0 + j));
+                *xyz++ = terrimpi_field_sample(&tree->field,
+                                               terrimpi_tree_col(tree, n.level, i0 + i),
+                                               terrimpi_tree_row(tree, n.level, j0 + j));
                 *xyz++ = terrimpi_tree_z(tree, n.level, j0 + j);
             }
             if (vertices)
@@ -4741,9 +4758,9 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
 /* ==== Impostor =========================================================== >>impl-impostor */
 /* Based on: Hess 2010, sections 3.3 to 3.5 and 6.2. */
 
-#define TERRIMPI_SPLITS 24u /* places of a split that are tried */
+#define TERRIMPI_SPLIT_COUNT 24u /* places of a split that are tried */
 #define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
-#define TERRIMPI_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
+#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
 static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
@@ -4777,7 +4794,7 @@ TERRIMP_API terrimp_result terrimp_impostor_size(const terrimp_capture *capture,
 }
 
 /* Widens [low, high], which `inner` texels show, by `margin` texels on both sides. */
-static void terrimpi_pad(float *low, float *high, uint32_t inner, uint32_t margin)
+static void terrimpi_impostor_pad(float *low, float *high, uint32_t inner, uint32_t margin)
 {
     float by = (*high - *low) * (float)margin / (float)inner;
     *low -= by;
@@ -4790,13 +4807,15 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
     TERRIMPI_REFUSE(!capture || !slot, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(margin > 65536u || slot[0] <= 2u * margin ||
                     slot[1] <= 2u * margin, TERRIMP_E_RANGE);
-    terrimpi_pad(&capture->tan_left, &capture->tan_right, slot[0] - 2u * margin, margin);
-    terrimpi_pad(&capture->tan_down, &capture->tan_up, slot[1] - 2u * margin, margin);
+    terrimpi_impostor_pad(&capture->tan_left, &capture->tan_right, slot[0] - 2u * margin, margin);
+    terrimpi_impostor_pad(&capture->tan_down, &capture->tan_up, slot[1] - 2u * margin, margin);
     return TERRIMP_OK;
 }
 
-static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrimp_rect *slot,
-                                    uint32_t atlas_width, uint32_t atlas_height, float matrix[16])
+static void terrimpi_impostor_texture_matrix(const terrimp_capture *capture,
+                                             const terrimp_rect *slot,
+                                             uint32_t atlas_width, uint32_t atlas_height,
+                                             float matrix[16])
 {
     float view[16], projection[16];
     float scale[3], offset[3]; /* clip space to atlas */
@@ -4823,7 +4842,8 @@ static void terrimpi_texture_matrix(const terrimp_capture *capture, const terrim
     }
 }
 
-static int terrimpi_slot_in_atlas(const terrimp_rect *slot, uint32_t width, uint32_t height)
+static int terrimpi_impostor_slot_in_atlas(const terrimp_rect *slot, uint32_t width,
+                                           uint32_t height)
 {
     return slot->width >= 1u && slot->height >= 1u && slot->x <= width &&
            slot->width <= width - slot->x && slot->y <= height && slot->height <= height - slot->y;
@@ -4834,16 +4854,18 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16])
 {
     TERRIMPI_REFUSE(!capture || !slot || !matrix, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_slot_in_atlas(slot, atlas_width, atlas_height), TERRIMP_E_RANGE);
-    terrimpi_texture_matrix(capture, slot, atlas_width, atlas_height, matrix);
+    TERRIMPI_REFUSE(!terrimpi_impostor_slot_in_atlas(slot, atlas_width, atlas_height),
+                    TERRIMP_E_RANGE);
+    terrimpi_impostor_texture_matrix(capture, slot, atlas_width, atlas_height, matrix);
     return TERRIMP_OK;
 }
 
 /* A place at the distance z along forward is z (forward + x right + y up) from the capture's eye,
    with tangents x and y that grow with s and t; and 1 / z grows with the depth, from 1 / z_near to
    1 / z_far. So (place, 1) / z is linear in all three. */
-static void terrimpi_place_matrix(const terrimp_capture *c, const terrimp_rect *slot,
-                                  uint32_t atlas_width, uint32_t atlas_height, float matrix[16])
+static void terrimpi_impostor_place_matrix(const terrimp_capture *c, const terrimp_rect *slot,
+                                           uint32_t atlas_width, uint32_t atlas_height,
+                                           float matrix[16])
 {
     float across = (c->tan_right - c->tan_left) / (float)slot->width;
     float upward = (c->tan_up - c->tan_down) / (float)slot->height;
@@ -4861,7 +4883,7 @@ static void terrimpi_place_matrix(const terrimp_capture *c, const terrimp_rect *
 }
 
 /* From places relative to one eye to those relative to another. */
-static void terrimpi_place_from(float matrix[16], const float from[3], const float eye[3])
+static void terrimpi_impostor_place_from(float matrix[16], const float from[3], const float eye[3])
 {
     int i, column;
     for (column = 0; column < 16; column += 4)
@@ -4875,10 +4897,11 @@ TERRIMP_API terrimp_result terrimp_place_matrix(const terrimp_capture *capture,
                                                 float matrix[16])
 {
     TERRIMPI_REFUSE(!capture || !slot || !eye || !matrix, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_slot_in_atlas(slot, atlas_width, atlas_height), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_impostor_slot_in_atlas(slot, atlas_width, atlas_height),
+                    TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
-    terrimpi_place_matrix(capture, slot, atlas_width, atlas_height, matrix);
-    terrimpi_place_from(matrix, capture->eye, eye);
+    terrimpi_impostor_place_matrix(capture, slot, atlas_width, atlas_height, matrix);
+    terrimpi_impostor_place_from(matrix, capture->eye, eye);
     return TERRIMP_OK;
 }
 
@@ -4900,8 +4923,9 @@ TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], c
     return TERRIMP_OK;
 }
 
-static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float captured_eye[3],
-                                          const float eye[3], const float *out)
+static terrimp_result terrimpi_impostor_check_eyes(const terrimp_box *box,
+                                                   const float captured_eye[3],
+                                                   const float eye[3], const float *out)
 {
     TERRIMPI_REFUSE(!box || !captured_eye || !eye || !out, TERRIMP_E_NULL);
     return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
@@ -4911,15 +4935,15 @@ static terrimp_result terrimpi_check_eyes(const terrimp_box *box, const float ca
 }
 
 /* The functions of this room that a view calls check nothing; those of the API do. */
-static float terrimpi_view_angle(const terrimp_box *box, const float captured_eye[3],
-                                 const float eye[3])
+static float terrimpi_impostor_view_angle(const terrimp_box *box, const float captured_eye[3],
+                                          const float eye[3])
 {
     float worst = 0.0f; /* grows with the angle: its sine up to 60 degrees, then 2 - its cosine */
     int i;
     for (i = 0; i < 8; i++) {
         float a[3], b[3], across[3], cosine;
-        terrimpi_box_corner(box, i, captured_eye, a);
-        terrimpi_box_corner(box, i, eye, b);
+        terrimpi_camera_box_corner(box, i, captured_eye, a);
+        terrimpi_camera_box_corner(box, i, eye, b);
         if (!terrimpi_normalize(a) || !terrimpi_normalize(b))
             continue; /* an eye on the corner has no direction to it */
         cosine = terrimpi_dot(a, b);
@@ -4933,15 +4957,15 @@ static float terrimpi_view_angle(const terrimp_box *box, const float captured_ey
 TERRIMP_API terrimp_result terrimp_view_angle(const terrimp_box *box, const float captured_eye[3],
                                               const float eye[3], float *angle_rad)
 {
-    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, angle_rad));
-    *angle_rad = terrimpi_view_angle(box, captured_eye, eye);
+    TERRIMPI_TRY(terrimpi_impostor_check_eyes(box, captured_eye, eye, angle_rad));
+    *angle_rad = terrimpi_impostor_view_angle(box, captured_eye, eye);
     return TERRIMP_OK;
 }
 
 /* The largest sine of the angle between `move` and the directions from `eye` to the points of a
    box: those directions lie in a cone around the one to the box's centre. */
-static float terrimpi_largest_sine(const terrimp_box *box, const float eye[3], const float move[3],
-                                   float move_length)
+static float terrimpi_impostor_largest_sine(const terrimp_box *box, const float eye[3],
+                                            const float move[3], float move_length)
 {
     float centre[3], half[3], across[3], distance, radius, sine, cosine, cone_sine, cone_cosine;
     int i;
@@ -4970,9 +4994,9 @@ static float terrimpi_largest_sine(const terrimp_box *box, const float eye[3], c
    sin(APB) = |AB| sin(BAP) / |BP|. With d the distance from B to the box, which holds P:
    |BP| >= d, |QB| >= d - error. The tangent of that angle times K is the distance in pixels at the
    middle of the screen. */
-static float terrimpi_parallax_error(const terrimp_box *box, float error,
-                                     const float captured_eye[3], const float eye[3],
-                                     float pixel_factor)
+static float terrimpi_impostor_parallax_error(const terrimp_box *box, float error,
+                                              const float captured_eye[3], const float eye[3],
+                                              float pixel_factor)
 {
     float move[3], move_length, distance, sine;
     terrimpi_sub(eye, captured_eye, move);
@@ -4984,7 +5008,8 @@ static float terrimpi_parallax_error(const terrimp_box *box, float error,
     if (distance > error)
         sine = error / (distance - error) *
                terrimpi_min(1.0f, move_length / distance *
-                                      terrimpi_largest_sine(box, captured_eye, move, move_length));
+                                      terrimpi_impostor_largest_sine(box, captured_eye, move,
+                                                                     move_length));
     return sine < 0.999f ? pixel_factor * sine / TERRIMP_SQRTF(1.0f - sine * sine)
                          : TERRIMPI_INFINITY;
 }
@@ -4993,10 +5018,10 @@ TERRIMP_API terrimp_result terrimp_parallax_error(const terrimp_box *box, float 
                                                   const float captured_eye[3], const float eye[3],
                                                   float pixel_factor, float *error_px)
 {
-    TERRIMPI_TRY(terrimpi_check_eyes(box, captured_eye, eye, error_px));
+    TERRIMPI_TRY(terrimpi_impostor_check_eyes(box, captured_eye, eye, error_px));
     TERRIMPI_REFUSE(!terrimpi_finite2(error, pixel_factor), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(error < 0.0f || !(pixel_factor > 0.0f), TERRIMP_E_RANGE);
-    *error_px = terrimpi_parallax_error(box, error, captured_eye, eye, pixel_factor);
+    *error_px = terrimpi_impostor_parallax_error(box, error, captured_eye, eye, pixel_factor);
     return TERRIMP_OK;
 }
 
@@ -5090,11 +5115,11 @@ static void terrimpi_split_draw(terrimpi_split_map *m, uint32_t first, float p[3
 }
 
 /* Sums over a mesh as the moved eyes see it. */
-typedef struct terrimpi_smear {
+typedef struct terrimpi_split_gap {
     float seen;                   /* size of all triangles */
     float all;                    /* sizes times squared gaps, of those that were hidden */
-    float saved[TERRIMPI_SPLITS]; /* ... and that a split would spare */
-} terrimpi_smear;
+    float saved[TERRIMPI_SPLIT_COUNT]; /* ... and that a split would spare */
+} terrimpi_split_gap;
 
 /* Whether a point that is hidden at cell (x, y) still is after the eye has moved towards larger x
    (or y, or smaller x), by `move` cells at depth 1. What hides it stretches up to a crest, some
@@ -5104,7 +5129,7 @@ static int terrimpi_split_still(const terrimpi_split_map *m, int x, int y, int s
 {
     float away = 0.5f;
     while (x >= 0 && x < TERRIMPI_SPLIT_CELLS && y < TERRIMPI_SPLIT_CELLS &&
-           m->closest[y][x] * TERRIMPI_IN_SIGHT > w) {
+           m->closest[y][x] * TERRIMPI_IMPOSTOR_IN_SIGHT > w) {
         if (away >= move * (m->closest[y][x] - w))
             return 1;
         away += 1.0f;
@@ -5118,7 +5143,7 @@ static int terrimpi_split_still(const terrimpi_split_map *m, int x, int y, int s
 static float terrimpi_split_hit(const terrimpi_split_map *m, int x, int y, const float point[3])
 {
     float p[3][3], inside, w;
-    if (!(m->closest[y][x] * TERRIMPI_IN_SIGHT > point[2]))
+    if (!(m->closest[y][x] * TERRIMPI_IMPOSTOR_IN_SIGHT > point[2]))
         return 1.0f;
     terrimpi_split_corners(m, m->own[y][x], p);
     w = terrimpi_split_plane(p, terrimpi_split_area(p, 0.0f, 0.0f), point[0], point[1], &inside);
@@ -5128,7 +5153,7 @@ static float terrimpi_split_hit(const terrimpi_split_map *m, int x, int y, const
 /* Adds a triangle, for eyes that have moved up, right and left. Places of a split: first + (k + 1)
    * step. */
 static void terrimpi_split_add(const terrimpi_split_map *m, float p[3][3], float reach,
-                               float overlap, float first, float step, terrimpi_smear *smear)
+                               float overlap, float first, float step, terrimpi_split_gap *smear)
 {
     static const int ways[3][2] = { { 0, 1 }, { 1, 0 }, { -1, 0 } };
     const float last = (float)(TERRIMPI_SPLIT_CELLS - 1);
@@ -5148,12 +5173,12 @@ static void terrimpi_split_add(const terrimpi_split_map *m, float p[3][3], float
         if (!(size > 0.0f))
             continue;
         smear->seen += size;
-        if (hit > TERRIMPI_IN_SIGHT ||
+        if (hit > TERRIMPI_IMPOSTOR_IN_SIGHT ||
             terrimpi_split_still(m, x, y, ways[way][0], up, reach * m->cells[up], middle[2]))
             continue;
         weight = size * (1.0f - hit) * (1.0f - hit);
         smear->all += weight;
-        for (k = 0; k < TERRIMPI_SPLITS; k++) {
+        for (k = 0; k < TERRIMPI_SPLIT_COUNT; k++) {
             float at = first + (float)(k + 1u) * step;
             if (depth * hit < at - overlap && depth > at + overlap)
                 smear->saved[k] += weight;
@@ -5162,8 +5187,8 @@ static void terrimpi_split_add(const terrimpi_split_map *m, float p[3][3], float
 }
 
 /* Sets the cells over all vertices; they lie between the depths 1 / *w_most and 1 / *w_least. */
-static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, float *w_least,
-                               float *w_most)
+static void terrimpi_split_set_cells(terrimpi_split_map *m, uint32_t vertex_count, float *w_least,
+                                     float *w_most)
 {
     float low[3], high[3], p[3];
     uint32_t i, k;
@@ -5188,21 +5213,21 @@ static void terrimpi_split_aim(terrimpi_split_map *m, uint32_t vertex_count, flo
 }
 
 /* terrimp_capture_split of checked arguments. */
-static void terrimpi_capture_split(const terrimp_capture *capture, const float *xyz,
-                                   uint32_t vertex_count, const uint16_t *indices,
-                                   uint32_t index_count, float reach, float overlap,
-                                   terrimp_split *split)
+static void terrimpi_impostor_split(const terrimp_capture *capture, const float *xyz,
+                                    uint32_t vertex_count, const uint16_t *indices,
+                                    uint32_t index_count, float reach, float overlap,
+                                    terrimp_split *split)
 {
     float first, step, w_least, w_most, p[3][3];
     uint32_t i, k, best = 0;
     terrimpi_split_map map;
-    terrimpi_smear smear;
+    terrimpi_split_gap smear;
     map.capture = capture;
     map.xyz = xyz;
     map.indices = indices;
-    terrimpi_split_aim(&map, vertex_count, &w_least, &w_most);
+    terrimpi_split_set_cells(&map, vertex_count, &w_least, &w_most);
     first = 1.0f / w_most;
-    step = (1.0f / w_least - first) / (float)(TERRIMPI_SPLITS + 1u);
+    step = (1.0f / w_least - first) / (float)(TERRIMPI_SPLIT_COUNT + 1u);
     for (i = 0; i < index_count; i += 3u) {
         terrimpi_split_corners(&map, i, p);
         terrimpi_split_draw(&map, i, p);
@@ -5212,7 +5237,7 @@ static void terrimpi_capture_split(const terrimp_capture *capture, const float *
         terrimpi_split_corners(&map, i, p);
         terrimpi_split_add(&map, p, reach, overlap, first, step, &smear);
     }
-    for (k = 1; k < TERRIMPI_SPLITS; k++)
+    for (k = 1; k < TERRIMPI_SPLIT_COUNT; k++)
         if (smear.saved[k] > smear.saved[best])
             best = k;
     memset(split, 0, sizeof *split);
@@ -5235,7 +5260,8 @@ TERRIMP_API terrimp_result terrimp_capture_split(const terrimp_capture *capture,
     TERRIMPI_REFUSE(!(reach > 0.0f) || overlap < 0.0f, TERRIMP_E_RANGE);
     for (i = 0; i < index_count; i++)
         TERRIMPI_REFUSE(indices[i] >= vertex_count, TERRIMP_E_RANGE);
-    terrimpi_capture_split(capture, xyz, vertex_count, indices, index_count, reach, overlap, split);
+    terrimpi_impostor_split(capture, xyz, vertex_count, indices, index_count, reach, overlap,
+                            split);
     return TERRIMP_OK;
 }
 
@@ -5330,13 +5356,13 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, te
    Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
    count as larger by it, so that the rest of the code need not know of it. */
 
-static int terrimpi_rects_overlap(const terrimp_rect *a, const terrimp_rect *b)
+static int terrimpi_atlas_overlap(const terrimp_rect *a, const terrimp_rect *b)
 {
     return a->x < b->x + b->width && b->x < a->x + a->width && a->y < b->y + b->height &&
            b->y < a->y + a->height;
 }
 
-static int terrimpi_rect_contains(const terrimp_rect *outer, const terrimp_rect *inner)
+static int terrimpi_atlas_contains(const terrimp_rect *outer, const terrimp_rect *inner)
 {
     return outer->x <= inner->x && outer->y <= inner->y &&
            inner->x + inner->width <= outer->x + outer->width &&
@@ -5345,8 +5371,8 @@ static int terrimpi_rect_contains(const terrimp_rect *outer, const terrimp_rect 
 
 /* The part of a rectangle to the left of, to the right of, below or above what overlaps it; of
    width or height 0 when there is none. */
-static terrimp_rect terrimpi_rect_beside(const terrimp_rect *rect, const terrimp_rect *taken,
-                                         int side)
+static terrimp_rect terrimpi_atlas_beside(const terrimp_rect *rect, const terrimp_rect *taken,
+                                          int side)
 {
     uint32_t right = rect->x + rect->width, top = rect->y + rect->height;
     uint32_t left_cut = terrimpi_max_u32(rect->x, taken->x);
@@ -5362,19 +5388,19 @@ static terrimp_rect terrimpi_rect_beside(const terrimp_rect *rect, const terrimp
 }
 
 /* Whether rectangles overlap or have a piece of an edge or a corner in common. */
-static int terrimpi_rects_touch(const terrimp_rect *a, const terrimp_rect *b)
+static int terrimpi_atlas_touch(const terrimp_rect *a, const terrimp_rect *b)
 {
     return a->x <= b->x + b->width && b->x <= a->x + a->width && a->y <= b->y + b->height &&
            b->y <= a->y + a->height;
 }
 
 /* Moves the holes from `begin` on that touch a rectangle to the end; returns the first of them. */
-static uint32_t terrimpi_holes_part(terrimp_live_atlas *atlas, uint32_t begin,
-                                    const terrimp_rect *rect)
+static uint32_t terrimpi_atlas_free_part(terrimp_live_atlas *atlas, uint32_t begin,
+                                         const terrimp_rect *rect)
 {
     uint32_t i, first = begin;
     for (i = begin; i < atlas->hole_count; i++)
-        if (!terrimpi_rects_touch(&atlas->holes[i], rect)) {
+        if (!terrimpi_atlas_touch(&atlas->holes[i], rect)) {
             terrimp_rect swap = atlas->holes[i];
             atlas->holes[i] = atlas->holes[first];
             atlas->holes[first++] = swap;
@@ -5383,21 +5409,21 @@ static uint32_t terrimpi_holes_part(terrimp_live_atlas *atlas, uint32_t begin,
 }
 
 /* Marks the holes from `first` to `last` that one from `by` on contains: their width becomes 0. */
-static void terrimpi_holes_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
-                                uint32_t by)
+static void terrimpi_atlas_free_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
+                                     uint32_t by)
 {
     terrimp_rect *holes = atlas->holes;
     uint32_t i, k;
     for (i = first; i < last; i++)
         for (k = by; k < atlas->hole_count; k++)
-            if (k != i && holes[k].width > 0 && terrimpi_rect_contains(&holes[k], &holes[i])) {
+            if (k != i && holes[k].width > 0 && terrimpi_atlas_contains(&holes[k], &holes[i])) {
                 holes[i].width = 0;
                 break;
             }
 }
 
 /* Removes the marked holes from `first` on. */
-static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t first)
+static void terrimpi_atlas_free_compact(terrimp_live_atlas *atlas, uint32_t first)
 {
     uint32_t i, kept = first;
     for (i = first; i < atlas->hole_count; i++)
@@ -5409,18 +5435,18 @@ static void terrimpi_holes_compact(terrimp_live_atlas *atlas, uint32_t first)
 /* Cuts a rectangle out of the holes from `begin` on. Of the pieces, those that are maximal and
    overlap `window` are kept; what contains one of them touches the rectangle as they do. A piece
    for which there is no memory is lost until a slot beside it is freed. */
-static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const terrimp_rect *taken,
-                               const terrimp_rect *window)
+static void terrimpi_atlas_free_cut(terrimp_live_atlas *atlas, uint32_t begin,
+                                    const terrimp_rect *taken, const terrimp_rect *window)
 {
     terrimp_rect *holes = atlas->holes;
-    uint32_t i, first = terrimpi_holes_part(atlas, begin, taken), old = atlas->hole_count;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->hole_count;
     int side, cut = 0;
     for (i = first; i < old; i++) {
-        if (!terrimpi_rects_overlap(&holes[i], taken))
+        if (!terrimpi_atlas_overlap(&holes[i], taken))
             continue;
         for (side = 0; side < 4; side++) {
-            terrimp_rect piece = terrimpi_rect_beside(&holes[i], taken, side);
-            if (piece.width > 0 && piece.height > 0 && terrimpi_rects_overlap(&piece, window) &&
+            terrimp_rect piece = terrimpi_atlas_beside(&holes[i], taken, side);
+            if (piece.width > 0 && piece.height > 0 && terrimpi_atlas_overlap(&piece, window) &&
                 atlas->hole_count < atlas->max_holes)
                 holes[atlas->hole_count++] = piece;
         }
@@ -5428,24 +5454,24 @@ static void terrimpi_holes_cut(terrimp_live_atlas *atlas, uint32_t begin, const 
         cut = 1;
     }
     if (cut) {
-        terrimpi_holes_mark(atlas, old, atlas->hole_count, first);
-        terrimpi_holes_compact(atlas, first);
+        terrimpi_atlas_free_mark(atlas, old, atlas->hole_count, first);
+        terrimpi_atlas_free_compact(atlas, first);
     }
 }
 
 /* The largest number of free rectangles that are kept. */
-static uint32_t terrimpi_live_holes(const terrimp_live_atlas_desc *desc)
+static uint32_t terrimpi_atlas_free_most(const terrimp_live_atlas_desc *desc)
 {
     return 6u * desc->max_slots + 64u;
 }
 
-static terrimp_rect terrimpi_live_whole(const terrimp_live_atlas *atlas)
+static terrimp_rect terrimpi_atlas_whole(const terrimp_live_atlas *atlas)
 {
     return terrimpi_rect(0, 0, atlas->desc.width + atlas->desc.padding,
                          atlas->desc.height + atlas->desc.padding);
 }
 
-static terrimp_rect terrimpi_live_padded(const terrimp_live_atlas *atlas, uint32_t slot)
+static terrimp_rect terrimpi_atlas_padded(const terrimp_live_atlas *atlas, uint32_t slot)
 {
     terrimp_rect rect = atlas->slots[slot];
     rect.width += atlas->desc.padding;
@@ -5453,7 +5479,7 @@ static terrimp_rect terrimpi_live_padded(const terrimp_live_atlas *atlas, uint32
     return rect;
 }
 
-static int terrimpi_live_desc_ok(const terrimp_live_atlas_desc *desc)
+static int terrimpi_atlas_desc_ok(const terrimp_live_atlas_desc *desc)
 {
     return terrimpi_within_u32(desc->width, 1u, 32768u) && desc->padding <= 1024u &&
            terrimpi_within_u32(desc->height, 1u, 32768u) &&
@@ -5462,30 +5488,30 @@ static int terrimpi_live_desc_ok(const terrimp_live_atlas_desc *desc)
 
 TERRIMP_API size_t terrimp_live_atlas_bytes(const terrimp_live_atlas_desc *desc)
 {
-    if (!desc || !terrimpi_live_desc_ok(desc))
+    if (!desc || !terrimpi_atlas_desc_ok(desc))
         return 0;
-    return ((size_t)desc->max_slots + terrimpi_live_holes(desc)) * sizeof(terrimp_rect);
+    return ((size_t)desc->max_slots + terrimpi_atlas_free_most(desc)) * sizeof(terrimp_rect);
 }
 
-static void terrimpi_live_reset(terrimp_live_atlas *atlas)
+static void terrimpi_atlas_reset(terrimp_live_atlas *atlas)
 {
     uint32_t i;
     for (i = 0; i < atlas->desc.max_slots; i++)
         atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
-    atlas->holes[0] = terrimpi_live_whole(atlas);
+    atlas->holes[0] = terrimpi_atlas_whole(atlas);
     atlas->hole_count = 1;
     atlas->unused = atlas->slot_end = 0;
     atlas->slot_count = atlas->texels_used = atlas->failures = 0;
 }
 
 /* Sets an atlas up, without its first reset. */
-static void terrimpi_live_init(terrimp_live_atlas *atlas, const terrimp_live_atlas_desc *desc,
-                               void *memory)
+static void terrimpi_atlas_init(terrimp_live_atlas *atlas, const terrimp_live_atlas_desc *desc,
+                                void *memory)
 {
     atlas->desc = *desc;
     atlas->slots = (terrimp_rect *)memory;
     atlas->holes = atlas->slots + desc->max_slots;
-    atlas->max_holes = terrimpi_live_holes(desc);
+    atlas->max_holes = terrimpi_atlas_free_most(desc);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
@@ -5493,16 +5519,17 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
                                                    void *memory, size_t bytes)
 {
     TERRIMPI_REFUSE(!atlas || !desc || !memory, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_live_desc_ok(desc), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_atlas_desc_ok(desc), TERRIMP_E_RANGE);
     TERRIMPI_REFUSE((uintptr_t)memory % 8u != 0, TERRIMP_E_ALIGN);
     TERRIMPI_REFUSE(bytes < terrimp_live_atlas_bytes(desc), TERRIMP_E_MEMORY);
-    terrimpi_live_init(atlas, desc, memory);
-    terrimpi_live_reset(atlas);
+    terrimpi_atlas_init(atlas, desc, memory);
+    terrimpi_atlas_reset(atlas);
     return TERRIMP_OK;
 }
 
 /* The smallest hole that a size fits into, the first of equals; hole_count for none. */
-static uint32_t terrimpi_live_find(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height)
+static uint32_t terrimpi_atlas_find(const terrimp_live_atlas *atlas, uint32_t width,
+                                    uint32_t height)
 {
     uint32_t i, best = atlas->hole_count, best_area = 0xffffffffu;
     if (width > atlas->desc.width || height > atlas->desc.height)
@@ -5521,34 +5548,34 @@ static uint32_t terrimpi_live_find(const terrimp_live_atlas *atlas, uint32_t wid
 }
 
 /* Length that the ranges [a, a + a_size] and [b, b + b_size] have in common. */
-static uint32_t terrimpi_shared(uint32_t a, uint32_t a_size, uint32_t b, uint32_t b_size)
+static uint32_t terrimpi_atlas_shared(uint32_t a, uint32_t a_size, uint32_t b, uint32_t b_size)
 {
     uint32_t low = terrimpi_max_u32(a, b), high = terrimpi_min_u32(a + a_size, b + b_size);
     return high > low ? high - low : 0u;
 }
 
 /* How much of a place's outline lies at slots or at the rim of the atlas. */
-static uint32_t terrimpi_live_contact(const terrimp_live_atlas *atlas, const terrimp_rect *place)
+static uint32_t terrimpi_atlas_contact(const terrimp_live_atlas *atlas, const terrimp_rect *place)
 {
-    terrimp_rect whole = terrimpi_live_whole(atlas);
+    terrimp_rect whole = terrimpi_atlas_whole(atlas);
     uint32_t i, right = place->x + place->width, top = place->y + place->height, length = 0;
     length += (place->x == 0 ? place->height : 0u) + (right == whole.width ? place->height : 0u);
     length += (place->y == 0 ? place->width : 0u) + (top == whole.height ? place->width : 0u);
     for (i = 0; i < atlas->slot_end; i++) {
-        terrimp_rect slot = terrimpi_live_padded(atlas, i);
+        terrimp_rect slot = terrimpi_atlas_padded(atlas, i);
         if (atlas->slots[i].width == 0)
             continue;
         if (slot.x == right || slot.x + slot.width == place->x)
-            length += terrimpi_shared(slot.y, slot.height, place->y, place->height);
+            length += terrimpi_atlas_shared(slot.y, slot.height, place->y, place->height);
         if (slot.y == top || slot.y + slot.height == place->y)
-            length += terrimpi_shared(slot.x, slot.width, place->x, place->width);
+            length += terrimpi_atlas_shared(slot.x, slot.width, place->x, place->width);
     }
     return length;
 }
 
 /* The corner of a hole where a padded size touches most: what stays free is in one piece there. */
-static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
-                                         uint32_t width, uint32_t height)
+static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
+                                          uint32_t width, uint32_t height)
 {
     terrimp_rect best = terrimpi_rect(hole->x, hole->y, width, height);
     uint32_t corner, most = 0;
@@ -5557,7 +5584,7 @@ static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const 
         uint32_t length;
         place.x += corner & 1u ? hole->width - width : 0u;
         place.y += corner & 2u ? hole->height - height : 0u;
-        length = terrimpi_live_contact(atlas, &place);
+        length = terrimpi_atlas_contact(atlas, &place);
         if (length > most) {
             most = length;
             best = place;
@@ -5567,26 +5594,26 @@ static terrimp_rect terrimpi_live_corner(const terrimp_live_atlas *atlas, const 
 }
 
 /* terrimp_live_atlas_alloc of checked arguments. */
-static terrimp_result terrimpi_live_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                          uint32_t height, uint32_t *slot)
+static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                           uint32_t height, uint32_t *slot)
 {
     uint32_t hole, handle;
     terrimp_rect taken, whole;
-    hole = terrimpi_live_find(atlas, width, height);
+    hole = terrimpi_atlas_find(atlas, width, height);
     handle = atlas->unused;
     if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
         atlas->failures++;
         return TERRIMP_E_CAPACITY;
     }
-    taken = terrimpi_live_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
-                                 height + atlas->desc.padding);
+    taken = terrimpi_atlas_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
+                                  height + atlas->desc.padding);
     atlas->unused = atlas->slots[handle].x;
     atlas->slots[handle] = terrimpi_rect(taken.x, taken.y, width, height);
     atlas->slot_end = terrimpi_max_u32(atlas->slot_end, handle + 1u);
     atlas->slot_count++;
     atlas->texels_used += width * height;
-    whole = terrimpi_live_whole(atlas);
-    terrimpi_holes_cut(atlas, 0, &taken, &whole);
+    whole = terrimpi_atlas_whole(atlas);
+    terrimpi_atlas_free_cut(atlas, 0, &taken, &whole);
     *slot = handle;
     return TERRIMP_OK;
 }
@@ -5597,28 +5624,30 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
-    return terrimpi_live_alloc(atlas, width, height, slot);
+    return terrimpi_atlas_alloc(atlas, width, height, slot);
 }
 
 /* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
    contain, which touch it. */
-static void terrimpi_live_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
+static void terrimpi_atlas_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, first = terrimpi_holes_part(atlas, 0, freed), old = atlas->hole_count;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->hole_count;
     int beside;
     /* There is memory for one more: what was cut last has left its place. */
-    atlas->holes[atlas->hole_count++] = terrimpi_live_whole(atlas);
+    atlas->holes[atlas->hole_count++] = terrimpi_atlas_whole(atlas);
     /* What lies beside, above or below cuts most: with it first, the list stays short. */
     for (beside = 1; beside >= 0; beside--)
         for (i = 0; i < atlas->slot_end; i++) {
-            terrimp_rect taken = terrimpi_live_padded(atlas, i);
+            terrimp_rect taken = terrimpi_atlas_padded(atlas, i);
             if (atlas->slots[i].width > 0 &&
-                beside == (terrimpi_shared(taken.x, taken.width, freed->x, freed->width) > 0 ||
-                           terrimpi_shared(taken.y, taken.height, freed->y, freed->height) > 0))
-                terrimpi_holes_cut(atlas, old, &taken, freed);
+                beside == (terrimpi_atlas_shared(taken.x, taken.width, freed->x,
+                                                 freed->width) > 0 ||
+                           terrimpi_atlas_shared(taken.y, taken.height, freed->y,
+                                                 freed->height) > 0))
+                terrimpi_atlas_free_cut(atlas, old, &taken, freed);
         }
-    terrimpi_holes_mark(atlas, first, old, old);
-    terrimpi_holes_compact(atlas, first);
+    terrimpi_atlas_free_mark(atlas, first, old, old);
+    terrimpi_atlas_free_compact(atlas, first);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot)
@@ -5628,18 +5657,18 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
     TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     TERRIMPI_REFUSE(slot >= atlas->desc.max_slots, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(atlas->slots[slot].width == 0, TERRIMP_E_STATE);
-    freed = terrimpi_live_padded(atlas, slot);
+    freed = terrimpi_atlas_padded(atlas, slot);
     atlas->texels_used -= atlas->slots[slot].width * atlas->slots[slot].height;
     atlas->slot_count--;
     atlas->slots[slot] = terrimpi_rect(atlas->unused, 0, 0, 0);
     atlas->unused = slot;
-    terrimpi_live_reclaim(atlas, &freed);
+    terrimpi_atlas_reclaim(atlas, &freed);
     return TERRIMP_OK;
 }
 
 /* terrimp_live_atlas_room of checked arguments. */
-static void terrimpi_live_room(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
-                               uint32_t size[2])
+static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
+                                uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
     for (i = 0; i < atlas->hole_count; i++) {
@@ -5672,7 +5701,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
     TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
     TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
                     !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
-    terrimpi_live_room(atlas, width, height, size);
+    terrimpi_atlas_room(atlas, width, height, size);
     return TERRIMP_OK;
 }
 
@@ -5684,11 +5713,11 @@ TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atl
    any pointer: so nodes can be built in any order, and the arrays can lie in read-only memory and
    change their byte order (room Bake). */
 
-#define TERRIMPI_DIRECTIONS 8u           /* neighbours of a node */
+#define TERRIMPI_TERRAIN_DIRECTIONS 8u           /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
-#define TERRIMPI_WALL_POINTS 4u          /* of the walls round it, for each of these */
-#define TERRIMPI_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
-#define TERRIMPI_INNER_STEPS 0xffffu     /* of those of inner vertices */
+#define TERRIMPI_FLOOR_WALL_POINTS 4u          /* of the walls round it, for each of these */
+#define TERRIMPI_MESH_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
+#define TERRIMPI_MESH_INNER_STEPS 0xffffu     /* of those of inner vertices */
 
 /* What is kept of a node's coarse mesh. Skirts are not stored: they follow from the border loop. */
 typedef struct terrimpi_mesh {
@@ -5704,10 +5733,10 @@ typedef struct terrimpi_mesh {
    height, in steps of the node's own: one extreme sample spoils only the nodes that hold it. Those
    of borders have to meet those of neighbours to the bit: 8 bits along the side, 2 for which side,
    and 22 of height, in steps of the terrain. */
-typedef struct terrimpi_point {
+typedef struct terrimpi_mesh_point_steps {
     uint32_t x, z;
     float height;
-} terrimpi_point;
+} terrimpi_mesh_point_steps;
 
 struct terrimp_terrain {
     uint32_t border_limit, vertex_limit, index_limit; /* of one surface; the last ones are kept */
@@ -5733,7 +5762,7 @@ struct terrimp_terrain {
 
 /* Writes the triangles of a wall along a loop of n vertices, whose rim is the vertices from
    `rim` on. Facing outwards with the rim below, or inwards with the rim above. */
-static void terrimpi_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwards)
+static void terrimpi_terrain_write_wall(uint16_t *t, uint32_t n, uint32_t rim, int inwards)
 {
     uint32_t i;
     for (i = 0; i < n; i++) {
@@ -5780,25 +5809,25 @@ static uint32_t terrimpi_floor_ground_indices(const terrimp_terrain *t)
     return t->tree.level_x[t->floor_level] * t->tree.level_z[t->floor_level] * 6u;
 }
 
-static uint32_t terrimpi_wall_points(const terrimp_terrain *t)
+static uint32_t terrimpi_floor_wall_points(const terrimp_terrain *t)
 {
-    return 2u * TERRIMPI_WALL_POINTS *
+    return 2u * TERRIMPI_FLOOR_WALL_POINTS *
            (t->tree.level_x[t->floor_level] + t->tree.level_z[t->floor_level]);
 }
 
 static uint32_t terrimpi_floor_vertices(const terrimp_terrain *t)
 {
-    return terrimpi_floor_ground_vertices(t) + 2u * terrimpi_wall_points(t);
+    return terrimpi_floor_ground_vertices(t) + 2u * terrimpi_floor_wall_points(t);
 }
 
 static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
 {
-    return terrimpi_floor_ground_indices(t) + 6u * terrimpi_wall_points(t);
+    return terrimpi_floor_ground_indices(t) + 6u * terrimpi_floor_wall_points(t);
 }
 
 /* Inner points that a border keeps: those of 64 quads are the simplifier's default, and a budget
    that is larger or smaller moves them along, since a mesh's triangles go with the square. */
-static uint32_t terrimpi_border_points(uint32_t budget)
+static uint32_t terrimpi_terrain_border_points(uint32_t budget)
 {
     uint32_t points = 1;
     while ((points + 1u) * (points + 1u) * TERRIMP_TRIANGLE_BUDGET <=
@@ -5816,7 +5845,7 @@ static int terrimpi_terrain_count(terrimp_terrain *t)
     skirts = t->desc.no_lower_skirts ? 0u : 1u;
     terrimp_quadtree_init(&t->desc.field, t->desc.chunk_quads, &t->tree);
     /* A surface of n triangles whose border has b vertices has (n + b + 2) / 2 vertices in all. */
-    t->border_limit = 4u * (terrimpi_border_points(budget) + 1u);
+    t->border_limit = 4u * (terrimpi_terrain_border_points(budget) + 1u);
     t->vertex_limit = (budget + t->border_limit + 2u) / 2u;
     t->index_limit = (3u * budget + 3u) / 4u * 4u;
     t->vertex_stride = t->vertex_limit + skirts * t->border_limit;
@@ -5846,16 +5875,16 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 
 /* Where a node lies: its first sample, how many quads of the field it spans, and its tile of every
    2^level-th sample, whose last column and row are the node's last. */
-typedef struct terrimpi_patch {
+typedef struct terrimpi_terrain_tile {
     uint32_t level, x, z, span_x, span_z;
     uint32_t cols, rows;
-} terrimpi_patch;
+} terrimpi_terrain_tile;
 
-static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
+static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, uint32_t node)
 {
     terrimp_node place = terrimpi_tree_node(&t->tree, node);
     uint32_t quads = t->desc.chunk_quads;
-    terrimpi_patch p;
+    terrimpi_terrain_tile p;
     p.level = place.level;
     p.x = terrimpi_tree_col(&t->tree, p.level, place.x * quads);
     p.z = terrimpi_tree_row(&t->tree, p.level, place.z * quads);
@@ -5867,12 +5896,12 @@ static terrimpi_patch terrimpi_patch_of(const terrimp_terrain *t, uint32_t node)
 }
 
 /* World x of a column and z of a row; beyond the far edge, of the last ones. */
-static float terrimpi_world_x(const terrimp_terrain *t, uint32_t column)
+static float terrimpi_terrain_x(const terrimp_terrain *t, uint32_t column)
 {
     return terrimpi_tree_x(&t->tree, 0, column);
 }
 
-static float terrimpi_world_z(const terrimp_terrain *t, uint32_t row)
+static float terrimpi_terrain_z(const terrimp_terrain *t, uint32_t row)
 {
     return terrimpi_tree_z(&t->tree, 0, row);
 }
@@ -5902,7 +5931,7 @@ static float terrimpi_mesh_step(const terrimpi_mesh *mesh)
 }
 
 /* The height that a number of steps stands for, on a border. */
-static float terrimpi_border_height(const terrimp_terrain *t, uint32_t steps)
+static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t steps)
 {
     return t->range_low + t->range_step * (float)steps;
 }
@@ -5914,17 +5943,18 @@ static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
 }
 
 /* Vertex i of a node's mesh. */
-static terrimpi_point terrimpi_mesh_point(const terrimp_terrain *t, const terrimpi_patch *p,
-                                          uint32_t node, uint32_t i)
+static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
+                                                     const terrimpi_terrain_tile *p,
+                                                     uint32_t node, uint32_t i)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
     uint32_t word = t->points[(size_t)terrimpi_real_node(t, node) * t->vertex_limit + i];
-    terrimpi_point point;
+    terrimpi_mesh_point_steps point;
     point.x = word & 0xffu;
     point.z = word >> 8 & 0xffu;
     if (i < terrimpi_mesh_border(mesh)) {
         uint32_t side = point.z & 3u;
-        point.height = terrimpi_border_height(t, word >> 10);
+        point.height = terrimpi_terrain_border_height(t, word >> 10);
         point.z = terrimpi_along_x((int)side) ? side & 1u ? p->rows - 1u : 0u : point.x;
         point.x = terrimpi_along_x((int)side) ? point.x : side & 1u ? p->cols - 1u : 0u;
     } else {
@@ -5942,9 +5972,9 @@ static uint32_t terrimpi_mesh_corner(const terrimp_terrain *t, uint32_t node, ui
 
 /* Whether a range of heights does not overflow, nor squared errors that are summed up over all
    samples. */
-static int terrimpi_range_fits(const terrimp_heightfield *field, float low, float step)
+static int terrimpi_terrain_range_fits(const terrimp_heightfield *field, float low, float step)
 {
-    float range = step * (float)TERRIMPI_BORDER_STEPS;
+    float range = step * (float)TERRIMPI_MESH_BORDER_STEPS;
     return step >= 0.0f && terrimpi_finite(low) && terrimpi_finite(low + range) &&
            terrimpi_finite(range * range * (float)field->width * (float)field->depth);
 }
@@ -5952,8 +5982,8 @@ static int terrimpi_range_fits(const terrimp_heightfield *field, float low, floa
 /* ---- what has been built ---- */
 
 /* What all that give something of a node have to check. */
-static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32_t node,
-                                          const void *out)
+static terrimp_result terrimpi_terrain_check_node(const terrimp_terrain *terrain, uint32_t node,
+                                                  const void *out)
 {
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
@@ -5961,7 +5991,8 @@ static terrimp_result terrimpi_check_node(const terrimp_terrain *terrain, uint32
 }
 
 /* The box of a node: of everything drawn of it and of those below it. */
-static void terrimpi_node_box(const terrimp_terrain *t, const terrimp_node *node, terrimp_box *box)
+static void terrimpi_terrain_node_box(const terrimp_terrain *t, const terrimp_node *node,
+                                      terrimp_box *box)
 {
     const terrimpi_mesh *mesh = &t->meshes[node->number];
     terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
@@ -5971,9 +6002,9 @@ TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrai
                                                    terrimp_box *box)
 {
     terrimp_node place;
-    TERRIMPI_TRY(terrimpi_check_node(terrain, node, box));
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, box));
     place = terrimpi_tree_node(&terrain->tree, node);
-    terrimpi_node_box(terrain, &place, box);
+    terrimpi_terrain_node_box(terrain, &place, box);
     return TERRIMP_OK;
 }
 
@@ -5995,7 +6026,7 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                     terrimp_mesh_info *mesh)
 {
-    TERRIMPI_TRY(terrimpi_check_node(terrain, node, mesh));
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, mesh));
     terrimpi_mesh_place(terrain, node, mesh);
     return TERRIMP_OK;
 }
@@ -6003,14 +6034,16 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
 /* ---- edits ---- */
 
 /* The nodes of a level that some samples belong to: columns and rows, first and last. */
-typedef struct terrimpi_touched {
+typedef struct terrimpi_terrain_touched {
     uint32_t x0, z0, x1, z1;
-} terrimpi_touched;
+} terrimpi_terrain_touched;
 
 /* The nodes of a level that have one of `count` samples from `first` on, or one that is not more
    than `margin` beside them, along one axis of `samples` samples and `nodes` nodes. */
-static void terrimpi_touched_along(uint32_t first, uint32_t count, uint32_t margin, uint32_t side,
-                                   uint32_t samples, uint32_t nodes, uint32_t *from, uint32_t *to)
+static void terrimpi_terrain_touched_along(uint32_t first, uint32_t count, uint32_t margin,
+                                           uint32_t side,
+                                           uint32_t samples, uint32_t nodes, uint32_t *from,
+                                           uint32_t *to)
 {
     uint32_t last = count > samples - first ? samples - 1u : first + count - 1u;
     first = first > margin ? first - margin : 0u;
@@ -6022,20 +6055,22 @@ static void terrimpi_touched_along(uint32_t first, uint32_t count, uint32_t marg
 
 /* What vertices move by hangs on the triangles of two levels above; errors, and how far down skirts
    reach, on what a finer neighbour draws next to the border. */
-static terrimpi_touched terrimpi_touched_nodes(const terrimp_terrain *t, const terrimp_rect *rect,
-                                               uint32_t level, int morph)
+static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_terrain *t,
+                                                               const terrimp_rect *rect,
+                                                               uint32_t level, int morph)
 {
     uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
-    terrimpi_touched out;
-    terrimpi_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
-                           t->tree.level_x[level], &out.x0, &out.x1);
-    terrimpi_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
-                           t->tree.level_z[level], &out.z0, &out.z1);
+    terrimpi_terrain_touched out;
+    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
+                                   t->tree.level_x[level], &out.x0, &out.x1);
+    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
+                                   t->tree.level_z[level], &out.z0, &out.z1);
     return out;
 }
 
-static terrimp_result terrimpi_check_touched(const terrimp_terrain *t, const terrimp_rect *rect)
+static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
+                                                     const terrimp_rect *rect)
 {
     TERRIMPI_REFUSE(!t || !rect, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!t->built, TERRIMP_E_STATE);
@@ -6051,15 +6086,17 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
 {
     uint32_t level, x, z, all = 0;
     TERRIMPI_REFUSE(!count, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
+    TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     for (level = 0; level < terrain->tree.level_count; level++) {
-        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, level,
+                                                                     morph);
         all += (in.x1 - in.x0 + 1u) * (in.z1 - in.z0 + 1u);
     }
     *count = all;
     TERRIMPI_REFUSE(nodes && all > capacity, TERRIMP_E_CAPACITY);
     for (level = 0; nodes && level < terrain->tree.level_count; level++) {
-        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, morph);
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, level,
+                                                                     morph);
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++)
                 *nodes++ = terrimpi_tree_at(&terrain->tree, level, x, z).number;
@@ -6069,32 +6106,32 @@ TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrai
 
 /* ---- the shared index buffer: geomip patterns, then rectangles of quads for captures ---- */
 
-typedef struct terrimpi_pattern {
+typedef struct terrimpi_terrain_pattern {
     uint32_t first_index, index_count;
     uint32_t triangle_count;
     uint32_t x0, z0, x1, z1; /* quads */
-} terrimpi_pattern;
+} terrimpi_terrain_pattern;
 
 /* Widths of the strips of neighbours that a capture can draw: a 16th of the node, then twice as
    many quads each time, then the whole neighbour. */
-static uint32_t terrimpi_strip_quads(uint32_t chunk_quads, uint32_t width)
+static uint32_t terrimpi_terrain_apron_quads(uint32_t chunk_quads, uint32_t width)
 {
     uint32_t quads = terrimpi_max_u32(1u, chunk_quads / 16u) << width;
     return terrimpi_min_u32(quads, chunk_quads);
 }
 
-static uint32_t terrimpi_strip_count(uint32_t chunk_quads)
+static uint32_t terrimpi_terrain_apron_count(uint32_t chunk_quads)
 {
     uint32_t count = 0;
-    while (terrimpi_strip_quads(chunk_quads, count) < chunk_quads)
+    while (terrimpi_terrain_apron_quads(chunk_quads, count) < chunk_quads)
         count++;
     return count;
 }
 
 /* The quads of a neighbour that lie within `strip` quads of the node, along one axis on which it is
    before (0), beside (1) or behind (2) the node. */
-static void terrimpi_strip_span(uint32_t place, uint32_t quads, uint32_t strip, uint32_t *from,
-                                uint32_t *to)
+static void terrimpi_terrain_apron_span(uint32_t place, uint32_t quads, uint32_t strip,
+                                        uint32_t *from, uint32_t *to)
 {
     *from = place == 0 ? quads - strip : 0;
     *to = place == 2u ? strip : quads;
@@ -6103,10 +6140,10 @@ static void terrimpi_strip_span(uint32_t place, uint32_t quads, uint32_t strip, 
 /* Pattern 0 is the whole node, as geomip pattern 0; then come, for each strip width but the whole,
    the strips of the eight neighbours, behind all geomip patterns. Returns where pattern `wanted`
    stands, or with 0xffffffffu the end of all. */
-static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
+static terrimpi_terrain_pattern terrimpi_terrain_pattern_of(uint32_t quads, uint32_t wanted)
 {
-    terrimpi_pattern p;
-    uint32_t width, strip = 0, direction = (wanted - 1u) % TERRIMPI_DIRECTIONS, k;
+    terrimpi_terrain_pattern p;
+    uint32_t width, strip = 0, direction = (wanted - 1u) % TERRIMPI_TERRAIN_DIRECTIONS, k;
     p.x0 = p.z0 = p.first_index = 0;
     p.x1 = p.z1 = quads;
     p.index_count = terrimpi_mip_indices(quads, TERRIMP_FORM_LIST, 0);
@@ -6116,17 +6153,17 @@ static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
     /* each of the 16 patterns as pattern 0, but half of the 64 sides coarse */
     p.first_index = 16u * p.index_count - 32u * 3u * (quads / 2u);
     p.index_count = p.triangle_count = 0;
-    for (width = 0; width <= (wanted - 1u) / TERRIMPI_DIRECTIONS; width++) {
+    for (width = 0; width <= (wanted - 1u) / TERRIMPI_TERRAIN_DIRECTIONS; width++) {
         p.first_index += 24u * strip * (strip + quads); /* corners, and whole sides */
-        strip = terrimpi_strip_quads(quads, width);
+        strip = terrimpi_terrain_apron_quads(quads, width);
         if (strip == quads)
             return p;
     }
     for (k = 0; k <= direction; k++) {
         uint32_t cell = k < 4u ? k : k + 1u; /* of 3 x 3, row by row, without the middle */
         p.first_index += p.index_count;
-        terrimpi_strip_span(cell % 3u, quads, strip, &p.x0, &p.x1);
-        terrimpi_strip_span(cell / 3u, quads, strip, &p.z0, &p.z1);
+        terrimpi_terrain_apron_span(cell % 3u, quads, strip, &p.x0, &p.x1);
+        terrimpi_terrain_apron_span(cell / 3u, quads, strip, &p.z0, &p.z1);
         p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
         p.index_count = 3u * p.triangle_count;
     }
@@ -6134,14 +6171,16 @@ static terrimpi_pattern terrimpi_find_pattern(uint32_t quads, uint32_t wanted)
 }
 
 /* The pattern of a neighbour's strip. */
-static uint32_t terrimpi_strip_pattern(uint32_t quads, uint32_t width, uint32_t direction)
+static uint32_t terrimpi_terrain_apron_pattern(uint32_t quads, uint32_t width, uint32_t direction)
 {
-    return width < terrimpi_strip_count(quads) ? 1u + width * TERRIMPI_DIRECTIONS + direction : 0u;
+    return width < terrimpi_terrain_apron_count(quads) ? 1u + width * TERRIMPI_TERRAIN_DIRECTIONS +
+        direction : 0u;
 }
 
 /* Writes the triangles of a rectangle of quads in columns of 14 quads, row by row within a column,
    so that a vertex cache of 16 entries still holds the row above. */
-static void terrimpi_emit_quads(uint16_t *out, const terrimpi_pattern *p, uint32_t row_vertices)
+static void terrimpi_terrain_write_quads(uint16_t *out, const terrimpi_terrain_pattern *p,
+                                         uint32_t row_vertices)
 {
     uint32_t column, x, z;
     for (column = p->x0; column < p->x1; column += 14u)
@@ -6178,7 +6217,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->level_count = tree->level_count;
     info->node_count = tree->node_count;
     info->ground_vertex_count = (quads + 1u) * (quads + 1u);
-    info->ground_index_count = terrimpi_find_pattern(quads, 0xffffffffu).first_index;
+    info->ground_index_count = terrimpi_terrain_pattern_of(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
     info->floor_vertex_count = terrimpi_floor_vertices(terrain);
@@ -6187,7 +6226,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->mesh_index_count = tree->node_count * terrain->index_stride + info->floor_index_count;
     info->mesh_triangle_count = terrain->mesh_triangle_count;
     root = terrimpi_tree_root(tree);
-    terrimpi_node_box(terrain, &root, &info->box);
+    terrimpi_terrain_node_box(terrain, &root, &info->box);
     return TERRIMP_OK;
 }
 
@@ -6198,18 +6237,18 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_indices(const terrimp_terrain *t
     TERRIMPI_REFUSE(!terrain || !indices, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     quads = terrain->desc.chunk_quads;
-    TERRIMPI_REFUSE(capacity < terrimpi_find_pattern(quads, 0xffffffffu).first_index,
+    TERRIMPI_REFUSE(capacity < terrimpi_terrain_pattern_of(quads, 0xffffffffu).first_index,
                     TERRIMP_E_CAPACITY);
     terrimp_pattern_fill(quads, TERRIMP_FORM_LIST, indices, capacity);
-    strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
+    strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
     for (i = 1; i <= strips; i++) {
-        terrimpi_pattern p = terrimpi_find_pattern(quads, i);
-        terrimpi_emit_quads(indices + p.first_index, &p, quads + 1u);
+        terrimpi_terrain_pattern p = terrimpi_terrain_pattern_of(quads, i);
+        terrimpi_terrain_write_quads(indices + p.first_index, &p, quads + 1u);
     }
     return TERRIMP_OK;
 }
 
-static size_t terrimpi_ground_vertices(const terrimp_terrain *t)
+static size_t terrimpi_terrain_ground_vertices(const terrimp_terrain *t)
 {
     return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
@@ -6217,8 +6256,8 @@ static size_t terrimpi_ground_vertices(const terrimp_terrain *t)
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
-    TERRIMPI_TRY(terrimpi_check_node(terrain, node, xyz));
-    TERRIMPI_REFUSE(capacity < 3u * terrimpi_ground_vertices(terrain), TERRIMP_E_CAPACITY);
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, xyz));
+    TERRIMPI_REFUSE(capacity < 3u * terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
 }
 
@@ -6227,42 +6266,43 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity)
 {
-    TERRIMPI_TRY(terrimpi_check_node(terrain, node, vertices));
-    TERRIMPI_REFUSE(capacity < terrimpi_ground_vertices(terrain), TERRIMP_E_CAPACITY);
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, vertices));
+    TERRIMPI_REFUSE(capacity < terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
 }
 
 /* Writes the floor's ground: a quad for each node of its level. A corner has the height of the
    lowest sample of the up to four nodes around it, so no quad rises over a sample of its node; and
    nodes share their corners, so it has no gap. */
-static void terrimpi_fill_floor_ground(const terrimp_terrain *t, float *xyz, uint16_t *indices)
+static void terrimpi_floor_write_ground(const terrimp_terrain *t, float *xyz, uint16_t *indices)
 {
     uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
     uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level], x, z, i, k;
     const terrimp_geomip_node *nodes = t->tree.nodes + t->tree.level_first[level];
-    terrimpi_pattern all;
+    terrimpi_terrain_pattern all;
     for (z = 0; z <= deep; z++)
         for (x = 0; x <= wide; x++) {
             float low = TERRIMPI_FLOAT_MAX;
             for (k = z ? z - 1u : 0; k <= terrimpi_min_u32(z, deep - 1u); k++)
                 for (i = x ? x - 1u : 0; i <= terrimpi_min_u32(x, wide - 1u); i++)
                     low = terrimpi_min(low, nodes[k * wide + i].low);
-            *xyz++ = terrimpi_world_x(t, x * quads);
+            *xyz++ = terrimpi_terrain_x(t, x * quads);
             *xyz++ = low;
-            *xyz++ = terrimpi_world_z(t, z * quads);
+            *xyz++ = terrimpi_terrain_z(t, z * quads);
         }
     memset(&all, 0, sizeof all);
     all.x1 = wide;
     all.z1 = deep;
-    terrimpi_emit_quads(indices, &all, wide + 1u);
+    terrimpi_terrain_write_quads(indices, &all, wide + 1u);
 }
 
 /* The sample of point k of the floor's walls, round the outer border as round a mesh's. */
-static void terrimpi_wall_place(const terrimp_terrain *t, uint32_t k, uint32_t *x, uint32_t *z)
+static void terrimpi_floor_wall_place(const terrimp_terrain *t, uint32_t k, uint32_t *x,
+                                      uint32_t *z)
 {
     uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
-    uint32_t along_x = t->tree.level_x[level] * TERRIMPI_WALL_POINTS;
-    uint32_t along_z = t->tree.level_z[level] * TERRIMPI_WALL_POINTS, col, row;
+    uint32_t along_x = t->tree.level_x[level] * TERRIMPI_FLOOR_WALL_POINTS;
+    uint32_t along_z = t->tree.level_z[level] * TERRIMPI_FLOOR_WALL_POINTS, col, row;
     k %= 2u * (along_x + along_z);
     col = k < along_z                  ? 0
           : k < along_z + along_x      ? k - along_z
@@ -6272,12 +6312,13 @@ static void terrimpi_wall_place(const terrimp_terrain *t, uint32_t k, uint32_t *
           : k < along_z + along_x      ? along_z
           : k < 2u * along_z + along_x ? 2u * along_z + along_x - k
                                        : 0;
-    *x = terrimpi_min_u32(col * quads / TERRIMPI_WALL_POINTS, t->desc.field.width - 1u);
-    *z = terrimpi_min_u32(row * quads / TERRIMPI_WALL_POINTS, t->desc.field.depth - 1u);
+    *x = terrimpi_min_u32(col * quads / TERRIMPI_FLOOR_WALL_POINTS, t->desc.field.width - 1u);
+    *z = terrimpi_min_u32(row * quads / TERRIMPI_FLOOR_WALL_POINTS, t->desc.field.depth - 1u);
 }
 
 /* The lowest sample of a rectangle that two of its corners span. */
-static float terrimpi_lowest(const terrimp_terrain *t, const uint32_t a[2], const uint32_t b[2])
+static float terrimpi_terrain_lowest(const terrimp_terrain *t, const uint32_t a[2],
+                                     const uint32_t b[2])
 {
     float low, high;
     terrimp_rect r;
@@ -6285,32 +6326,33 @@ static float terrimpi_lowest(const terrimp_terrain *t, const uint32_t a[2], cons
     r.y = terrimpi_min_u32(a[1], b[1]);
     r.width = terrimpi_max_u32(a[0], b[0]) - r.x + 1u;
     r.height = terrimpi_max_u32(a[1], b[1]) - r.y + 1u;
-    return terrimpi_height_range(&t->desc.field, r, 0, &low, &high) == TERRIMP_OK
+    return terrimpi_field_range(&t->desc.field, r, 0, &low, &high) == TERRIMP_OK
                ? low : t->sample_low;
 }
 
 /* Writes the floor and its walls. These stand on the outer border and face inwards, from below the
    floor up to the lowest samples between the points beside, so nowhere over the border. */
-static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *indices)
+static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t *indices)
 {
     uint32_t ground = terrimpi_floor_ground_vertices(t), i, k, points;
     uint32_t first = terrimpi_floor_ground_indices(t);
     terrimp_node root = terrimpi_tree_root(&t->tree);
-    points = terrimpi_wall_points(t);
-    terrimpi_fill_floor_ground(t, xyz, indices);
+    points = terrimpi_floor_wall_points(t);
+    terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
         uint32_t before[2], at[2], after[2];
         float *top = xyz + 3u * (points + k);
-        terrimpi_wall_place(t, k + points - 1u, &before[0], &before[1]);
-        terrimpi_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_wall_place(t, k + 1u, &after[0], &after[1]);
-        xyz[3u * k] = top[0] = terrimpi_world_x(t, at[0]);
+        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
+        terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
+        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
+        xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
         xyz[3u * k + 1u] = t->meshes[root.number].low;
-        xyz[3u * k + 2u] = top[2] = terrimpi_world_z(t, at[1]);
-        top[1] = terrimpi_min(terrimpi_lowest(t, before, at), terrimpi_lowest(t, at, after));
+        xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
+        top[1] = terrimpi_min(terrimpi_terrain_lowest(t, before, at),
+                              terrimpi_terrain_lowest(t, at, after));
     }
-    terrimpi_write_wall(indices + first, points, points, 1);
+    terrimpi_terrain_write_wall(indices + first, points, points, 1);
     for (i = first; i < terrimpi_floor_indices(t); i++)
         indices[i] = (uint16_t)(indices[i] + ground);
 }
@@ -6319,13 +6361,13 @@ static void terrimpi_fill_floor(const terrimp_terrain *t, float *xyz, uint16_t *
    it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
    beside it would end below that. So the line of feet is below every sample, and no neighbour
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
-   (terrimpi_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
+   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
    there. When one of them is within D of L, both end at L <= s; else each hangs by D or, since then
    L is deeper, by more, and the line is <= s + e - D <= s - e.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
-static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
-                                 uint32_t i)
+static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
+                                      uint32_t i)
 {
     const terrimp_geomip_node *range = &t->tree.nodes[node];
     uint32_t n = terrimpi_mesh_border(&t->meshes[node]);
@@ -6339,10 +6381,10 @@ static float terrimpi_skirt_foot(const terrimp_terrain *t, uint32_t node, const 
 }
 
 /* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
-static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *xyz,
-                               uint16_t *indices)
+static void terrimpi_mesh_write(const terrimp_terrain *t, uint32_t node, float *xyz,
+                                uint16_t *indices)
 {
-    terrimpi_patch p = terrimpi_patch_of(t, node);
+    terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     uint32_t border = terrimpi_mesh_border(&t->meshes[node]), i;
     uint32_t vertices = terrimpi_mesh_vertices(&t->meshes[node]);
     uint32_t index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
@@ -6350,10 +6392,11 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
     for (i = 0; i < vertices; i++) {
-        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
-        xyz[i * 3u] = terrimpi_world_x(t, p.x + terrimpi_lattice(point.x, p.level, p.span_x));
+        terrimpi_mesh_point_steps point = terrimpi_mesh_point(t, &p, node, i);
+        xyz[i * 3u] = terrimpi_terrain_x(t, p.x + terrimpi_lattice(point.x, p.level, p.span_x));
         xyz[i * 3u + 1u] = point.height;
-        xyz[i * 3u + 2u] = terrimpi_world_z(t, p.z + terrimpi_lattice(point.z, p.level, p.span_z));
+        xyz[i * 3u + 2u] = terrimpi_terrain_z(t,
+                                              p.z + terrimpi_lattice(point.z, p.level, p.span_z));
     }
     for (i = 0; i < index_count; i++)
         indices[i] = (uint16_t)terrimpi_mesh_corner(t, node, i);
@@ -6361,8 +6404,8 @@ static void terrimpi_fill_mesh(const terrimp_terrain *t, uint32_t node, float *x
         return;
     memcpy(rim, xyz, (size_t)border * 3u * sizeof *rim);
     for (i = 0; i < border; i++)
-        rim[i * 3u + 1u] = terrimpi_skirt_foot(t, node, xyz, i);
-    terrimpi_write_wall(indices + index_count, border, vertices, 0);
+        rim[i * 3u + 1u] = terrimpi_mesh_skirt_foot(t, node, xyz, i);
+    terrimpi_terrain_write_wall(indices + index_count, border, vertices, 0);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terrain, uint32_t node,
@@ -6380,9 +6423,9 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
                     index_capacity < index_count, TERRIMP_E_CAPACITY);
     if (is_floor)
-        terrimpi_fill_floor(terrain, xyz, indices);
+        terrimpi_floor_write(terrain, xyz, indices);
     else
-        terrimpi_fill_mesh(terrain, node, xyz, indices);
+        terrimpi_mesh_write(terrain, node, xyz, indices);
     return TERRIMP_OK;
 }
 
@@ -6392,29 +6435,29 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
 {
     size_t node, vertex_stride, index_stride;
     TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_node(terrain, 0, xyz));
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, 0, xyz));
     vertex_stride = terrain->vertex_stride;
     index_stride = terrain->index_stride;
     node = terrain->tree.node_count;
     if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_vertices(terrain) ||
         index_capacity < node * index_stride + terrimpi_floor_indices(terrain))
         return TERRIMP_E_CAPACITY;
-    terrimpi_fill_floor(terrain, xyz + 3u * node * vertex_stride, indices + node * index_stride);
+    terrimpi_floor_write(terrain, xyz + 3u * node * vertex_stride, indices + node * index_stride);
     while (node-- > 0)
-        terrimpi_fill_mesh(terrain, (uint32_t)node, xyz + 3u * node * vertex_stride,
-                           indices + node * index_stride);
+        terrimpi_mesh_write(terrain, (uint32_t)node, xyz + 3u * node * vertex_stride,
+                            indices + node * index_stride);
     return TERRIMP_OK;
 }
 
 #ifndef TERRIMP_NO_MALLOC
 
-static void *terrimpi_default_allocate(void *user, size_t bytes)
+static void *terrimpi_terrain_default_allocate(void *user, size_t bytes)
 {
     (void)user;
     return TERRIMP_MALLOC(bytes);
 }
 
-static void terrimpi_default_release(void *user, void *pointer, size_t bytes)
+static void terrimpi_terrain_default_release(void *user, void *pointer, size_t bytes)
 {
     (void)user;
     (void)bytes;
@@ -6422,15 +6465,15 @@ static void terrimpi_default_release(void *user, void *pointer, size_t bytes)
 }
 
 /* The allocator to use; returns 0 when one of its functions is missing. */
-static int terrimpi_pick_allocator(const terrimp_allocator *wanted, terrimp_allocator *out)
+static int terrimpi_terrain_allocator(const terrimp_allocator *wanted, terrimp_allocator *out)
 {
     if (wanted) {
         *out = *wanted;
         return out->allocate && out->release;
     }
     out->user = NULL;
-    out->allocate = terrimpi_default_allocate;
-    out->release = terrimpi_default_release;
+    out->allocate = terrimpi_terrain_default_allocate;
+    out->release = terrimpi_terrain_default_release;
     return 1;
 }
 
@@ -6471,12 +6514,12 @@ typedef struct terrimpi_bake {
 
 /* Fowler, Noll and Vo's hash, a word at a time: no changed word goes unseen, nor two that are
    exchanged. */
-static uint32_t terrimpi_hash(uint32_t hash, uint32_t word)
+static uint32_t terrimpi_bake_hash_word(uint32_t hash, uint32_t word)
 {
     return (hash ^ word) * 16777619u;
 }
 
-static uint32_t terrimpi_float_bits(float value)
+static uint32_t terrimpi_bake_float_bits(float value)
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
@@ -6491,18 +6534,20 @@ static uint32_t terrimpi_bake_hash(const void *block)
     memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
     for (bytes -= (uint32_t)offsetof(terrimpi_bake, width); bytes >= 4u; bytes -= 4u, at += 4) {
         memcpy(&word, at, sizeof word);
-        hash = terrimpi_hash(hash, word);
+        hash = terrimpi_bake_hash_word(hash, word);
     }
     return hash;
 }
 
 /* The checksum of a heightfield's samples, whatever their byte order and the length of rows. */
-static uint32_t terrimpi_samples_hash(const terrimp_heightfield *field)
+static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
 {
     uint32_t hash = 2166136261u, x, z;
     for (z = 0; z < field->depth; z++)
         for (x = 0; x < field->width; x++)
-            hash = terrimpi_hash(hash, terrimpi_float_bits(terrimpi_raw(field, x, z)));
+            hash = terrimpi_bake_hash_word(hash,
+                                           terrimpi_bake_float_bits(terrimpi_field_raw(field, x,
+                                                                                       z)));
     return hash;
 }
 
@@ -6548,7 +6593,7 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     return bake->node_count == t->tree.node_count && bake->vertex_limit == t->vertex_limit &&
            bake->index_limit == t->index_limit && terrimpi_finite(t->sample_low) &&
            terrimpi_finite(t->sample_high) &&
-           terrimpi_range_fits(&t->desc.field, t->range_low, t->range_step);
+           terrimpi_terrain_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
 /* Sets the arrays of a terrain to those of a bake. Only reading functions touch them then. */
@@ -6558,11 +6603,12 @@ static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
 }
 
 /* Whether the border runs once round the tile, counter-clockwise seen from above, from (0, 0). */
-static int terrimpi_loop_ok(const terrimp_terrain *t, const terrimpi_patch *tile, uint32_t node)
+static int terrimpi_bake_loop_ok(const terrimp_terrain *t, const terrimpi_terrain_tile *tile,
+                                 uint32_t node)
 {
     uint32_t i, count = terrimpi_mesh_border(&t->meshes[node]);
     uint32_t last_x = tile->cols - 1u, last_z = tile->rows - 1u;
-    terrimpi_point p = terrimpi_mesh_point(t, tile, node, 0), q;
+    terrimpi_mesh_point_steps p = terrimpi_mesh_point(t, tile, node, 0), q;
     if (p.x != 0 || p.z != 0)
         return 0;
     for (i = 0; i < count; i++, p = q) {
@@ -6579,33 +6625,34 @@ static int terrimpi_loop_ok(const terrimp_terrain *t, const terrimpi_patch *tile
 }
 
 /* A number for a directed edge that has nothing to do with those of others. */
-static uint32_t terrimpi_edge_hash(uint32_t from, uint32_t to)
+static uint32_t terrimpi_bake_edge_hash(uint32_t from, uint32_t to)
 {
-    uint32_t hash = terrimpi_hash(0, from << 8 | to);
-    hash = terrimpi_hash(hash >> 15, hash);
-    return terrimpi_hash(hash >> 13, hash);
+    uint32_t hash = terrimpi_bake_hash_word(0, from << 8 | to);
+    hash = terrimpi_bake_hash_word(hash >> 15, hash);
+    return terrimpi_bake_hash_word(hash >> 13, hash);
 }
 
 /* What an edge adds to the sum over a surface; the same edge the other way takes it off. */
-static uint32_t terrimpi_edge_sum(uint32_t from, uint32_t to)
+static uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
 {
-    return terrimpi_edge_hash(from, to) - terrimpi_edge_hash(to, from);
+    return terrimpi_bake_edge_hash(from, to) - terrimpi_bake_edge_hash(to, from);
 }
 
 /* Whether the triangles of a surface face up, have corners that exist, and cover its node: that
    inner edges have two sides, and border edges one, is told from a sum over all. */
-static int terrimpi_corners_ok(const terrimp_terrain *t, const terrimpi_patch *p, uint32_t node)
+static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                    uint32_t node)
 {
     const terrimpi_mesh *mesh = &t->meshes[node];
     int64_t all = 0;
     uint32_t i, k, edges = 0, border = terrimpi_mesh_border(mesh);
     for (i = 0; i < border; i++)
-        edges -= terrimpi_edge_sum(i, i + 1u < border ? i + 1u : 0u);
+        edges -= terrimpi_bake_edge_sum(i, i + 1u < border ? i + 1u : 0u);
     for (i = 0; i < terrimpi_mesh_triangles(mesh); i++) {
         uint32_t corner[3];
         int64_t at[3][2], area;
         for (k = 0; k < 3u; k++) {
-            terrimpi_point point;
+            terrimpi_mesh_point_steps point;
             corner[k] = terrimpi_mesh_corner(t, node, 3u * i + k);
             if (corner[k] >= terrimpi_mesh_vertices(mesh))
                 return 0;
@@ -6618,13 +6665,13 @@ static int terrimpi_corners_ok(const terrimp_terrain *t, const terrimpi_patch *p
             return 0;
         all += area;
         for (k = 0; k < 3u; k++)
-            edges += terrimpi_edge_sum(corner[k], corner[k == 2u ? 0 : k + 1u]);
+            edges += terrimpi_bake_edge_sum(corner[k], corner[k == 2u ? 0 : k + 1u]);
     }
     return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
 
 /* Whether all numbers of one node are what building could have made. */
-static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
+static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
 {
     const terrimp_geomip_node *ground = &t->tree.nodes[node];
     const terrimpi_mesh *mesh = &t->meshes[node];
@@ -6632,7 +6679,7 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
     float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
     uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
     uint32_t triangles = terrimpi_mesh_triangles(mesh);
-    terrimpi_patch p = terrimpi_patch_of(t, node);
+    terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     if (!terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
         !terrimpi_within(mesh->error, 0.0f, most) ||
         !terrimpi_within(mesh->error_rms, 0.0f, most) ||
@@ -6644,16 +6691,16 @@ static int terrimpi_node_ok(const terrimp_terrain *t, uint32_t node)
         vertices > t->vertex_limit || triangles < 2u || triangles > t->desc.triangle_budget)
         return 0;
     for (i = 0; i < vertices; i++) {
-        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        terrimpi_mesh_point_steps point = terrimpi_mesh_point(t, &p, node, i);
         if (point.x >= p.cols || point.z >= p.rows ||
             !(point.height + slack >= mesh->low && point.height - slack <= mesh->high))
             return 0;
     }
-    return terrimpi_loop_ok(t, &p, node) && terrimpi_corners_ok(t, &p, node);
+    return terrimpi_bake_loop_ok(t, &p, node) && terrimpi_bake_corners_ok(t, &p, node);
 }
 
 /* Whether a node is held by its parent. */
-static int terrimpi_parent_ok(const terrimp_terrain *t, uint32_t node)
+static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
     uint32_t parent =
         node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
@@ -6684,7 +6731,7 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
                               field->height_offset != f->height_offset), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
     for (node = 0; node < t->tree.node_count; node++) {
-        if (!terrimpi_node_ok(t, node) || !terrimpi_parent_ok(t, node))
+        if (!terrimpi_bake_node_ok(t, node) || !terrimpi_bake_parent_ok(t, node))
             return TERRIMP_E_BAKE;
         triangles += terrimpi_mesh_triangles(&t->meshes[node]);
     }
@@ -6702,7 +6749,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
         TERRIMPI_TRY(terrimp_heightfield_resolve(field, &resolved));
     TERRIMPI_TRY(terrimpi_bake_read(block, bytes, field ? &resolved : NULL, &t));
     memcpy(&bake, block, sizeof bake);
-    TERRIMPI_REFUSE(field && terrimpi_samples_hash(&resolved) != bake.samples, TERRIMP_E_BAKE);
+    TERRIMPI_REFUSE(field && terrimpi_bake_hash_samples(&resolved) != bake.samples, TERRIMP_E_BAKE);
     if (!info)
         return TERRIMP_OK;
     info->bytes = bake.bytes;
@@ -6825,8 +6872,8 @@ static uint32_t terrimpi_horizon_last(const terrimp_quadtree *tree, uint32_t axi
 static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
                                      uint32_t other)
 {
-    return axis == 0 ? terrimpi_sample(&h->tree->field, line, other)
-                     : terrimpi_sample(&h->tree->field, other, line);
+    return axis == 0 ? terrimpi_field_sample(&h->tree->field, line, other)
+                     : terrimpi_field_sample(&h->tree->field, other, line);
 }
 
 /* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
@@ -7170,10 +7217,10 @@ static float terrimpi_horizon_ground_top(const terrimp_horizon *h, const float r
     }
     for (j = from[1]; j <= to[1]; j++)
         for (i = from[0]; i <= to[0]; i++) {
-            float a = terrimpi_sample(&h->tree->field, i, j), u, v, low, high;
-            float b = terrimpi_sample(&h->tree->field, i + 1u, j);
-            float c = terrimpi_sample(&h->tree->field, i, j + 1u);
-            float d = terrimpi_sample(&h->tree->field, i + 1u, j + 1u);
+            float a = terrimpi_field_sample(&h->tree->field, i, j), u, v, low, high;
+            float b = terrimpi_field_sample(&h->tree->field, i + 1u, j);
+            float c = terrimpi_field_sample(&h->tree->field, i, j + 1u);
+            float d = terrimpi_field_sample(&h->tree->field, i + 1u, j + 1u);
             u = (float)((int32_t)h->quad[0] - (int32_t)i) + h->within[0];
             v = (float)((int32_t)h->quad[1] - (int32_t)j) + h->within[1];
             low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
@@ -7208,16 +7255,16 @@ static int terrimpi_horizon_clip(terrimp_horizon *h, const terrimp_capture *c)
 }
 
 /* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
-static int terrimpi_horizon_stand(terrimp_horizon *h, const float eye[3])
+static int terrimpi_horizon_set_eye(terrimp_horizon *h, const float eye[3])
 {
     const terrimp_heightfield *field = &h->tree->field;
     float x, z, right, down;
-    if (!terrimpi_locate(field, eye[0], eye[2], &h->quad[0], &h->quad[1]))
+    if (!terrimpi_field_locate(field, eye[0], eye[2], &h->quad[0], &h->quad[1]))
         return 0;
-    x = terrimpi_line(field->origin_x, field->spacing_x, h->quad[0]);
-    z = terrimpi_line(field->origin_z, field->spacing_z, h->quad[1]);
-    right = terrimpi_line(field->origin_x, field->spacing_x, field->width - 1u);
-    down = terrimpi_line(field->origin_z, field->spacing_z, field->depth - 1u);
+    x = terrimpi_field_line(field->origin_x, field->spacing_x, h->quad[0]);
+    z = terrimpi_field_line(field->origin_z, field->spacing_z, h->quad[1]);
+    right = terrimpi_field_line(field->origin_x, field->spacing_x, field->width - 1u);
+    down = terrimpi_field_line(field->origin_z, field->spacing_z, field->depth - 1u);
     h->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
     h->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
     x = terrimpi_max(terrimpi_abs(field->origin_x), terrimpi_abs(right)) / field->spacing_x;
@@ -7247,7 +7294,7 @@ static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *t
     h->spread = TERRIMP_SQRTF(tree->field.spacing_x * tree->field.spacing_x +
                               tree->field.spacing_z * tree->field.spacing_z);
     terrimpi_camera_capture(camera, &capture);
-    h->blind = !terrimpi_horizon_stand(h, camera->eye) ||
+    h->blind = !terrimpi_horizon_set_eye(h, camera->eye) ||
                terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) !=
                    TERRIMP_OK || h->eye <= ground + h->low || !terrimpi_horizon_clip(h, &capture);
     if (h->blind)
@@ -7279,7 +7326,8 @@ TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
 /* How far a node may be drawn off its samples: as it is, or as its parent when it morphs. At the
    far edges drawn triangles may cross those of the samples: there it can be anything between the
    heights of the node. */
-static float terrimpi_node_error(const terrimp_quadtree *tree, const terrimp_node *n, int morphs)
+static float terrimpi_horizon_node_error(const terrimp_quadtree *tree, const terrimp_node *n,
+                                         int morphs)
 {
     const terrimp_geomip_node *nodes = tree->nodes;
     uint32_t quads = tree->chunk_quads << n->level, part = (1u << n->level) - 1u;
@@ -7293,31 +7341,33 @@ static float terrimpi_node_error(const terrimp_quadtree *tree, const terrimp_nod
 }
 
 /* The same for a draw, which at coarse borders is drawn as those beside it. */
-static float terrimpi_draw_error(const terrimp_quadtree *tree, const terrimp_geomip_draw *draw,
-                                 int morphs)
+static float terrimpi_horizon_draw_error(const terrimp_quadtree *tree,
+                                         const terrimp_geomip_draw *draw, int morphs)
 {
     terrimp_node n = draw->node, beyond;
-    float error = terrimpi_node_error(tree, &n, morphs);
+    float error = terrimpi_horizon_node_error(tree, &n, morphs);
     int side;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         if (!(draw->pattern >> side & 1u) || !terrimpi_tree_beyond(tree, &n, side, &beyond))
             continue;
         beyond = terrimpi_tree_parent(tree, &beyond);
-        error = terrimpi_max(error, terrimpi_node_error(tree, &beyond, morphs));
+        error = terrimpi_max(error, terrimpi_horizon_node_error(tree, &beyond, morphs));
     }
     return error;
 }
 
 /* The two bounds that a horizon wants: close to the eye one of height, else one over distance. */
-static void terrimpi_draws_error(const terrimp_quadtree *tree, const terrimp_geomip_view *view,
-                                 const float eye[3], float *error, float *low)
+static void terrimpi_horizon_draws_error(const terrimp_quadtree *tree,
+                                         const terrimp_geomip_view *view,
+                                         const float eye[3], float *error, float *low)
 {
     float side = (float)tree->chunk_quads *
                  terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
     uint32_t i;
     *error = *low = 0.0f;
     for (i = 0; i < view->draw_count; i++) {
-        float off = terrimpi_draw_error(tree, &view->draws[i], view->morph_ratio > 1.0f), distance;
+        float off = terrimpi_horizon_draw_error(tree, &view->draws[i],
+                                                view->morph_ratio > 1.0f), distance;
         terrimp_box box;
         terrimpi_mip_box(tree, &view->draws[i].node, &box);
         distance = terrimp_box_distance(&box, eye);
@@ -7339,12 +7389,12 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
     TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
-    terrimpi_draws_error(tree, view, c.eye, &error, &low);
+    terrimpi_horizon_draws_error(tree, view, c.eye, &error, &low);
     terrimpi_horizon_begin(horizon, tree, walls, &c, terrimpi_min(error, 0.5f), low);
     horizon->blind |= error > 0.5f;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
-        float off = terrimpi_draw_error(tree, draw, view->morph_ratio > 1.0f);
+        float off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
         if (terrimpi_horizon_hides_node(horizon, &draw->node, off))
             view->triangle_count -= terrimpi_mip_triangles(tree->chunk_quads, draw->pattern);
         else
@@ -7377,7 +7427,7 @@ typedef struct terrimpi_capture_plan {
     float z_near[TERRIMPI_CAPTURE_LAYERS], z_far[TERRIMPI_CAPTURE_LAYERS];
     uint32_t layer_count;
     uint32_t source;        /* level of the ground that is drawn */
-    uint32_t border;        /* its width: see terrimpi_strip_quads */
+    uint32_t border;        /* its width: see terrimpi_terrain_apron_quads */
 } terrimpi_capture_plan;
 
 /* Ground of the source level: a whole node, or the part of one that lies in the border. */
@@ -7395,8 +7445,8 @@ static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], cons
                                 terrimp_capture *camera, uint32_t size[2])
 {
     float width, height;
-    if (terrimpi_capture_fit(box, eye, camera) != TERRIMP_OK ||
-        !terrimpi_capture_tighten(camera, xyz, vertex_count))
+    if (terrimpi_camera_fit(box, eye, camera) != TERRIMP_OK ||
+        !terrimpi_camera_tighten(camera, xyz, vertex_count))
         return 0;
     width = (camera->tan_right - camera->tan_left) * density;
     height = (camera->tan_up - camera->tan_down) * density;
@@ -7442,14 +7492,14 @@ static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi
 {
     const terrimp_heightfield *field = &t->desc.field;
     const terrimp_capture *c = &plan->camera;
-    uint32_t quads = t->desc.chunk_quads, width = 0, widths = terrimpi_strip_count(quads);
+    uint32_t quads = t->desc.chunk_quads, width = 0, widths = terrimpi_terrain_apron_count(quads);
     float per_texel_x = (c->tan_right - c->tan_left) / (float)size[0];
     float per_texel_y = (c->tan_up - c->tan_down) / (float)size[1];
     float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
     float sine = terrimpi_max(drop / c->z_far, 0.1f);
     float reach = texels * c->z_far * terrimpi_max(per_texel_x, per_texel_y / sine);
     float step = terrimpi_min(field->spacing_x, field->spacing_z) * (float)(1u << plan->source);
-    while (width < widths && (float)terrimpi_strip_quads(quads, width) * step < reach)
+    while (width < widths && (float)terrimpi_terrain_apron_quads(quads, width) * step < reach)
         width++;
     return width;
 }
@@ -7457,7 +7507,7 @@ static uint32_t terrimpi_capture_border(const terrimp_terrain *t, const terrimpi
 /* Width of a plan's border in samples. */
 static float terrimpi_capture_reach(const terrimp_terrain *t, const terrimpi_capture_plan *plan)
 {
-    return (float)(terrimpi_strip_quads(t->desc.chunk_quads, plan->border) << plan->source);
+    return (float)(terrimpi_terrain_apron_quads(t->desc.chunk_quads, plan->border) << plan->source);
 }
 
 /* Spreads the camera over a slot of a size, and its depths over the border, which lies in front of
@@ -7467,10 +7517,10 @@ static void terrimpi_capture_spread(const terrimp_terrain *t, terrimpi_capture_p
 {
     terrimp_capture *c = &plan->camera;
     float border;
-    terrimpi_pad(&c->tan_left, &c->tan_right, size[0] - 2u * TERRIMPI_CAPTURE_MARGIN,
-                 TERRIMPI_CAPTURE_MARGIN);
-    terrimpi_pad(&c->tan_down, &c->tan_up, size[1] - 2u * TERRIMPI_CAPTURE_MARGIN,
-                 TERRIMPI_CAPTURE_MARGIN);
+    terrimpi_impostor_pad(&c->tan_left, &c->tan_right, size[0] - 2u * TERRIMPI_CAPTURE_MARGIN,
+                          TERRIMPI_CAPTURE_MARGIN);
+    terrimpi_impostor_pad(&c->tan_down, &c->tan_up, size[1] - 2u * TERRIMPI_CAPTURE_MARGIN,
+                          TERRIMPI_CAPTURE_MARGIN);
     plan->border = terrimpi_capture_border(t, plan, size, texels);
     border = 1.5f * terrimpi_capture_reach(t, plan) *
              terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
@@ -7531,7 +7581,7 @@ static int terrimpi_capture_in_layer(const terrimp_terrain *t, const terrimpi_ca
     if (plan->layer_count == 1u)
         return 1;
     place = terrimpi_tree_node(&t->tree, node);
-    terrimpi_node_box(t, &place, &box);
+    terrimpi_terrain_node_box(t, &place, &box);
     for (i = 0; i < 3; i++) {
         first += f[i] * ((f[i] > 0.0f ? box.min[i] : box.max[i]) - eye[i]);
         last += f[i] * ((f[i] > 0.0f ? box.max[i] : box.min[i]) - eye[i]);
@@ -7578,15 +7628,16 @@ static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_c
     uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
     uint32_t i, j, k, count = 0;
     float step = (float)(quads << plan->source);
-    terrimpi_pattern patterns[9];
+    terrimpi_terrain_pattern patterns[9];
     terrimpi_capture_row across, along;
     terrimpi_capture_order(plan->node.x, shift, t->tree.level_x[plan->source],
                            (eye[0] - field->origin_x) / (step * field->spacing_x), &across);
     terrimpi_capture_order(plan->node.z, shift, t->tree.level_z[plan->source],
                            (eye[2] - field->origin_z) / (step * field->spacing_z), &along);
     for (k = 0; k < 9u; k++)
-        patterns[k] = terrimpi_find_pattern(
-            quads, k == 4u ? 0u : terrimpi_strip_pattern(quads, plan->border, k > 4u ? k - 1u : k));
+        patterns[k] = terrimpi_terrain_pattern_of(
+            quads, k == 4u ? 0u :
+                terrimpi_terrain_apron_pattern(quads, plan->border, k > 4u ? k - 1u : k));
     for (j = 0; j < along.count + 2u; j++)
         for (i = 0; i < across.count + 2u; i++) {
             uint32_t x = across.first + across.order[i] - 1u, z = along.first + along.order[j] - 1u;
@@ -7626,9 +7677,9 @@ static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *n
     uint32_t quads = t->desc.chunk_quads << node->level;
     if (!t->real)
         return;
-    offset[0] = middle[0] + terrimpi_period(field, 0) *
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
                 ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
-    offset[1] = middle[1] + terrimpi_period(field, 1) *
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
                 ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
 }
 
@@ -7712,15 +7763,15 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_SPLIT_GAIN 0.6f /* ... and fall to this at most */
 #define TERRIMPI_VIEW_SPLIT_OVERLAP 0.6f /* ... unless these overlap in so much of their depth: then
                                          19 of 20 would spare too little (seven flights) */
-#define TERRIMPI_NO_PICTURE 0xffffu
+#define TERRIMPI_CACHE_NO_PICTURE 0xffffu
 
 /* How the eye moves: how far it is from where it was in the mean of the last 4, 16, 64 and 256
    frames. Who bobs is fast, but not far away from where he was: a picture that is good as far as
    that lasts. And how often all pictures are lost at once, by jumps or because the host says so. */
-#define TERRIMPI_MOTIONS 4u
+#define TERRIMPI_MOTION_COUNT 4u
 typedef struct terrimpi_motion {
-    float away[TERRIMPI_MOTIONS][3]; /* [wu] */
-    float frames[TERRIMPI_MOTIONS];  /* which an eye of constant speed needs for that way */
+    float away[TERRIMPI_MOTION_COUNT][3]; /* [wu] */
+    float frames[TERRIMPI_MOTION_COUNT];  /* which an eye of constant speed needs for that way */
     float since, between;            /* [frames] since the last loss, and between two in the mean */
 } terrimpi_motion;
 
@@ -7747,7 +7798,7 @@ static void terrimpi_motion_step(terrimpi_motion *m, const float step[3], float 
         terrimpi_motion_lose(m);
     else
         memcpy(way, step, sizeof way);
-    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+    for (k = 0; k < TERRIMPI_MOTION_COUNT; k++, frames *= 4.0f) {
         float keep = 1.0f - 1.0f / frames;
         for (i = 0; i < 3u; i++) {
             m->away[k][i] = keep * (m->away[k][i] + way[i]);
@@ -7764,7 +7815,7 @@ static float terrimpi_motion_speed(const terrimpi_motion *m, float reach)
 {
     float frames = 4.0f, speed = 0.0f;
     uint32_t k;
-    for (k = 0; k < TERRIMPI_MOTIONS; k++, frames *= 4.0f) {
+    for (k = 0; k < TERRIMPI_MOTION_COUNT; k++, frames *= 4.0f) {
         speed = terrimpi_length(m->away[k]) / terrimpi_max(m->frames[k], 0.75f);
         if (!(speed * frames < reach))
             break;
@@ -7795,16 +7846,16 @@ typedef struct terrimpi_frame {
 
 /* Impostors of a mode. */
 enum {
-    TERRIMPI_IMPOSTORS_NEVER = 0,
-    TERRIMPI_IMPOSTORS_ALWAYS, /* from the fade band on, each chunk, of its full resolution */
-    TERRIMPI_IMPOSTORS_CHEAPER /* where they cost less than ground */
+    TERRIMPI_VIEW_IMPOSTORS_NEVER = 0,
+    TERRIMPI_VIEW_IMPOSTORS_ALWAYS, /* from the fade band on, each chunk, of its full resolution */
+    TERRIMPI_VIEW_IMPOSTORS_CHEAPER /* where they cost less than ground */
 };
 
 static int terrimpi_view_impostors(const terrimp_view_desc *d)
 {
-    return d->mode == TERRIMP_MODE_AUTO       ? TERRIMPI_IMPOSTORS_CHEAPER
-           : d->mode == TERRIMP_MODE_IMPOSTOR ? TERRIMPI_IMPOSTORS_ALWAYS
-                                              : TERRIMPI_IMPOSTORS_NEVER;
+    return d->mode == TERRIMP_MODE_AUTO       ? TERRIMPI_VIEW_IMPOSTORS_CHEAPER
+           : d->mode == TERRIMP_MODE_IMPOSTOR ? TERRIMPI_VIEW_IMPOSTORS_ALWAYS
+                                              : TERRIMPI_VIEW_IMPOSTORS_NEVER;
 }
 
 /* Whether ground is drawn at its full resolution, else at a tolerance. */
@@ -7908,12 +7959,12 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
 /* ---- the pictures: a cache ---- */
 
 /* A slot of an atlas. */
-typedef struct terrimpi_slot {
+typedef struct terrimpi_cache_slot_place {
     uint32_t atlas, slot;
-} terrimpi_slot;
+} terrimpi_cache_slot_place;
 
 /* The picture of a node. */
-typedef struct terrimpi_picture {
+typedef struct terrimpi_cache_picture {
     terrimp_node node;
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
@@ -7927,19 +7978,19 @@ typedef struct terrimpi_picture {
     float angle_rad, parallax_px, urgency;
     float sharpness;          /* texels per unit of size at distance 1 */
     float cost;               /* of the capture */
-    terrimpi_slot slots[TERRIMPI_CAPTURE_LAYERS];
+    terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
     float texture_matrix[TERRIMPI_CAPTURE_LAYERS][16];
-} terrimpi_picture;
+} terrimpi_cache_picture;
 
 /* From the atlas to places relative to the eye of the capture, for exact depth. */
-typedef struct terrimpi_places {
+typedef struct terrimpi_cache_places {
     float matrix[TERRIMPI_CAPTURE_LAYERS][16];
-} terrimpi_places;
+} terrimpi_cache_places;
 
 typedef struct terrimpi_cache {
     terrimp_live_atlas *atlases; /* [atlas_count] */
-    terrimpi_picture *pictures;  /* [capacity] */
-    terrimpi_places *places;     /* [capacity] NULL: not wanted */
+    terrimpi_cache_picture *pictures;  /* [capacity] */
+    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted */
     uint16_t *of_node;           /* [node_count] */
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
@@ -7954,17 +8005,18 @@ static void terrimpi_cache_clear(terrimpi_cache *c)
     memset(c->of_node, 0xff, c->node_count * sizeof *c->of_node);
     memset(c->pictures, 0, c->capacity * sizeof *c->pictures);
     for (i = 0; i < c->atlas_count; i++)
-        terrimpi_live_reset(&c->atlases[i]);
+        terrimpi_atlas_reset(&c->atlases[i]);
 }
 
 /* The picture of a node, NULL when it has none. */
-static terrimpi_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t node)
+static terrimpi_cache_picture *terrimpi_cache_find(const terrimpi_cache *c, uint32_t node)
 {
     uint16_t index = c->of_node[node];
-    return index == TERRIMPI_NO_PICTURE ? NULL : &c->pictures[index];
+    return index == TERRIMPI_CACHE_NO_PICTURE ? NULL : &c->pictures[index];
 }
 
-static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, uint32_t count)
+static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_cache_slot_place *slots,
+                                uint32_t count)
 {
     uint32_t i;
     if (count > 0)
@@ -7973,17 +8025,17 @@ static void terrimpi_cache_free(terrimpi_cache *c, const terrimpi_slot *slots, u
         terrimp_live_atlas_free(&c->atlases[slots[i].atlas], slots[i].slot);
 }
 
-static void terrimpi_cache_drop(terrimpi_cache *c, terrimpi_picture *picture)
+static void terrimpi_cache_drop(terrimpi_cache *c, terrimpi_cache_picture *picture)
 {
     terrimpi_cache_free(c, picture->slots, picture->layer_count);
-    c->of_node[picture->node.number] = TERRIMPI_NO_PICTURE;
+    c->of_node[picture->node.number] = TERRIMPI_CACHE_NO_PICTURE;
     memset(picture, 0, sizeof *picture);
 }
 
 /* Gives up the picture that was useful longest ago, if that was before this frame. */
 static int terrimpi_cache_evict(terrimpi_cache *c)
 {
-    terrimpi_picture *p, *oldest = NULL;
+    terrimpi_cache_picture *p, *oldest = NULL;
     for (p = c->pictures; p < c->pictures + c->capacity; p++)
         if (p->seen != 0 && p->seen != c->frame && (!oldest || p->seen < oldest->seen))
             oldest = p;
@@ -7995,9 +8047,9 @@ static int terrimpi_cache_evict(terrimpi_cache *c)
 }
 
 /* A picture for a node that has none; NULL when all are in use. */
-static terrimpi_picture *terrimpi_cache_take(terrimpi_cache *c, const terrimp_node *node)
+static terrimpi_cache_picture *terrimpi_cache_take(terrimpi_cache *c, const terrimp_node *node)
 {
-    terrimpi_picture *found = NULL;
+    terrimpi_cache_picture *found = NULL;
     uint32_t i, turn;
     for (turn = 0; turn < 2u && !found; turn++) {
         for (i = 0; i < c->capacity && !found; i++) {
@@ -8014,36 +8066,38 @@ static terrimpi_picture *terrimpi_cache_take(terrimpi_cache *c, const terrimp_no
     return found;
 }
 
-static terrimp_rect terrimpi_cache_rect(const terrimpi_cache *c, const terrimpi_slot *slot)
+static terrimp_rect terrimpi_cache_rect(const terrimpi_cache *c,
+                                        const terrimpi_cache_slot_place *slot)
 {
     return c->atlases[slot->atlas].slots[slot->slot];
 }
 
 /* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
    but not less than a quarter of each side, is better than none. */
-static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slot)
+static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
+                               terrimpi_cache_slot_place *slot)
 {
     uint32_t room[2];
     do {
         for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
-            if (terrimpi_live_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
+            if (terrimpi_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
                 TERRIMP_OK)
                 return 1;
     } while (terrimpi_cache_evict(c));
     c->failures++;
     for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++) {
         terrimp_live_atlas *atlas = &c->atlases[slot->atlas];
-        terrimpi_live_room(atlas, size[0], size[1], room);
+        terrimpi_atlas_room(atlas, size[0], size[1], room);
         if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
             room[0] > 2u * TERRIMPI_CAPTURE_MARGIN && room[1] > 2u * TERRIMPI_CAPTURE_MARGIN)
-            return terrimpi_live_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
+            return terrimpi_atlas_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
     }
     return 0;
 }
 
 /* The same for each layer. */
-static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terrimpi_slot *slots,
-                                uint32_t count)
+static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2],
+                                terrimpi_cache_slot_place *slots, uint32_t count)
 {
     uint32_t i, freed = c->freed;
     for (i = 0; i < count; i++)
@@ -8057,7 +8111,8 @@ static int terrimpi_cache_slots(terrimpi_cache *c, const uint32_t size[2], terri
 
 /* Whether there is no room for a picture since there was none a frame before, and nothing has
    changed. */
-static int terrimpi_cache_refuses(const terrimpi_cache *c, int still, terrimpi_picture *picture)
+static int terrimpi_cache_refuses(const terrimpi_cache *c, int still,
+                                  terrimpi_cache_picture *picture)
 {
     if (!still || picture->refused + 1u != c->frame || c->freed >= picture->refused)
         return 0;
@@ -8067,7 +8122,7 @@ static int terrimpi_cache_refuses(const terrimpi_cache *c, int still, terrimpi_p
 
 /* Whether the slots of a picture can take another of a size: not less than 90 % of it in either
    side, not more than half as much again. */
-static int terrimpi_cache_suits(const terrimpi_cache *c, const terrimpi_picture *picture,
+static int terrimpi_cache_suits(const terrimpi_cache *c, const terrimpi_cache_picture *picture,
                                 const uint32_t size[2], uint32_t layer_count)
 {
     uint32_t i;
@@ -8081,8 +8136,8 @@ static int terrimpi_cache_suits(const terrimpi_cache *c, const terrimpi_picture 
 }
 
 /* Whether a picture shows a rectangle of samples: its border is at most the node's neighbours. */
-static int terrimpi_cache_shows(const terrimpi_picture *picture, uint32_t chunk_quads, uint32_t x,
-                                uint32_t z, uint32_t cols, uint32_t rows)
+static int terrimpi_cache_shows(const terrimpi_cache_picture *picture, uint32_t chunk_quads,
+                                uint32_t x, uint32_t z, uint32_t cols, uint32_t rows)
 {
     uint32_t quads = chunk_quads << picture->node.level;
     const terrimp_node *n = &picture->node;
@@ -8120,7 +8175,7 @@ typedef struct terrimpi_cull {
 static int terrimpi_cull_hides(terrimpi_cull *cull, int behind, const terrimpi_frame *f,
                                const terrimp_node *node, int *planes, terrimp_box *box)
 {
-    terrimpi_node_box(f->terrain, node, box);
+    terrimpi_terrain_node_box(f->terrain, node, box);
     if (*planes)
         *planes = terrimp_frustum_test(&f->frustum, box, *planes);
     if (*planes == TERRIMP_PLANES_OUTSIDE)
@@ -8140,11 +8195,11 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     const terrimp_heightfield *field = &f->terrain->desc.field;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
-    if (impostors == TERRIMPI_IMPOSTORS_NEVER || closest < f->desc->fade_start)
+    if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
         return 0;
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_IMPOSTORS_ALWAYS ||
+    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0) /* of no repetition */
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
@@ -8155,7 +8210,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
 static int terrimpi_cull_ground(const terrimpi_mip_frame *mip, const terrimp_node *node)
 {
-    return node->level == 0 || (mip && terrimpi_mip_marked(mip, node->number) < 1.0f);
+    return node->level == 0 || (mip && terrimpi_mip_ratio_of(mip, node->number) < 1.0f);
 }
 
 /* Whether any of a ground node's own terrain is in sight: not only its skirts. */
@@ -8192,12 +8247,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
         if (closest < f->desc->fade_start ||
-            terrimpi_view_impostors(f->desc) == TERRIMPI_IMPOSTORS_NEVER)
+            terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     if (!(*done & TERRIMPI_CULL_IMPOSTOR) &&
         terrimpi_cull_impostor(f, node, closest,
-                               cache->of_node[node->number] != TERRIMPI_NO_PICTURE)) {
+                               cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE)) {
         cuts |= TERRIMPI_CULL_IMPOSTOR;
         *done |= TERRIMPI_CULL_IMPOSTOR;
     }
@@ -8264,7 +8319,7 @@ static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimp
     uint32_t i;
     for (i = 0; i < cull->count && !full; i++) {
         terrimp_node n = terrimpi_tree_node(tree, cull->nodes[i].number);
-        float off = terrimpi_node_error(tree, &n, f->desc->morph_ratio > 1.0f);
+        float off = terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f);
         if (!(cull->nodes[i].cuts & TERRIMPI_CULL_GROUND))
             continue;
         if (cull->nodes[i].closest < side)
@@ -8272,7 +8327,7 @@ static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimp
         else
             error = terrimpi_max(error, off / cull->nodes[i].closest);
     }
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_IMPOSTORS_NEVER)
+    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_NEVER)
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
     terrimpi_horizon_begin(cull->horizon, tree, f->desc->walls, &f->camera,
                            terrimpi_min(2.0f * error, 0.5f), low);
@@ -8349,7 +8404,7 @@ static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node *node,
                                      float closest)
 {
-    if (terrimpi_view_impostors(f->desc) == TERRIMPI_IMPOSTORS_ALWAYS)
+    if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
@@ -8380,16 +8435,16 @@ static float terrimpi_view_error(const terrimpi_frame *f, const terrimp_node *no
                                  const float captured_eye[3], float *angle_rad, float *parallax_px)
 {
     terrimp_box box;
-    terrimpi_node_box(f->terrain, node, &box);
-    *angle_rad = terrimpi_view_angle(&box, captured_eye, f->camera.eye);
-    *parallax_px = terrimpi_parallax_error(&box, terrimpi_view_mesh_error(f, node->number),
-                                           captured_eye, f->camera.eye, f->pixel_factor);
+    terrimpi_terrain_node_box(f->terrain, node, &box);
+    *angle_rad = terrimpi_impostor_view_angle(&box, captured_eye, f->camera.eye);
+    *parallax_px = terrimpi_impostor_parallax_error(&box, terrimpi_view_mesh_error(f, node->number),
+                                                    captured_eye, f->camera.eye, f->pixel_factor);
     return terrimpi_max(*angle_rad / f->desc->max_angle_rad,
                         *parallax_px / f->desc->tolerance_px);
 }
 
 /* Judges a picture, once a frame. */
-static void terrimpi_view_judge(const terrimpi_frame *f, terrimpi_picture *picture)
+static void terrimpi_view_judge(const terrimpi_frame *f, terrimpi_cache_picture *picture)
 {
     if (picture->judged == f->number)
         return;
@@ -8401,7 +8456,7 @@ static void terrimpi_view_judge(const terrimpi_frame *f, terrimpi_picture *pictu
 
 /* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
    become too coarse, or far too fine. */
-static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_picture *picture,
+static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_cache_picture *picture,
                                    float closest)
 {
     float urgency, wanted = terrimpi_view_sharpness(f, closest);
@@ -8423,19 +8478,19 @@ typedef struct terrimpi_candidate {
     float draw_cost, capture_cost;
     int rank;                   /* among the captures of this frame, */
     float weight;               /* ... and within its rank */
-    terrimpi_picture *picture;  /* or NULL */
+    terrimpi_cache_picture *picture;  /* or NULL */
 } terrimpi_candidate;
 
-enum { TERRIMPI_RANK_EARLY = 0, TERRIMPI_RANK_DUE, TERRIMPI_RANK_MISSING };
+enum { TERRIMPI_JOB_RANK_EARLY = 0, TERRIMPI_JOB_RANK_DUE, TERRIMPI_JOB_RANK_MISSING };
 
 /* Kinds of draws, in the order in which they are drawn. The first ones can show a region: see
    terrimpi_view_kinds. */
 enum {
-    TERRIMPI_KIND_GROUND = 0,
-    TERRIMPI_KIND_IMPOSTOR,
-    TERRIMPI_KIND_SHOWS, /* that many kinds show regions */
-    TERRIMPI_KIND_FLOOR = TERRIMPI_KIND_SHOWS,
-    TERRIMPI_KIND_COUNT
+    TERRIMPI_VIEW_KIND_GROUND = 0,
+    TERRIMPI_VIEW_KIND_IMPOSTOR,
+    TERRIMPI_VIEW_KIND_SHOWS, /* that many kinds show regions */
+    TERRIMPI_VIEW_KIND_FLOOR = TERRIMPI_VIEW_KIND_SHOWS,
+    TERRIMPI_VIEW_KIND_COUNT
 };
 
 /* A part of the frame: the topmost node in one of the cuts. */
@@ -8450,23 +8505,23 @@ typedef struct terrimpi_region {
 } terrimpi_region;
 
 /* What a kind would cost a region. */
-typedef struct terrimpi_offer {
+typedef struct terrimpi_region_offer {
     float draw;   /* each frame */
     float upkeep; /* captures, spread over the frames that they last */
-} terrimpi_offer;
+} terrimpi_region_offer;
 
 /* A command of the frame. */
-typedef struct terrimpi_draw {
+typedef struct terrimpi_view_draw {
     int kind;
     uint32_t index; /* of the ground draw or the picture */
     float alpha;
-} terrimpi_draw;
+} terrimpi_view_draw;
 
 /* A capture of this frame, or a piece of one. */
 typedef struct terrimpi_job {
     terrimpi_capture_plan plan;
-    terrimpi_picture *picture;
-    terrimpi_slot slots[TERRIMPI_CAPTURE_LAYERS];
+    terrimpi_cache_picture *picture;
+    terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
     uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
     int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
     uint32_t triangles, texels;    /* of the whole picture */
@@ -8484,7 +8539,7 @@ struct terrimp_view {
     terrimpi_candidate *candidates; /* [max_impostors] by region */
     uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
     terrimpi_job *jobs;            /* [max_captures] */
-    terrimpi_draw *draws;          /* [max_ground + max_impostors + 1] front to back */
+    terrimpi_view_draw *draws;          /* [max_ground + max_impostors + 1] front to back */
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
@@ -8519,8 +8574,8 @@ static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain
         return;
     *t = *terrain;
     t->tiles = v->desc.wrap_tiles;
-    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_period(&field, 0);
-    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_period(&field, 1);
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
     field.width = (field.width - 1u) * t->tiles + 1u;
     field.depth = (field.depth - 1u) * t->tiles + 1u;
     field.row_bytes = 0; /* no sample is read through it */
@@ -8590,13 +8645,13 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     for (i = 0; i < c->atlas_count; i++) {
         void *memory = terrimpi_take(&l, slots, 1);
         if (memory)
-            terrimpi_live_init(&c->atlases[i], &atlas, memory);
+            terrimpi_atlas_init(&c->atlases[i], &atlas, memory);
     }
     c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
-    c->pictures = (terrimpi_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
+    c->pictures = (terrimpi_cache_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
     c->places = NULL;
     if (v->desc.exact_depth)
-        c->places = (terrimpi_places *)terrimpi_take(&l, impostors, sizeof *c->places);
+        c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
@@ -8613,7 +8668,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->draws = (terrimpi_draw *)terrimpi_take(
+    v->draws = (terrimpi_view_draw *)terrimpi_take(
         &l, ground + impostors + (v->terrain == &v->tiled ?
                                   v->desc.wrap_tiles * v->desc.wrap_tiles : 1u), sizeof *v->draws);
     if (v->terrain == &v->tiled) {
@@ -8704,7 +8759,7 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
 /* Gives back what a job has taken, unless that is what its picture has. */
 static void terrimpi_job_cancel(terrimpi_cache *cache, const terrimpi_job *job)
 {
-    const terrimpi_picture *p = job->picture;
+    const terrimpi_cache_picture *p = job->picture;
     if (p->layer_count != job->plan.layer_count ||
         memcmp(job->slots, p->slots, p->layer_count * sizeof *p->slots) != 0)
         terrimpi_cache_free(cache, job->slots, job->plan.layer_count);
@@ -8748,10 +8803,10 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     const terrimp_terrain *t = v->terrain;
     uint32_t count = t->tree.node_count, k;
     int up = z > 0 || (z == 0 && x > 0);
-    terrimpi_picture *p;
+    terrimpi_cache_picture *p;
     float way[2];
-    way[0] = (float)x * terrimpi_period(&t->desc.field, 0);
-    way[1] = (float)z * terrimpi_period(&t->desc.field, 1);
+    way[0] = (float)x * terrimpi_field_period(&t->desc.field, 0);
+    way[1] = (float)z * terrimpi_field_period(&t->desc.field, 1);
     v->frame.camera.eye[0] -= way[0];
     v->frame.camera.eye[2] -= way[1];
     v->outdated = 1; /* its draws are of nodes that are elsewhere now */
@@ -8763,13 +8818,13 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
         terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
         uint32_t was = terrimpi_tiled_before(t, &n, x, z);
         int is = was < count;
-        v->kind_of[n.number] = is ? v->kind_of[was] : (unsigned char)TERRIMPI_KIND_GROUND;
+        v->kind_of[n.number] = is ? v->kind_of[was] : (unsigned char)TERRIMPI_VIEW_KIND_GROUND;
         v->ground.marks[n.number].measure = is ? v->ground.marks[was].measure : 0.0f;
         v->ground.marks[n.number].frame = is ? v->ground.marks[was].frame : 0;
     }
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
         if (p->seen)
-            v->cache.of_node[p->node.number] = TERRIMPI_NO_PICTURE;
+            v->cache.of_node[p->node.number] = TERRIMPI_CACHE_NO_PICTURE;
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
         terrimp_node n = p->node;
         uint32_t now = p->seen ? terrimpi_tiled_before(t, &n, -x, -z) : count;
@@ -8796,8 +8851,8 @@ static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, 
     const terrimp_heightfield *field = &v->terrain->desc.field;
     int k;
     for (k = 0; k < 2 && v->terrain->real; k++) {
-        float period = terrimpi_period(field, k), step;
-        middle[k] = period * terrimpi_wrap(field, k, &camera->eye[2 * k]);
+        float period = terrimpi_field_period(field, k), step;
+        middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
         step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
         went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
@@ -8817,7 +8872,7 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
                                               uint32_t cols, uint32_t rows)
 {
     const terrimp_quadtree *tree;
-    terrimpi_picture *p;
+    terrimpi_cache_picture *p;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     tree = &view->built->tree;
     TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
@@ -8948,8 +9003,8 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     terrimp_mesh_info mesh;
     terrimp_box box;
     uint32_t quads;
-    terrimpi_node_box(f->terrain, &c->node, &box);
-    if (terrimpi_capture_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
+    terrimpi_terrain_node_box(f->terrain, &c->node, &box);
+    if (terrimpi_camera_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
@@ -8989,8 +9044,8 @@ static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cach
     }
 }
 
-static int terrimpi_ground_estimate(const terrimp_view *v, const terrimpi_region *region,
-                                    terrimpi_offer *offer)
+static int terrimpi_view_ground_estimate(const terrimp_view *v, const terrimpi_region *region,
+                                         terrimpi_region_offer *offer)
 {
     const terrimp_costs *costs = &v->desc.costs;
     float quads = (float)v->terrain->desc.chunk_quads;
@@ -9000,8 +9055,8 @@ static int terrimpi_ground_estimate(const terrimp_view *v, const terrimpi_region
     return 1;
 }
 
-static int terrimpi_impostor_estimate(const terrimp_view *v, const terrimpi_region *region,
-                                      terrimpi_offer *offer)
+static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi_region *region,
+                                           terrimpi_region_offer *offer)
 {
     const terrimp_costs *costs = &v->desc.costs;
     const terrimpi_candidate *c = &v->candidates[region->first_candidate];
@@ -9015,14 +9070,14 @@ static int terrimpi_impostor_estimate(const terrimp_view *v, const terrimpi_regi
     return region->fits;
 }
 
-static int terrimpi_ground_ready(const terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_ground_ready(const terrimp_view *v, const terrimpi_region *region)
 {
     (void)v;
     (void)region;
     return 1;
 }
 
-static int terrimpi_impostor_ready(const terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_impostor_ready(const terrimp_view *v, const terrimpi_region *region)
 {
     uint32_t i;
     for (i = 0; i < region->candidate_count; i++)
@@ -9035,25 +9090,25 @@ static int terrimpi_impostor_ready(const terrimp_view *v, const terrimpi_region 
 
 static void terrimpi_view_add(terrimp_view *v, int kind, uint32_t index)
 {
-    terrimpi_draw *draw = &v->draws[v->draw_count++];
+    terrimpi_view_draw *draw = &v->draws[v->draw_count++];
     draw->kind = kind;
     draw->index = index;
     draw->alpha = 1.0f;
 }
 
-static int terrimpi_ground_list(terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *region)
 {
     uint32_t i;
     for (i = 0; i < region->ground_count; i++)
-        terrimpi_view_add(v, TERRIMPI_KIND_GROUND, region->first_ground + i);
+        terrimpi_view_add(v, TERRIMPI_VIEW_KIND_GROUND, region->first_ground + i);
     return 1;
 }
 
 /* Lists a node's impostor, once, if it has a picture that is good. One that is drawn for several
    regions does not fade. */
-static int terrimpi_impostor_add(terrimp_view *v, const terrimp_node *node, float most_urgent)
+static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node, float most_urgent)
 {
-    terrimpi_picture *p = terrimpi_cache_find(&v->cache, node->number);
+    terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
     if (!p)
         return 0;
     if (p->listed == v->frame.number) {
@@ -9065,12 +9120,12 @@ static int terrimpi_impostor_add(terrimp_view *v, const terrimp_node *node, floa
         return 0;
     p->listed = p->seen = v->frame.number;
     p->draw = v->draw_count;
-    terrimpi_view_add(v, TERRIMPI_KIND_IMPOSTOR, (uint32_t)(p - v->cache.pictures));
+    terrimpi_view_add(v, TERRIMPI_VIEW_KIND_IMPOSTOR, (uint32_t)(p - v->cache.pictures));
     return 1;
 }
 
 /* Lists the impostors of a node's children; all or none of them has a picture. */
-static int terrimpi_impostor_add_children(terrimp_view *v, const terrimp_node *node)
+static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_node *node)
 {
     terrimp_node children[4];
     uint32_t i, count;
@@ -9078,12 +9133,12 @@ static int terrimpi_impostor_add_children(terrimp_view *v, const terrimp_node *n
         return 0;
     count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.camera.eye, children);
     for (i = 0; i < count; i++) {
-        const terrimpi_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
+        const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
         if (!p || p->layer_count == 0)
             return 0;
     }
     for (i = 0; i < count; i++)
-        if (!terrimpi_impostor_add(v, &children[i], TERRIMPI_VIEW_STALE_OTHER))
+        if (!terrimpi_view_impostor_add(v, &children[i], TERRIMPI_VIEW_STALE_OTHER))
             return 0;
     return 1;
 }
@@ -9096,19 +9151,19 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
     const terrimp_quadtree *tree = &v->terrain->tree;
     terrimp_node node = c->node;
     uint32_t up;
-    if (terrimpi_impostor_add(v, &node, TERRIMPI_VIEW_STALE))
+    if (terrimpi_view_impostor_add(v, &node, TERRIMPI_VIEW_STALE))
         return 1;
     v->stats.waiting++;
-    if (terrimpi_view_impostors(&v->desc) != TERRIMPI_IMPOSTORS_CHEAPER)
+    if (terrimpi_view_impostors(&v->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
         return 0;
-    if (terrimpi_impostor_add_children(v, &node))
+    if (terrimpi_view_impostor_add_children(v, &node))
         return 1;
     for (up = v->desc.sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
-        terrimpi_node_box(v->terrain, &node, &box);
+        terrimpi_terrain_node_box(v->terrain, &node, &box);
         if (terrimp_box_distance(&box, v->frame.camera.eye) >= v->desc.fade_start &&
-            terrimpi_impostor_add(v, &node, TERRIMPI_VIEW_STALE_OTHER))
+            terrimpi_view_impostor_add(v, &node, TERRIMPI_VIEW_STALE_OTHER))
             return 1;
     }
     return 0;
@@ -9116,7 +9171,7 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
 
 /* Lists a region's impostors, and in the fade band its ground, over which they appear; or nothing,
    when one of them has no picture. */
-static int terrimpi_impostor_list(terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_impostor_list(terrimp_view *v, const terrimpi_region *region)
 {
     float band = v->desc.fade_end - v->desc.fade_start;
     uint32_t before = v->draw_count, i;
@@ -9130,26 +9185,27 @@ static int terrimpi_impostor_list(terrimp_view *v, const terrimpi_region *region
     }
     for (i = before; i < v->draw_count; i++)
         v->draws[i].alpha = terrimpi_min(1.0f, (region->closest - v->desc.fade_start) / band);
-    return region->closest >= v->desc.fade_end || terrimpi_ground_list(v, region);
+    return region->closest >= v->desc.fade_end || terrimpi_view_ground_list(v, region);
 }
 
 /* ---- the commands ---- */
 
 /* Where the indices of a ground draw stand: those of the 16 patterns come first in the buffer. */
-static void terrimpi_ground_pattern(const terrimp_view *v, uint32_t draw, terrimp_pattern *found)
+static void terrimpi_view_ground_pattern(const terrimp_view *v, uint32_t draw,
+                                         terrimp_pattern *found)
 {
     memset(found, 0, sizeof *found); /* an analyser cannot know that there is one */
     terrimp_pattern_find(v->terrain->desc.chunk_quads, TERRIMP_FORM_LIST,
                          v->ground.draws[draw].pattern, found);
 }
 
-static void terrimpi_ground_emit(const terrimp_view *v, const terrimpi_draw *draw,
-                                 const terrimp_callbacks *callbacks)
+static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                      const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
     terrimp_ground_command command;
     terrimp_pattern pattern;
-    terrimpi_ground_pattern(v, draw->index, &pattern);
+    terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
     terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
     command.node = terrimpi_real_node(v->terrain, ground->node.number);
@@ -9162,10 +9218,10 @@ static void terrimpi_ground_emit(const terrimp_view *v, const terrimpi_draw *dra
     callbacks->draw_ground(callbacks->user, &command);
 }
 
-static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *draw,
-                                   const terrimp_callbacks *callbacks)
+static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                        const terrimp_callbacks *callbacks)
 {
-    terrimpi_picture *picture = &v->cache.pictures[draw->index];
+    terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     uint32_t k, layer;
@@ -9192,14 +9248,14 @@ static void terrimpi_impostor_emit(const terrimp_view *v, const terrimpi_draw *d
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_place_from(command.place_matrix, picture->eye, v->frame.camera.eye);
+            terrimpi_impostor_place_from(command.place_matrix, picture->eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
 }
 
-static void terrimpi_floor_emit(const terrimp_view *v, const terrimpi_draw *draw,
-                                const terrimp_callbacks *callbacks)
+static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                     const terrimp_callbacks *callbacks)
 {
     terrimp_floor_command command;
     if (!callbacks->draw_floor)
@@ -9221,20 +9277,21 @@ static void terrimpi_floor_emit(const terrimp_view *v, const terrimpi_draw *draw
 /* What can show a region. */
 typedef struct terrimpi_view_kind {
     /* What it costs; returns 0 when it cannot show the region. */
-    int (*estimate)(const terrimp_view *v, const terrimpi_region *region, terrimpi_offer *offer);
+    int (*estimate)(const terrimp_view *v, const terrimpi_region *region,
+                    terrimpi_region_offer *offer);
     /* Whether it can do so in this frame, before captures. */
     int (*ready)(const terrimp_view *v, const terrimpi_region *region);
     /* Puts its draws on the list; returns 0 when it is not ready: then the kind before it does. */
     int (*list)(terrimp_view *v, const terrimpi_region *region);
-    void (*emit)(const terrimp_view *v, const terrimpi_draw *draw,
+    void (*emit)(const terrimp_view *v, const terrimpi_view_draw *draw,
                  const terrimp_callbacks *callbacks);
 } terrimpi_view_kind;
 
-static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_KIND_COUNT] = {
-    {terrimpi_ground_estimate, terrimpi_ground_ready, terrimpi_ground_list, terrimpi_ground_emit},
-    {terrimpi_impostor_estimate, terrimpi_impostor_ready, terrimpi_impostor_list,
-     terrimpi_impostor_emit},
-    {NULL, NULL, NULL, terrimpi_floor_emit}
+static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = {
+    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list, terrimpi_view_ground_emit},
+    {terrimpi_view_impostor_estimate, terrimpi_view_impostor_ready, terrimpi_view_impostor_list,
+     terrimpi_view_impostor_emit},
+    {NULL, NULL, NULL, terrimpi_view_floor_emit}
 };
 
 /* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
@@ -9242,13 +9299,13 @@ static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_KIND_COUNT] = {
 static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float *spread,
                                  float *drawn)
 {
-    terrimpi_offer offers[TERRIMPI_KIND_SHOWS];
-    int possible[TERRIMPI_KIND_SHOWS], kind, best = TERRIMPI_KIND_GROUND;
+    terrimpi_region_offer offers[TERRIMPI_VIEW_KIND_SHOWS];
+    int possible[TERRIMPI_VIEW_KIND_SHOWS], kind, best = TERRIMPI_VIEW_KIND_GROUND;
     int before = v->kind_of[region->node];
-    float total[TERRIMPI_KIND_SHOWS];
+    float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
     terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
-    for (kind = 0; kind < TERRIMPI_KIND_SHOWS; kind++) {
+    for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
         total[kind] = offers[kind].draw + offers[kind].upkeep;
         if (possible[kind] && total[kind] < total[best])
@@ -9256,15 +9313,15 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     }
     if (possible[before] && total[before] < total[best] * TERRIMPI_VIEW_FLIP)
         best = before;
-    if (possible[TERRIMPI_KIND_IMPOSTOR] &&
-        terrimpi_view_impostors(&v->desc) == TERRIMPI_IMPOSTORS_ALWAYS)
-        best = TERRIMPI_KIND_IMPOSTOR;
+    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
+        terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+        best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = best;
     v->kind_of[region->node] = (unsigned char)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
-    for (i = 0; i < region->candidate_count && best == TERRIMPI_KIND_IMPOSTOR; i++) {
-        terrimpi_picture *p = v->candidates[region->first_candidate + i].picture;
+    for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
+        terrimpi_cache_picture *p = v->candidates[region->first_candidate + i].picture;
         if (p)
             p->seen = v->frame.number;
     }
@@ -9284,13 +9341,13 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
-    if (f->desc->no_splits || terrimpi_view_impostors(f->desc) != TERRIMPI_IMPOSTORS_CHEAPER ||
+    if (f->desc->no_splits || terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER ||
         !(sine * closest > 0.0f) ||
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
         return 0;
-    terrimpi_capture_split(&plan->camera, xyz, terrimpi_mesh_vertices(mesh), indices,
-                           3u * terrimpi_mesh_triangles(mesh), sine * closest, overlap, &split);
+    terrimpi_impostor_split(&plan->camera, xyz, terrimpi_mesh_vertices(mesh), indices,
+                            3u * terrimpi_mesh_triangles(mesh), sine * closest, overlap, &split);
     *distance = split.distance;
     return split.gap * sine * f->pixel_factor >
                TERRIMPI_VIEW_SPLIT_SMEAR * f->desc->tolerance_px &&
@@ -9305,7 +9362,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
    one is drawn meanwhile. */
 static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], terrimpi_job *job)
 {
-    const terrimpi_picture *picture = job->picture;
+    const terrimpi_cache_picture *picture = job->picture;
     if (!job->in_pieces && terrimpi_cache_suits(cache, picture, size, job->plan.layer_count)) {
         memcpy(job->slots, picture->slots, sizeof job->slots);
         return 1;
@@ -9332,10 +9389,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         return 0;
     plan->node = c->node;
     plan->layer_count = 1;
-    terrimpi_node_box(f->terrain, &c->node, &plan->box);
+    terrimpi_terrain_node_box(f->terrain, &c->node, &plan->box);
     terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, eye);
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
-    terrimpi_fill_mesh(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
+    terrimpi_mesh_write(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
     if (!terrimpi_capture_aim(&plan->box, eye, v->mesh_xyz, mesh.vertex_count,
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
@@ -9425,15 +9482,15 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
             uint32_t index = v->regions[r].first_candidate + i;
             terrimpi_candidate *c = &v->candidates[index];
             float weight = terrimpi_max(c->pixels / (1.0f + c->pixels), 1e-3f) + c->pixels;
-            if (v->regions[r].kind != TERRIMPI_KIND_IMPOSTOR ||
+            if (v->regions[r].kind != TERRIMPI_VIEW_KIND_IMPOSTOR ||
                 (v->open && v->jobs[0].plan.node.number == c->node.number) ||
                 (c->urgency < 1.0f &&
                  (v->desc.no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
                 continue;
-            c->rank = !terrimpi_candidate_ready(c) ? TERRIMPI_RANK_MISSING
-                      : c->urgency >= 1.0f         ? TERRIMPI_RANK_DUE
-                                                   : TERRIMPI_RANK_EARLY;
-            c->weight = c->rank == TERRIMPI_RANK_MISSING
+            c->rank = !terrimpi_candidate_ready(c) ? TERRIMPI_JOB_RANK_MISSING
+                      : c->urgency >= 1.0f         ? TERRIMPI_JOB_RANK_DUE
+                                                   : TERRIMPI_JOB_RANK_EARLY;
+            c->weight = c->rank == TERRIMPI_JOB_RANK_MISSING
                             ? weight
                             : weight * terrimpi_min(c->urgency, 2.0f);
             v->queue[count++] = index;
@@ -9482,7 +9539,7 @@ static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
 static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
                                   const terrimpi_job *job, terrimpi_spending *s)
 {
-    terrimpi_picture *p = job->picture;
+    terrimpi_cache_picture *p = job->picture;
     uint32_t triangles = terrimpi_capture_triangles(f->terrain, &job->plan, draws + job->from,
                                                     job->to - job->from);
     s->texels += job->texels;
@@ -9606,24 +9663,24 @@ static void terrimpi_view_list(terrimp_view *v)
             kind--;
     }
     for (i = 0; i < v->draw_count; i++)
-        impostors += v->draws[i].kind == TERRIMPI_KIND_IMPOSTOR ? 1u : 0u;
+        impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
     if (impostors > 0 && terrimpi_view_over(&v->frame))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
-            terrimpi_view_add(v, TERRIMPI_KIND_FLOOR, i);
+            terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
 /* What a draw adds to the statistics. */
-static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_draw *draw,
+static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
                                      terrimp_stats *s)
 {
-    if (draw->kind == TERRIMPI_KIND_GROUND) {
+    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
         terrimp_pattern pattern;
-        terrimpi_ground_pattern(v, draw->index, &pattern);
+        terrimpi_view_ground_pattern(v, draw->index, &pattern);
         s->ground++;
         s->draws++;
         s->triangles += pattern.triangle_count;
-    } else if (draw->kind == TERRIMPI_KIND_IMPOSTOR) {
-        const terrimpi_picture *p = &v->cache.pictures[draw->index];
+    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
+        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
         terrimp_mesh_info mesh;
         terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
         s->impostors++;
@@ -9652,7 +9709,7 @@ static void terrimpi_view_count_frame(terrimp_view *v)
     for (i = 0; i < v->region_count; i++) {
         terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
         terrimp_box box;
-        terrimpi_node_box(v->terrain, &node, &box);
+        terrimpi_terrain_node_box(v->terrain, &node, &box);
         if (i == 0 || v->regions[i].closest < s->z_near)
             s->z_near = v->regions[i].closest;
         s->z_far = terrimpi_max(s->z_far, terrimp_box_farthest(&box, v->frame.camera.eye));
@@ -9744,7 +9801,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 /* Notes that a picture has been made. */
 static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
 {
-    terrimpi_picture *p = job->picture;
+    terrimpi_cache_picture *p = job->picture;
     uint32_t i;
     if (p->layer_count > 0) {
         float frames = (float)p->drawn_count;
@@ -9761,11 +9818,11 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
-        terrimpi_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                p->texture_matrix[i]);
+        terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                         p->texture_matrix[i]);
         if (v->cache.places)
-            terrimpi_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                  v->cache.places[p - v->cache.pictures].matrix[i]);
+            terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                           v->cache.places[p - v->cache.pictures].matrix[i]);
     }
 }
 
@@ -9810,7 +9867,7 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     view->job_count = 0;
     for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
         terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
-    for (kind = 0; kind < TERRIMPI_KIND_COUNT && !view->desc.sorted; kind++)
+    for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
         for (i = 0; i < view->draw_count; i++)
             if (view->draws[i].kind == kind)
                 terrimpi_view_kinds[kind].emit(view, &view->draws[i], callbacks);
@@ -9848,7 +9905,7 @@ TERRIMP_API terrimp_result terrimp_view_create(const terrimp_terrain *terrain,
     terrimp_result result;
     size_t bytes;
     void *memory;
-    TERRIMPI_REFUSE(!view || !terrimpi_pick_allocator(allocator, &from), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!view || !terrimpi_terrain_allocator(allocator, &from), TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &resolved));
     bytes = terrimp_view_bytes(terrain, &resolved);
     TERRIMPI_REFUSE(bytes == 0, TERRIMP_E_OVERFLOW);
@@ -9938,7 +9995,7 @@ static uint32_t terrimpi_sorted_top(uint32_t page_quads)
     return top;
 }
 
-static int terrimpi_is_power(uint32_t value, uint32_t low, uint32_t high)
+static int terrimpi_sorted_is_power(uint32_t value, uint32_t low, uint32_t high)
 {
     return terrimpi_within_u32(value, low, high) && (value & (value - 1u)) == 0;
 }
@@ -9967,9 +10024,9 @@ static int terrimpi_sorted_numbers_ok(const terrimp_sorted_desc *d)
     float least = terrimpi_sorted_least_scale(d->table, terrimpi_sorted_top(d->page_quads));
     return d->low <= d->high && least > 0.0f && d->scale >= least && d->low_far >= 0.0f &&
            d->low_height >= 0.0f && d->texels_per_px > 0.0f &&
-           terrimpi_is_power(d->page_texels, 1u, 65536u) &&
+           terrimpi_sorted_is_power(d->page_texels, 1u, 65536u) &&
            terrimpi_within_u32(d->texture_level_count, 1u, 16u) &&
-           terrimpi_is_power(d->texture_window, 1u, 32768u);
+           terrimpi_sorted_is_power(d->texture_window, 1u, 32768u);
 }
 
 TERRIMP_API terrimp_result terrimp_sorted_desc_resolve(const terrimp_sorted_desc *in,
@@ -9986,7 +10043,8 @@ TERRIMP_API terrimp_result terrimp_sorted_desc_resolve(const terrimp_sorted_desc
     TERRIMPI_DEFAULT(d.texture_window, 32u);
     TERRIMPI_REFUSE(!terrimpi_finite2(d.low, d.high) || !terrimpi_finite2(d.scale, d.low_far) ||
                     !terrimpi_finite2(d.low_height, d.texels_per_px), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!terrimpi_is_power(d.page_quads, 2u, 1u << (TERRIMP_SORTED_LEVELS - 1)) ||
+    TERRIMPI_REFUSE(!terrimpi_sorted_is_power(d.page_quads, 2u,
+                                              1u << (TERRIMP_SORTED_LEVELS - 1)) ||
                     !terrimpi_sorted_numbers_ok(&d), TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(d.page && !(d.low < d.high || d.low > 0.0f || d.low < 0.0f), TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_sorted_resolve_field(&d, &d.field));
@@ -10019,13 +10077,14 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
 /* ---- the footprint ---- */
 
 /* Points in plan, in samples from the corner of the eye's page. */
-typedef struct terrimpi_hull {
+typedef struct terrimpi_sorted_hull {
     float at[16][2];
     int count;
     float farthest; /* from the corner, along an axis */
-} terrimpi_hull;
+} terrimpi_sorted_hull;
 
-static void terrimpi_hull_add(terrimpi_hull *hull, const float a[3], const float b[3], float part)
+static void terrimpi_sorted_hull_add(terrimpi_sorted_hull *hull, const float a[3], const float b[3],
+                                     float part)
 {
     float *at = hull->at[hull->count++];
     at[0] = a[0] + (b[0] - a[0]) * part;
@@ -10035,21 +10094,22 @@ static void terrimpi_hull_add(terrimpi_hull *hull, const float a[3], const float
 }
 
 /* Adds where an edge of the frustum ends or leaves the heights that there are. */
-static void terrimpi_hull_edge(terrimpi_hull *hull, const float a[3], const float b[3], float low,
-                               float high)
+static void terrimpi_sorted_hull_edge(terrimpi_sorted_hull *hull, const float a[3],
+                                      const float b[3], float low, float high)
 {
     if (terrimpi_within(a[1], low, high))
-        terrimpi_hull_add(hull, a, b, 0.0f);
+        terrimpi_sorted_hull_add(hull, a, b, 0.0f);
     if ((a[1] < low) != (b[1] < low))
-        terrimpi_hull_add(hull, a, b, (low - a[1]) / (b[1] - a[1]));
+        terrimpi_sorted_hull_add(hull, a, b, (low - a[1]) / (b[1] - a[1]));
     if ((a[1] > high) != (b[1] > high))
-        terrimpi_hull_add(hull, a, b, (high - a[1]) / (b[1] - a[1]));
+        terrimpi_sorted_hull_add(hull, a, b, (high - a[1]) / (b[1] - a[1]));
 }
 
 /* The corners, in plan, of what of the frustum lies between the lowest and the highest height:
    edges from the eye to the corners at z_far, and from each of these to the next. */
-static void terrimpi_hull_frustum(const terrimp_sorted_desc *d, const terrimp_camera *camera,
-                                  float z_far, const float eye[3], terrimpi_hull *hull)
+static void terrimpi_sorted_hull_frustum(const terrimp_sorted_desc *d, const terrimp_camera *camera,
+                                         float z_far, const float eye[3],
+                                         terrimpi_sorted_hull *hull)
 {
     float corner[4][3];
     terrimp_capture c;
@@ -10066,14 +10126,14 @@ static void terrimpi_hull_frustum(const terrimp_sorted_desc *d, const terrimp_ca
     hull->count = 0;
     hull->farthest = 0.0f;
     for (i = 0; i < 4; i++) {
-        terrimpi_hull_edge(hull, eye, corner[i], d->low, d->high);
-        terrimpi_hull_edge(hull, corner[i], corner[(i + 1) & 3], d->low, d->high);
+        terrimpi_sorted_hull_edge(hull, eye, corner[i], d->low, d->high);
+        terrimpi_sorted_hull_edge(hull, corner[i], corner[(i + 1) & 3], d->low, d->high);
     }
 }
 
 /* Which of the points lies farthest to the right of the way from one of them in a direction: the
    next corner of the convex hull, counter-clockwise with x to the right and z up. */
-static int terrimpi_hull_next(const terrimpi_hull *hull, int from)
+static int terrimpi_sorted_hull_next(const terrimpi_sorted_hull *hull, int from)
 {
     int i, best = from;
     float x = 0.0f, z = 0.0f;
@@ -10092,7 +10152,8 @@ static int terrimpi_hull_next(const terrimpi_hull *hull, int from)
 
 /* A side of the footprint: its direction is rounded, but none of the points is left outside, nor
    what is within a sample of them. */
-static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_hull *hull, float x, float z)
+static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *hull, float x,
+                                 float z)
 {
     float size = 8192.0f / terrimpi_max(terrimpi_abs(x), terrimpi_abs(z)), least = 0.0f;
     terrimp_sorted_int *side = s->sides[s->side_count++];
@@ -10106,9 +10167,9 @@ static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_hull *hull, f
     side[2] = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
 }
 
-static int32_t terrimpi_larger(int32_t a, int32_t b) { return a > b ? a : b; }
+static int32_t terrimpi_sorted_larger(int32_t a, int32_t b) { return a > b ? a : b; }
 
-static int32_t terrimpi_floor(float value)
+static int32_t terrimpi_sorted_floor(float value)
 {
     int32_t whole = (int32_t)value;
     return (float)whole > value ? whole - 1 : whole;
@@ -10116,7 +10177,7 @@ static int32_t terrimpi_floor(float value)
 
 /* The convex hull of the points, and the pages between its ends along each axis. Of a hull with
    more sides than can be kept the last ones are left out: what is drawn too much does not show. */
-static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_hull *hull)
+static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_hull *hull)
 {
     float page = (float)s->desc.page_quads;
     int i, k, first = 0, from, to, least[2] = { 0, 0 }, most[2] = { 0, 0 };
@@ -10128,12 +10189,12 @@ static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_hull *hu
             most[k] = hull->at[i][k] > hull->at[most[k]][k] ? i : most[k];
         }
     for (k = 0; k < 2; k++) {
-        s->bounds[k][0] = terrimpi_floor((hull->at[least[k]][k] - 1.0f) / page);
-        s->bounds[k][1] = terrimpi_floor((hull->at[most[k]][k] + 1.0f) / page);
+        s->bounds[k][0] = terrimpi_sorted_floor((hull->at[least[k]][k] - 1.0f) / page);
+        s->bounds[k][1] = terrimpi_sorted_floor((hull->at[most[k]][k] + 1.0f) / page);
     }
     for (from = first = least[0]; s->side_count < TERRIMP_SORTED_SIDES; from = to) {
         float x, z;
-        to = terrimpi_hull_next(hull, from);
+        to = terrimpi_sorted_hull_next(hull, from);
         x = hull->at[to][0] - hull->at[from][0];
         z = hull->at[to][1] - hull->at[from][1];
         if (to == from || !(x * x + z * z > 0.0f))
@@ -10179,9 +10240,9 @@ static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *f
         int32_t most = (int32_t)(s->sides[i][2] >> s->top) + 1 +
                        m * (m > 0 ? row + 1 : row);
         if (n > 0)
-            *first = terrimpi_larger(*first, -most / n - 1);
+            *first = terrimpi_sorted_larger(*first, -most / n - 1);
         else if (n < 0)
-            *last = -terrimpi_larger(-*last, most / n);
+            *last = -terrimpi_sorted_larger(-*last, most / n);
     }
 }
 
@@ -10218,7 +10279,7 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
         s->whole[level] = terrimpi_sorted_square(s, begins + 1.875f * size);
         begins = scale * (s->desc.table && level < s->top ? s->desc.table[level + 1] * unit
                                                            : 2.0f * size);
-        begins = (float)terrimpi_floor(terrimpi_min(begins, (float)s->limit));
+        begins = (float)terrimpi_sorted_floor(terrimpi_min(begins, (float)s->limit));
         range = (float)(terrimpi_sorted_square(s, begins) - s->whole[level]);
         s->fade[level] = range > 1.0f ? 1.0f / range : 1.0f;
     }
@@ -10247,7 +10308,8 @@ static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 
 /* The k-th of count places from first on, from both ends towards that of the eye, or away from
    it. */
-static int32_t terrimpi_outside_in(int32_t first, int32_t count, int32_t eye, int32_t k, int away)
+static int32_t terrimpi_sorted_outside_in(int32_t first, int32_t count, int32_t eye, int32_t k,
+                                          int away)
 {
     int32_t last = first + count - 1;
     eye = eye < first ? first : eye > last ? last : eye;
@@ -10345,7 +10407,8 @@ static void terrimpi_sorted_field_page(terrimp_sorted *s, terrimp_sorted_page *p
     const terrimp_heightfield *f = &s->desc.field;
     uint32_t quads = s->desc.page_quads, x = terrimpi_sorted_tile(page->x, s->pages[0]) * quads;
     uint32_t z = terrimpi_sorted_tile(page->z, s->pages[1]) * quads;
-    page->samples = (const char *)terrimpi_row(f, z) + x * terrimpi_sample_bytes(f->format);
+    page->samples = (const char *)terrimpi_field_row(f, z) + x *
+        terrimpi_field_sample_bytes(f->format);
     page->row_bytes = f->row_bytes;
     s->last[0] = (int32_t)terrimpi_min_u32(quads, f->width - 1u - x);
     s->last[1] = (int32_t)terrimpi_min_u32(quads, f->depth - 1u - z);
@@ -10409,15 +10472,15 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s, int to_count)
         int32_t last;
         if (s->row >= s->rows)
             return -1;
-        s->page_row = terrimpi_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
-                                          s->desc.front_to_back);
+        s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
+                                                 s->desc.front_to_back);
         terrimpi_sorted_row(s, s->page_row, &s->first_col, &last);
         s->cols = last - s->first_col + 1;
         s->col = 0;
     }
     place[across] = s->page_row;
-    place[along] = terrimpi_outside_in(s->first_col, s->cols, 0, s->col++,
-                                       s->desc.front_to_back);
+    place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, 0, s->col++,
+                                              s->desc.front_to_back);
     return terrimpi_sorted_enter(s, place, to_count);
 }
 
@@ -10594,7 +10657,7 @@ static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *
 #ifdef TERRIMP_FIXED
     v->height = height;
 #else
-    v->height = terrimpi_world_height(&s->desc.field, height);
+    v->height = terrimpi_field_world_height(&s->desc.field, height);
 #endif
 }
 
@@ -10728,7 +10791,7 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
     position[0] = terrimpi_float(f->origin_x + (float)vertex->x * f->spacing_x);
     position[2] = terrimpi_float(f->origin_z + (float)vertex->z * f->spacing_z);
 #ifdef TERRIMP_FIXED
-    position[1] = terrimpi_world_height(f, (float)vertex->height * (1.0f / 256.0f));
+    position[1] = terrimpi_field_world_height(f, (float)vertex->height * (1.0f / 256.0f));
 #else
     position[1] = vertex->height;
 #endif
@@ -10844,7 +10907,7 @@ static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3], float re
         return 0;
     for (k = 0; k < 2; k++) {
         s->unit[k] = (terrimp_sorted_int)terrimpi_max(spacing[k] / larger * unit + 0.5f, 1.0f);
-        s->eye[k] = (terrimp_sorted_int)terrimpi_floor(eye[2 * k] * (float)s->unit[k]);
+        s->eye[k] = (terrimp_sorted_int)terrimpi_sorted_floor(eye[2 * k] * (float)s->unit[k]);
     }
     rise = terrimpi_max(terrimpi_max(eye[1] - d->high, d->low - eye[1]), 0.0f) / larger * unit;
     s->limit = (terrimp_sorted_int)(TERRIMPI_SORTED_LIMIT - unit);
@@ -10879,7 +10942,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
                                                 const terrimp_camera *camera)
 {
     terrimp_camera c;
-    terrimpi_hull hull;
+    terrimpi_sorted_hull hull;
     float eye[3];
     int k;
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
@@ -10894,10 +10957,11 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
         if (k == 1)
             continue;
         TERRIMPI_REFUSE(!(terrimpi_abs(eye[k]) < 8388608.0f), TERRIMP_E_RANGE);
-        sorted->eye_page[k / 2] = terrimpi_floor(eye[k] / quads);
+        sorted->eye_page[k / 2] = terrimpi_sorted_floor(eye[k] / quads);
         eye[k] -= (float)sorted->eye_page[k / 2] * quads;
     }
-    terrimpi_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye, &hull);
+    terrimpi_sorted_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye,
+                                 &hull);
     TERRIMPI_REFUSE(!terrimpi_sorted_units(sorted, eye, hull.farthest), TERRIMP_E_RANGE);
     if (hull.count == 0)
         return TERRIMP_OK;
@@ -10922,7 +10986,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
    quads comes first. The last edge is a quad's own diagonal. */
 typedef struct terrimpi_sorted_block {
     terrimpi_mip_writer out;
-    terrimpi_pattern part; /* quads that are drawn */
+    terrimpi_terrain_pattern part; /* quads that are drawn */
     float x[3], z[3];      /* of the columns and rows of vertices, from the eye on */
 } terrimpi_sorted_block;
 
@@ -11016,13 +11080,13 @@ static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtr
 }
 
 /* The pattern that begins at an index of the shared buffer, and its coarse sides. */
-static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index, terrimpi_pattern *part,
-                                uint32_t *coarse)
+static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index,
+                                terrimpi_terrain_pattern *part, uint32_t *coarse)
 {
-    uint32_t i, strips = terrimpi_strip_count(quads) * TERRIMPI_DIRECTIONS;
+    uint32_t i, strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
     terrimp_pattern pattern;
     *coarse = 0;
-    *part = terrimpi_find_pattern(quads, 0);
+    *part = terrimpi_terrain_pattern_of(quads, 0);
     for (i = 0; i < TERRIMP_PATTERN_COUNT; i++)
         if (terrimp_pattern_find(quads, TERRIMP_FORM_LIST, i, &pattern) == TERRIMP_OK &&
             pattern.first_index == first_index) {
@@ -11031,7 +11095,7 @@ static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index, terrimpi_p
             return 1;
         }
     for (i = 1; i <= strips; i++) {
-        *part = terrimpi_find_pattern(quads, i);
+        *part = terrimpi_terrain_pattern_of(quads, i);
         if (part->first_index == first_index)
             return 1;
     }
@@ -11045,7 +11109,7 @@ TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
 {
     terrimpi_sorted_block b;
     terrimp_node n;
-    TERRIMPI_TRY(terrimpi_check_node(terrain, node, indices));
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, indices));
     TERRIMPI_REFUSE(!eye || !count, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(eye[0], eye[2]), TERRIMP_E_NOT_FINITE);
     b.out.quads = terrain->desc.chunk_quads;
@@ -11354,70 +11418,70 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
    those left of its edges, added and subtracted. An edge costs one step a row, thanks to running
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
-/* Heights are worked with in steps, -TERRIMPI_STEPS to +TERRIMPI_STEPS over the tile's range: few
+/* Heights are worked with in steps, -TERRIMPI_SIMP_STEPS to +TERRIMPI_SIMP_STEPS over the tile's range: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
-#define TERRIMPI_STEPS 2047
+#define TERRIMPI_SIMP_STEPS 2047
 
 /* Tenths of vertices inside the start mesh for each one inside the final mesh. More are better and
    slower: 20 gives rms 2.83 %, 30 gives 2.70 %, 40 gives 2.64 % in 1.15 times the time. */
-#define TERRIMPI_START_TENTHS 35
+#define TERRIMPI_SIMP_START_TENTHS 35
 
 /* Fans that a collapse is priced by, of those that miss the removed vertex least. All of them
    together gain nothing over 3, and 2 lose less than they save. */
-#define TERRIMPI_FANS 2
+#define TERRIMPI_SIMP_FANS 2
 
 /* One inner vertex in so many is placed by insertion at the worst sample. 4 gives the same max and
    a worse rms, 8 a worse max. */
-#define TERRIMPI_INSERT_SHARE 6
+#define TERRIMPI_SIMP_INSERT_SHARE 6
 
-#define TERRIMPI_ROUNDS 4             /* of flips and moves on the final mesh */
-#define TERRIMPI_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
-#define TERRIMPI_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
-#define TERRIMPI_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
-#define TERRIMPI_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
+#define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
+#define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
+#define TERRIMPI_SIMP_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
+#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
+#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
-typedef struct terrimpi_row_sum {
+typedef struct terrimpi_simp_row_prefix {
     int32_t h, hx, hh;
-} terrimpi_row_sum;
+} terrimpi_simp_row_prefix;
 
 /* Sums over a set of samples (x, z, h). */
 enum {
-    TERRIMPI_SUM_1 = 0,
-    TERRIMPI_SUM_X,
-    TERRIMPI_SUM_Z,
-    TERRIMPI_SUM_XX,
-    TERRIMPI_SUM_XZ,
-    TERRIMPI_SUM_ZZ,
-    TERRIMPI_SUM_H,
-    TERRIMPI_SUM_HX,
-    TERRIMPI_SUM_HZ,
-    TERRIMPI_SUM_HH,
-    TERRIMPI_SUM_COUNT
+    TERRIMPI_SIMP_SUM_1 = 0,
+    TERRIMPI_SIMP_SUM_X,
+    TERRIMPI_SIMP_SUM_Z,
+    TERRIMPI_SIMP_SUM_XX,
+    TERRIMPI_SIMP_SUM_XZ,
+    TERRIMPI_SIMP_SUM_ZZ,
+    TERRIMPI_SIMP_SUM_H,
+    TERRIMPI_SIMP_SUM_HX,
+    TERRIMPI_SIMP_SUM_HZ,
+    TERRIMPI_SIMP_SUM_HH,
+    TERRIMPI_SIMP_SUM_COUNT
 };
-typedef struct terrimpi_sums {
-    int64_t of[TERRIMPI_SUM_COUNT];
-} terrimpi_sums;
+typedef struct terrimpi_simp_moments {
+    int64_t of[TERRIMPI_SIMP_SUM_COUNT];
+} terrimpi_simp_moments;
 
 /* Squared error as a function of one vertex's height ref + d: c - 2 b d + a d^2. */
-typedef struct terrimpi_parabola {
+typedef struct terrimpi_simp_quadric {
     float a, b, c;
-} terrimpi_parabola;
+} terrimpi_simp_quadric;
 
 /* Where columns and rows of a tile really lie, when the last ones lie closer to those before them
    than the others: column x at x * step, but the last one at last_x. A triangle that faces up on
    the tile's even grid need not do so there; the mesh has to face up on both. */
-typedef struct terrimpi_squeeze {
+typedef struct terrimpi_simp_last_spacing {
     int32_t step, last_x, last_z;
-} terrimpi_squeeze;
+} terrimpi_simp_last_spacing;
 
 /* The mesh at work. Half-edge 4 t + k (k = 0, 1, 2) is side k of triangle t; it runs from origin[]
    to the origin of the next one, counter-clockwise. The border's vertices come first. */
 typedef struct terrimpi_simplifier {
     int32_t cols, rows;
     float middle, unit;     /* height = middle + unit * steps */
-    const terrimpi_squeeze *squeeze; /* NULL: none */
-    terrimpi_row_sum *row_sums; /* [rows][cols] */
+    const terrimpi_simp_last_spacing *squeeze; /* NULL: none */
+    terrimpi_simp_row_prefix *row_sums; /* [rows][cols] */
 
     int32_t border_count, vertex_count, triangle_count;
     int32_t half_edge_end, edge_count;
@@ -11431,17 +11495,17 @@ typedef struct terrimpi_simplifier {
     int32_t *twin;          /* [half-edge] the same edge in the next triangle; -1: border */
     int32_t *edge;          /* [half-edge] the edge's number */
     float *square;          /* [triangle] squared error, negative when not known */
-    terrimpi_sums *sums;    /* [edge] over the samples left (-x) of the edge, in its rows */
-    terrimpi_sums *spare;   /* [TERRIMPI_MAX_DEGREE^2] edges under trial */
+    terrimpi_simp_moments *sums;    /* [edge] over the samples left (-x) of the edge, in its rows */
+    terrimpi_simp_moments *spare;   /* [TERRIMPI_SIMP_MAX_DEGREE^2] edges under trial */
 } terrimpi_simplifier;
 
-static int32_t terrimpi_next(int32_t e) { return (e & 3) == 2 ? e - 2 : e + 1; }
-static int32_t terrimpi_prev(int32_t e) { return (e & 3) == 0 ? e + 2 : e - 1; }
+static int32_t terrimpi_simp_next(int32_t e) { return (e & 3) == 2 ? e - 2 : e + 1; }
+static int32_t terrimpi_simp_prev(int32_t e) { return (e & 3) == 0 ? e + 2 : e - 1; }
 
-static int32_t terrimpi_round(float v) { return (int32_t)(v + (v < 0.0f ? -0.5f : 0.5f)); }
+static int32_t terrimpi_simp_round(float v) { return (int32_t)(v + (v < 0.0f ? -0.5f : 0.5f)); }
 
 /* Twice the area of a triangle in the xz grid; positive exactly when its normal has y > 0. */
-static int32_t terrimpi_area(const terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
+static int32_t terrimpi_simp_area(const terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
 {
     int32_t bx = s->x[b] - s->x[a], bz = s->z[b] - s->z[a];
     int32_t cx = s->x[c] - s->x[a], cz = s->z[c] - s->z[a];
@@ -11449,24 +11513,24 @@ static int32_t terrimpi_area(const terrimpi_simplifier *s, int32_t a, int32_t b,
 }
 
 /* Where a vertex really lies. */
-static void terrimpi_true_place(const terrimpi_simplifier *s, int32_t v, int64_t place[2])
+static void terrimpi_simp_true_place(const terrimpi_simplifier *s, int32_t v, int64_t place[2])
 {
-    const terrimpi_squeeze *squeeze = s->squeeze;
+    const terrimpi_simp_last_spacing *squeeze = s->squeeze;
     place[0] = s->x[v] == s->cols - 1 ? squeeze->last_x : s->x[v] * squeeze->step;
     place[1] = s->z[v] == s->rows - 1 ? squeeze->last_z : s->z[v] * squeeze->step;
 }
 
 /* Does a triangle face up, on the tile's grid and where its corners really lie? */
-static int terrimpi_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
+static int terrimpi_simp_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
 {
     int64_t p[3][2];
-    if (terrimpi_area(s, a, b, c) <= 0)
+    if (terrimpi_simp_area(s, a, b, c) <= 0)
         return 0;
     if (!s->squeeze)
         return 1;
-    terrimpi_true_place(s, a, p[0]);
-    terrimpi_true_place(s, b, p[1]);
-    terrimpi_true_place(s, c, p[2]);
+    terrimpi_simp_true_place(s, a, p[0]);
+    terrimpi_simp_true_place(s, b, p[1]);
+    terrimpi_simp_true_place(s, c, p[2]);
     return terrimpi_twice_area(p[0], p[1], p[2]) > 0;
 }
 
@@ -11477,16 +11541,17 @@ static int terrimpi_faces_up(const terrimpi_simplifier *s, int32_t a, int32_t b,
    does so by at least 1 / 256 of a column, far more than the rounding of 256 rows together. A
    sample on an edge goes to the right, and on a level edge down; so every sample but those of the
    last row and the last column belongs to exactly one triangle. */
-typedef struct terrimpi_walk {
+typedef struct terrimpi_simp_edge_step {
     int32_t at, slope, z, end;
-} terrimpi_walk;
+} terrimpi_simp_edge_step;
 
-static terrimpi_walk terrimpi_walk_edge(int32_t x0, int32_t z0, int32_t x1, int32_t z1)
+static terrimpi_simp_edge_step terrimpi_simp_edge_stepper(int32_t x0, int32_t z0, int32_t x1,
+                                                          int32_t z1)
 {
     int upwards = z0 > z1;
     int32_t rows = upwards ? z0 - z1 : z1 - z0, x = upwards ? x1 : x0;
     int32_t run = (upwards ? x0 - x1 : x1 - x0) * (1 << 20);
-    terrimpi_walk w;
+    terrimpi_simp_edge_step w;
     w.z = upwards ? z1 : z0;
     w.end = w.z + rows;
     w.at = x * (1 << 20) + (1 << 20) - 1;
@@ -11497,19 +11562,19 @@ static terrimpi_walk terrimpi_walk_edge(int32_t x0, int32_t z0, int32_t x1, int3
 }
 
 /* Columns [left, right) of each row of [low, high) that belong to a triangle. */
-typedef struct terrimpi_span {
+typedef struct terrimpi_simp_span {
     int32_t low, high;
     int16_t left[TERRIMP_MAX_TILE_DIM], right[TERRIMP_MAX_TILE_DIM];
-} terrimpi_span;
+} terrimpi_simp_span;
 
-static void terrimpi_find_span(const terrimp_mesh_vertex corner[3], terrimpi_span *span)
+static void terrimpi_simp_find_span(const terrimp_mesh_vertex corner[3], terrimpi_simp_span *span)
 {
     int32_t k;
     span->low = span->high = corner[0].z;
     for (k = 0; k < 3; k++) {
         const terrimp_mesh_vertex *p = corner + k, *q = corner + (k + 1) % 3;
         int16_t *side = p->z < q->z ? span->left : span->right;
-        terrimpi_walk w = terrimpi_walk_edge(p->x, p->z, q->x, q->z);
+        terrimpi_simp_edge_step w = terrimpi_simp_edge_stepper(p->x, p->z, q->x, q->z);
         span->low = w.z < span->low ? w.z : span->low;
         span->high = w.end > span->high ? w.end : span->high;
         for (; w.z < w.end; w.z++, w.at += w.slope)
@@ -11518,17 +11583,17 @@ static void terrimpi_find_span(const terrimp_mesh_vertex corner[3], terrimpi_spa
 }
 
 /* Sums over the samples left of the edge between (x, z) and vertex b. */
-static void terrimpi_sum_edge(const terrimpi_simplifier *s, int32_t x, int32_t z, int32_t b,
-                              terrimpi_sums *out)
+static void terrimpi_simp_edge_moments(const terrimpi_simplifier *s, int32_t x, int32_t z,
+                                       int32_t b, terrimpi_simp_moments *out)
 {
-    terrimpi_walk w = terrimpi_walk_edge(x, z, s->x[b], s->z[b]);
-    const terrimpi_row_sum *row = s->row_sums + w.z * s->cols;
+    terrimpi_simp_edge_step w = terrimpi_simp_edge_stepper(x, z, s->x[b], s->z[b]);
+    const terrimpi_simp_row_prefix *row = s->row_sums + w.z * s->cols;
     int32_t n = 0, sx = 0, sh = 0;
     int64_t sxx = 0, shx = 0, shh = 0, end = w.end;
     int64_t n1 = 0, n2 = 0, sx1 = 0, sh1 = 0; /* sums of the sums so far: rows to the end count */
     for (; w.z < w.end; w.z++, w.at += w.slope, row += s->cols) {
         int32_t count = w.at >> 20;
-        const terrimpi_row_sum *sum = row + count;
+        const terrimpi_simp_row_prefix *sum = row + count;
         int32_t to_x = count * (count - 1) / 2; /* 0 + 1 + ... + (count - 1) */
         n += count;
         n1 += n;
@@ -11541,76 +11606,80 @@ static void terrimpi_sum_edge(const terrimpi_simplifier *s, int32_t x, int32_t z
         shx += sum->hx;
         shh += sum->hh;
     }
-    out->of[TERRIMPI_SUM_1] = n;
-    out->of[TERRIMPI_SUM_X] = sx;
-    out->of[TERRIMPI_SUM_Z] = end * n - n1;
-    out->of[TERRIMPI_SUM_XX] = sxx / 3;
-    out->of[TERRIMPI_SUM_XZ] = end * sx - sx1;
-    out->of[TERRIMPI_SUM_ZZ] = end * (end * n - 2 * n1) + 2 * n2 - n1;
-    out->of[TERRIMPI_SUM_H] = sh;
-    out->of[TERRIMPI_SUM_HX] = shx;
-    out->of[TERRIMPI_SUM_HZ] = end * sh - sh1;
-    out->of[TERRIMPI_SUM_HH] = shh;
+    out->of[TERRIMPI_SIMP_SUM_1] = n;
+    out->of[TERRIMPI_SIMP_SUM_X] = sx;
+    out->of[TERRIMPI_SIMP_SUM_Z] = end * n - n1;
+    out->of[TERRIMPI_SIMP_SUM_XX] = sxx / 3;
+    out->of[TERRIMPI_SIMP_SUM_XZ] = end * sx - sx1;
+    out->of[TERRIMPI_SIMP_SUM_ZZ] = end * (end * n - 2 * n1) + 2 * n2 - n1;
+    out->of[TERRIMPI_SIMP_SUM_H] = sh;
+    out->of[TERRIMPI_SIMP_SUM_HX] = shx;
+    out->of[TERRIMPI_SIMP_SUM_HZ] = end * sh - sh1;
+    out->of[TERRIMPI_SIMP_SUM_HH] = shh;
 }
 
 /* Sums over triangle abc from those of its edges, which rise in z by the given amounts: a rising
    edge has the triangle on its right, a falling one on its left. No branch, as the signs cannot be
    foretold; a level edge has empty sums. */
-static void terrimpi_sum_sides(const terrimpi_sums *ab, int32_t ab_rise, const terrimpi_sums *bc,
-                               int32_t bc_rise, const terrimpi_sums *ca, int32_t ca_rise,
-                               terrimpi_sums *out)
+static void terrimpi_simp_sides_moments(const terrimpi_simp_moments *ab, int32_t ab_rise,
+                                        const terrimpi_simp_moments *bc,
+                                        int32_t bc_rise, const terrimpi_simp_moments *ca,
+                                        int32_t ca_rise, terrimpi_simp_moments *out)
 {
     int64_t f = -(int64_t)(ab_rise > 0), g = -(int64_t)(bc_rise > 0), h = -(int64_t)(ca_rise > 0);
     int i;
-    for (i = 0; i < TERRIMPI_SUM_COUNT; i++)
+    for (i = 0; i < TERRIMPI_SIMP_SUM_COUNT; i++)
         out->of[i] = ((ab->of[i] ^ f) - f) + ((bc->of[i] ^ g) - g) + ((ca->of[i] ^ h) - h);
 }
 
-static void terrimpi_sum_triangle(const terrimpi_simplifier *s, int32_t e, terrimpi_sums *out)
+static void terrimpi_simp_triangle_moments(const terrimpi_simplifier *s, int32_t e,
+                                           terrimpi_simp_moments *out)
 {
-    int32_t e1 = terrimpi_next(e), e2 = terrimpi_prev(e);
+    int32_t e1 = terrimpi_simp_next(e), e2 = terrimpi_simp_prev(e);
     int32_t az = s->z[s->origin[e]], bz = s->z[s->origin[e1]], cz = s->z[s->origin[e2]];
-    terrimpi_sum_sides(s->sums + s->edge[e], bz - az, s->sums + s->edge[e1], cz - bz,
-                       s->sums + s->edge[e2], az - cz, out);
+    terrimpi_simp_sides_moments(s->sums + s->edge[e], bz - az, s->sums + s->edge[e1], cz - bz,
+                                s->sums + s->edge[e2], az - cz, out);
 }
 
 /* Works out the sums of a half-edge's edge after an end has moved. */
-static void terrimpi_renew_edge(terrimpi_simplifier *s, int32_t e)
+static void terrimpi_simp_update_edge(terrimpi_simplifier *s, int32_t e)
 {
     int32_t a = s->origin[e];
-    terrimpi_sum_edge(s, s->x[a], s->z[a], s->origin[terrimpi_next(e)], s->sums + s->edge[e]);
+    terrimpi_simp_edge_moments(s, s->x[a], s->z[a], s->origin[terrimpi_simp_next(e)],
+                               s->sums + s->edge[e]);
 }
 
 /* --- squared errors from sums --- */
 
 /* The sums of a triangle abc about its corner a and the height ref, and its plane when a stands at
    ref: slopes gx, gz. The weight of a falls from 1 at a with the slopes wx, wz. */
-typedef struct terrimpi_local {
+typedef struct terrimpi_simp_local {
     float n, x, z, xx, xz, zz, h, hx, hz, hh;
     float gx, gz, wx, wz;
-} terrimpi_local;
+} terrimpi_simp_local;
 
-static void terrimpi_localise(const terrimpi_simplifier *s, const terrimpi_sums *sums, int32_t a,
-                              int32_t b, int32_t c, int32_t ref, terrimpi_local *l)
+static void terrimpi_simp_recentre(const terrimpi_simplifier *s, const terrimpi_simp_moments *sums,
+                                   int32_t a,
+                                   int32_t b, int32_t c, int32_t ref, terrimpi_simp_local *l)
 {
     const int64_t *of = sums->of;
     int32_t ox = s->x[a], oz = s->z[a];
     int32_t bx = s->x[b] - ox, bz = s->z[b] - oz, cx = s->x[c] - ox, cz = s->z[c] - oz;
-    int64_t x = of[TERRIMPI_SUM_X] - ox * of[TERRIMPI_SUM_1];
-    int64_t z = of[TERRIMPI_SUM_Z] - oz * of[TERRIMPI_SUM_1];
-    int64_t h = of[TERRIMPI_SUM_H] - ref * of[TERRIMPI_SUM_1];
+    int64_t x = of[TERRIMPI_SIMP_SUM_X] - ox * of[TERRIMPI_SIMP_SUM_1];
+    int64_t z = of[TERRIMPI_SIMP_SUM_Z] - oz * of[TERRIMPI_SIMP_SUM_1];
+    int64_t h = of[TERRIMPI_SIMP_SUM_H] - ref * of[TERRIMPI_SIMP_SUM_1];
     float inverse = 1.0f / (float)(bz * cx - bx * cz);
     float hb = (s->height[b] - (float)ref) * inverse, hc = (s->height[c] - (float)ref) * inverse;
-    l->n = (float)of[TERRIMPI_SUM_1];
+    l->n = (float)of[TERRIMPI_SIMP_SUM_1];
     l->x = (float)x;
     l->z = (float)z;
-    l->xx = (float)(of[TERRIMPI_SUM_XX] - ox * (of[TERRIMPI_SUM_X] + x));
-    l->xz = (float)(of[TERRIMPI_SUM_XZ] - ox * of[TERRIMPI_SUM_Z] - oz * x);
-    l->zz = (float)(of[TERRIMPI_SUM_ZZ] - oz * (of[TERRIMPI_SUM_Z] + z));
+    l->xx = (float)(of[TERRIMPI_SIMP_SUM_XX] - ox * (of[TERRIMPI_SIMP_SUM_X] + x));
+    l->xz = (float)(of[TERRIMPI_SIMP_SUM_XZ] - ox * of[TERRIMPI_SIMP_SUM_Z] - oz * x);
+    l->zz = (float)(of[TERRIMPI_SIMP_SUM_ZZ] - oz * (of[TERRIMPI_SIMP_SUM_Z] + z));
     l->h = (float)h;
-    l->hx = (float)(of[TERRIMPI_SUM_HX] - ox * of[TERRIMPI_SUM_H] - ref * x);
-    l->hz = (float)(of[TERRIMPI_SUM_HZ] - oz * of[TERRIMPI_SUM_H] - ref * z);
-    l->hh = (float)(of[TERRIMPI_SUM_HH] - ref * (of[TERRIMPI_SUM_H] + h));
+    l->hx = (float)(of[TERRIMPI_SIMP_SUM_HX] - ox * of[TERRIMPI_SIMP_SUM_H] - ref * x);
+    l->hz = (float)(of[TERRIMPI_SIMP_SUM_HZ] - oz * of[TERRIMPI_SIMP_SUM_H] - ref * z);
+    l->hh = (float)(of[TERRIMPI_SIMP_SUM_HH] - ref * (of[TERRIMPI_SIMP_SUM_H] + h));
     l->gx = (float)bz * hc - (float)cz * hb;
     l->gz = (float)cx * hb - (float)bx * hc;
     l->wx = (float)(cz - bz) * inverse;
@@ -11618,13 +11687,14 @@ static void terrimpi_localise(const terrimpi_simplifier *s, const terrimpi_sums 
 }
 
 /* Squared error over triangle abc. */
-static float terrimpi_square_error(const terrimpi_simplifier *s, const terrimpi_sums *sums,
-                                   int32_t a, int32_t b, int32_t c)
+static float terrimpi_simp_square_error(const terrimpi_simplifier *s,
+                                        const terrimpi_simp_moments *sums,
+                                        int32_t a, int32_t b, int32_t c)
 {
-    int32_t ref = terrimpi_round(s->height[a]);
+    int32_t ref = terrimpi_simp_round(s->height[a]);
     float d = s->height[a] - (float)ref, gx, gz;
-    terrimpi_local l;
-    terrimpi_localise(s, sums, a, b, c, ref, &l);
+    terrimpi_simp_local l;
+    terrimpi_simp_recentre(s, sums, a, b, c, ref, &l);
     gx = l.gx + d * l.wx;
     gz = l.gz + d * l.wz;
     return l.hh + gx * (gx * l.xx + 2.0f * (gz * l.xz - l.hx)) + gz * (gz * l.zz - 2.0f * l.hz) +
@@ -11632,7 +11702,7 @@ static float terrimpi_square_error(const terrimpi_simplifier *s, const terrimpi_
 }
 
 /* Adds the squared error over triangle abc as a function of a's height. */
-static void terrimpi_add_triangle(const terrimpi_local *l, terrimpi_parabola *p)
+static void terrimpi_simp_add_triangle(const terrimpi_simp_local *l, terrimpi_simp_quadric *p)
 {
     float ux = l->gx * l->xx + l->gz * l->xz, uz = l->gx * l->xz + l->gz * l->zz;
     p->a += l->n + 2.0f * (l->wx * l->x + l->wz * l->z) +
@@ -11644,49 +11714,50 @@ static void terrimpi_add_triangle(const terrimpi_local *l, terrimpi_parabola *p)
 /* --- the triangles round an inner vertex --- */
 
 /* The triangles round an inner vertex, counter-clockwise: half-edges that leave it, and the
-   vertices where those end. No triangles when there are more than TERRIMPI_MAX_DEGREE. */
-typedef struct terrimpi_ring {
+   vertices where those end. No triangles when there are more than TERRIMPI_SIMP_MAX_DEGREE. */
+typedef struct terrimpi_simp_ring {
     int32_t count;
-    int32_t spoke[TERRIMPI_MAX_DEGREE];
-    int32_t vertex[TERRIMPI_MAX_DEGREE];
-} terrimpi_ring;
+    int32_t spoke[TERRIMPI_SIMP_MAX_DEGREE];
+    int32_t vertex[TERRIMPI_SIMP_MAX_DEGREE];
+} terrimpi_simp_ring;
 
-static int32_t terrimpi_ring_next(const terrimpi_ring *ring, int32_t i)
+static int32_t terrimpi_simp_ring_next(const terrimpi_simp_ring *ring, int32_t i)
 {
     return i + 1 < ring->count ? i + 1 : 0;
 }
 
-static void terrimpi_find_ring(const terrimpi_simplifier *s, int32_t v, terrimpi_ring *ring)
+static void terrimpi_simp_find_ring(const terrimpi_simplifier *s, int32_t v,
+                                    terrimpi_simp_ring *ring)
 {
     int32_t e = s->out_edge[v], n = 0;
     do {
-        if (n == TERRIMPI_MAX_DEGREE) {
+        if (n == TERRIMPI_SIMP_MAX_DEGREE) {
             n = 0;
             break;
         }
         ring->spoke[n] = e;
-        ring->vertex[n++] = s->origin[terrimpi_next(e)];
-        e = s->twin[terrimpi_prev(e)];
+        ring->vertex[n++] = s->origin[terrimpi_simp_next(e)];
+        e = s->twin[terrimpi_simp_prev(e)];
     } while (e != s->out_edge[v]);
     ring->count = n;
 }
 
 /* Squared error of the triangle of half-edge e, worked out when it is not known. */
-static float terrimpi_triangle_error(terrimpi_simplifier *s, int32_t e)
+static float terrimpi_simp_triangle_error(terrimpi_simplifier *s, int32_t e)
 {
     float *square = s->square + (e >> 2);
     if (*square < 0.0f) {
-        terrimpi_sums sums;
-        terrimpi_sum_triangle(s, e, &sums);
-        *square = terrimpi_max(0.0f, terrimpi_square_error(s, &sums, s->origin[e],
-                                                           s->origin[terrimpi_next(e)],
-                                                           s->origin[terrimpi_prev(e)]));
+        terrimpi_simp_moments sums;
+        terrimpi_simp_triangle_moments(s, e, &sums);
+        *square = terrimpi_max(0.0f, terrimpi_simp_square_error(s, &sums, s->origin[e],
+                                                                s->origin[terrimpi_simp_next(e)],
+                                                                s->origin[terrimpi_simp_prev(e)]));
     }
     return *square;
 }
 
 /* Forgets the errors of a ring's triangles. */
-static void terrimpi_forget(terrimpi_simplifier *s, const terrimpi_ring *ring)
+static void terrimpi_simp_forget_errors(terrimpi_simplifier *s, const terrimpi_simp_ring *ring)
 {
     int32_t i;
     for (i = 0; i < ring->count; i++)
@@ -11694,77 +11765,79 @@ static void terrimpi_forget(terrimpi_simplifier *s, const terrimpi_ring *ring)
 }
 
 /* Squared error round v as a function of its height, and what it is made of, by triangle. */
-static terrimpi_parabola terrimpi_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                             const terrimpi_ring *ring, int32_t ref,
-                                             terrimpi_local part[TERRIMPI_MAX_DEGREE])
+static terrimpi_simp_quadric terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v,
+                                                      const terrimpi_simp_ring *ring, int32_t ref,
+                                                      terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
 {
-    terrimpi_parabola p = {0.0f, 0.0f, 0.0f};
+    terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     int32_t i;
     for (i = 0; i < ring->count; i++) {
-        int32_t j = terrimpi_ring_next(ring, i);
-        terrimpi_sums sums;
-        terrimpi_sum_triangle(s, ring->spoke[i], &sums);
-        terrimpi_localise(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, part + i);
-        terrimpi_add_triangle(part + i, &p);
+        int32_t j = terrimpi_simp_ring_next(ring, i);
+        terrimpi_simp_moments sums;
+        terrimpi_simp_triangle_moments(s, ring->spoke[i], &sums);
+        terrimpi_simp_recentre(s, &sums, v, ring->vertex[i], ring->vertex[j], ref, part + i);
+        terrimpi_simp_add_triangle(part + i, &p);
     }
     return p;
 }
 
 /* Gives v the height that fits best while its neighbours hold still. */
-static void terrimpi_fit_height(terrimpi_simplifier *s, int32_t v)
+static void terrimpi_simp_fit_height(terrimpi_simplifier *s, int32_t v)
 {
-    int32_t ref = terrimpi_round(s->height[v]);
-    terrimpi_local part[TERRIMPI_MAX_DEGREE];
-    terrimpi_parabola p;
-    terrimpi_ring ring;
-    terrimpi_find_ring(s, v, &ring);
-    p = terrimpi_ring_error(s, v, &ring, ref, part);
+    int32_t ref = terrimpi_simp_round(s->height[v]);
+    terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE];
+    terrimpi_simp_quadric p;
+    terrimpi_simp_ring ring;
+    terrimpi_simp_find_ring(s, v, &ring);
+    p = terrimpi_simp_ring_error(s, v, &ring, ref, part);
     if (p.a > 0.0f)
         s->height[v] = (float)ref + p.b / p.a;
-    terrimpi_forget(s, &ring);
+    terrimpi_simp_forget_errors(s, &ring);
 }
 
 /* One sweep of Gauss and Seidel's least squares over all inner heights. One is enough, as every
    move fits heights too: more change the rms in the fourth digit. */
-static void terrimpi_fit_all(terrimpi_simplifier *s)
+static void terrimpi_simp_fit_all(terrimpi_simplifier *s)
 {
     int32_t v;
     for (v = s->border_count; v < s->vertex_count; v++)
         if (s->out_edge[v] >= 0)
-            terrimpi_fit_height(s, v);
+            terrimpi_simp_fit_height(s, v);
 }
 
 /* --- moves --- */
 
 /* Stands v on another sample if that keeps the cover and lowers *error, the squared error round v
    at its best height. */
-static int terrimpi_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_ring *ring,
-                             int32_t x, int32_t z, float *error)
+static int terrimpi_simp_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
+                                  int32_t x, int32_t z, float *error)
 {
-    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_round(s->height[v]), n = ring->count;
+    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]), n =
+        ring->count;
     int32_t i, j;
-    terrimpi_parabola p = {0.0f, 0.0f, 0.0f};
+    terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     if (x <= 0 || z <= 0 || x >= s->cols - 1 || z >= s->rows - 1)
         return 0;
     s->x[v] = x;
     s->z[v] = z;
-    for (i = 0, j = n - 1; i < n && terrimpi_faces_up(s, v, ring->vertex[j], ring->vertex[i]); i++)
+    for (i = 0, j = n - 1; i < n && terrimpi_simp_faces_up(s, v, ring->vertex[j],
+                                                           ring->vertex[i]); i++)
         j = i;
     if (i == n)
         for (i = 0; i < n; i++)
-            terrimpi_sum_edge(s, x, z, ring->vertex[i], s->spare + i);
+            terrimpi_simp_edge_moments(s, x, z, ring->vertex[i], s->spare + i);
     else
         n = i = 0;
     /* a part of the triangles that is already worse ends the trial */
     for (j = n - 1, i = 0; i < n && !(p.c * p.a - p.b * p.b > *error * p.a); j = i++) {
         int32_t b = ring->vertex[j], c = ring->vertex[i];
-        terrimpi_sums sums;
-        terrimpi_local l;
-        terrimpi_sum_sides(s->spare + j, s->z[b] - z,
-                           s->sums + s->edge[terrimpi_next(ring->spoke[j])], s->z[c] - s->z[b],
-                           s->spare + i, z - s->z[c], &sums);
-        terrimpi_localise(s, &sums, v, b, c, ref, &l);
-        terrimpi_add_triangle(&l, &p);
+        terrimpi_simp_moments sums;
+        terrimpi_simp_local l;
+        terrimpi_simp_sides_moments(s->spare + j, s->z[b] - z,
+                                    s->sums + s->edge[terrimpi_simp_next(ring->spoke[j])],
+                                    s->z[c] - s->z[b], s->spare + i, z - s->z[c], &sums);
+        terrimpi_simp_recentre(s, &sums, v, b, c, ref, &l);
+        terrimpi_simp_add_triangle(&l, &p);
     }
     if (n > 0 && i == n && p.a > 0.0f && p.c - p.b * (p.b / p.a) < *error) {
         *error = p.c - p.b * (p.b / p.a);
@@ -11782,22 +11855,22 @@ static int terrimpi_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_r
    step of Gauss and Newton: to first order a move adds weight * (gx dx + gz dz) to the residual of
    a sample, where weight is v's share in it and gx, gz are the slopes of its triangle. Returns the
    squared error round v as it stands, or -1 when no way can be told. */
-static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring *ring, float *dx,
-                          float *dz)
+static float terrimpi_simp_newton_step(terrimpi_simplifier *s, int32_t v,
+                                       const terrimpi_simp_ring *ring, float *dx, float *dz)
 {
-    int32_t ref = terrimpi_round(s->height[v]), i;
-    terrimpi_local part[TERRIMPI_MAX_DEGREE];
-    terrimpi_parabola p = terrimpi_ring_error(s, v, ring, ref, part);
+    int32_t ref = terrimpi_simp_round(s->height[v]), i;
+    terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE];
+    terrimpi_simp_quadric p = terrimpi_simp_ring_error(s, v, ring, ref, part);
     float xx = 0.0f, xz = 0.0f, zz = 0.0f, xh = 0.0f, zh = 0.0f, rx = 0.0f, rz = 0.0f, d, det;
     if (!(p.a > 0.0f))
         return -1.0f;
     d = p.b / p.a;
     s->height[v] = (float)ref + d;
-    terrimpi_forget(s, ring);
+    terrimpi_simp_forget_errors(s, ring);
     for (i = 0; i < ring->count; i++) {
         float gx = part[i].gx + d * part[i].wx, gz = part[i].gz + d * part[i].wz, residual;
-        terrimpi_parabola own = {0.0f, 0.0f, 0.0f};
-        terrimpi_add_triangle(part + i, &own);
+        terrimpi_simp_quadric own = {0.0f, 0.0f, 0.0f};
+        terrimpi_simp_add_triangle(part + i, &own);
         residual = own.b - d * own.a;
         xx += own.a * gx * gx;
         xz += own.a * gx * gz;
@@ -11822,27 +11895,27 @@ static float terrimpi_aim(terrimpi_simplifier *s, int32_t v, const terrimpi_ring
 }
 
 /* Moves v towards its best place, all the way or half of it. Returns whether it moved. */
-static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
+static int terrimpi_simp_improve_vertex(terrimpi_simplifier *s, int32_t v)
 {
-    terrimpi_ring ring;
+    terrimpi_simp_ring ring;
     float error, dx = 0.0f, dz = 0.0f, length;
     int i;
-    terrimpi_find_ring(s, v, &ring);
-    error = TERRIMPI_GAIN * terrimpi_aim(s, v, &ring, &dx, &dz);
+    terrimpi_simp_find_ring(s, v, &ring);
+    error = TERRIMPI_SIMP_GAIN * terrimpi_simp_newton_step(s, v, &ring, &dx, &dz);
     if (!(error > 0.0f))
         return 0;
     length = TERRIMP_SQRTF(dx * dx + dz * dz);
     if (!(length < TERRIMPI_FLOAT_MAX))
         return 0;
-    if (length > TERRIMPI_MOVE_LIMIT) {
-        dx *= TERRIMPI_MOVE_LIMIT / length;
-        dz *= TERRIMPI_MOVE_LIMIT / length;
+    if (length > TERRIMPI_SIMP_MOVE_LIMIT) {
+        dx *= TERRIMPI_SIMP_MOVE_LIMIT / length;
+        dz *= TERRIMPI_SIMP_MOVE_LIMIT / length;
     }
     for (i = 0; i < 2; i++, dx *= 0.5f, dz *= 0.5f) {
-        int32_t to_x = terrimpi_round(dx), to_z = terrimpi_round(dz);
+        int32_t to_x = terrimpi_simp_round(dx), to_z = terrimpi_simp_round(dz);
         if (to_x == 0 && to_z == 0)
             return 0;
-        if (terrimpi_try_move(s, v, &ring, s->x[v] + to_x, s->z[v] + to_z, &error))
+        if (terrimpi_simp_try_move(s, v, &ring, s->x[v] + to_x, s->z[v] + to_z, &error))
             return 1;
     }
     return 0;
@@ -11850,7 +11923,7 @@ static int terrimpi_improve_vertex(terrimpi_simplifier *s, int32_t v)
 
 /* --- flips --- */
 
-static void terrimpi_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32_t edge)
+static void terrimpi_simp_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32_t edge)
 {
     s->twin[e] = twin;
     s->edge[e] = edge;
@@ -11862,67 +11935,71 @@ static void terrimpi_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32
 
 /* Finds the corners a, b, c, d of the triangles abc and bad beside half-edge e = ab. Returns
    whether adc and bcd, which have the other diagonal, would face up. */
-static int terrimpi_can_flip(const terrimpi_simplifier *s, int32_t e, int32_t v[4])
+static int terrimpi_simp_can_flip(const terrimpi_simplifier *s, int32_t e, int32_t v[4])
 {
     int32_t f = s->twin[e];
     if (f < 0)
         return 0;
     v[0] = s->origin[e];
     v[1] = s->origin[f];
-    v[2] = s->origin[terrimpi_prev(e)];
-    v[3] = s->origin[terrimpi_prev(f)];
-    return terrimpi_faces_up(s, v[0], v[3], v[2]) && terrimpi_faces_up(s, v[3], v[1], v[2]);
+    v[2] = s->origin[terrimpi_simp_prev(e)];
+    v[3] = s->origin[terrimpi_simp_prev(f)];
+    return terrimpi_simp_faces_up(s, v[0], v[3], v[2]) && terrimpi_simp_faces_up(s, v[3], v[1],
+                                                                                 v[2]);
 }
 
 /* Triangles abc (half-edge e = ab) and bad become adc and bcd; `sums` are those of edge cd. */
-static void terrimpi_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_sums *sums)
+static void terrimpi_simp_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_simp_moments *sums)
 {
-    int32_t f = s->twin[e], bc = terrimpi_next(e), ad = terrimpi_next(f);
-    int32_t c = s->origin[terrimpi_prev(e)], d = s->origin[terrimpi_prev(f)], flipped = s->edge[e];
+    int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f);
+    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)], flipped =
+        s->edge[e];
     s->out_edge[s->origin[e]] = e;
     s->out_edge[s->origin[f]] = f;
     s->out_edge[c] = ad;
     s->out_edge[d] = bc;
-    terrimpi_link(s, e, s->twin[ad], s->edge[ad]);
-    terrimpi_link(s, f, s->twin[bc], s->edge[bc]);
+    terrimpi_simp_link(s, e, s->twin[ad], s->edge[ad]);
+    terrimpi_simp_link(s, f, s->twin[bc], s->edge[bc]);
     s->origin[ad] = c;
     s->origin[bc] = d;
-    terrimpi_link(s, ad, bc, flipped);
+    terrimpi_simp_link(s, ad, bc, flipped);
     s->sums[flipped] = *sums;
     s->square[e >> 2] = s->square[f >> 2] = -1.0f;
 }
 
 /* Flips the edge of e if that lowers the squared error. */
-static void terrimpi_try_flip(terrimpi_simplifier *s, int32_t e)
+static void terrimpi_simp_try_flip(terrimpi_simplifier *s, int32_t e)
 {
     int32_t f = s->twin[e], v[4], az, bz, cz, dz;
-    terrimpi_sums sums, fresh;
+    terrimpi_simp_moments sums, fresh;
     float before, after;
-    const terrimpi_sums *edge_sums = s->sums;
-    if (!terrimpi_can_flip(s, e, v))
+    const terrimpi_simp_moments *edge_sums = s->sums;
+    if (!terrimpi_simp_can_flip(s, e, v))
         return;
     az = s->z[v[0]];
     bz = s->z[v[1]];
     cz = s->z[v[2]];
     dz = s->z[v[3]];
-    before = terrimpi_triangle_error(s, e) + terrimpi_triangle_error(s, f);
-    terrimpi_sum_edge(s, s->x[v[2]], cz, v[3], &fresh);
-    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_next(f)], dz - az, &fresh, cz - dz,
-                       edge_sums + s->edge[terrimpi_prev(e)], az - cz, &sums);
-    after = terrimpi_square_error(s, &sums, v[0], v[3], v[2]);
-    terrimpi_sum_sides(edge_sums + s->edge[terrimpi_prev(f)], bz - dz,
-                       edge_sums + s->edge[terrimpi_next(e)], cz - bz, &fresh, dz - cz, &sums);
-    after += terrimpi_square_error(s, &sums, v[3], v[1], v[2]);
-    if (after < TERRIMPI_GAIN * before)
-        terrimpi_flip(s, e, &fresh);
+    before = terrimpi_simp_triangle_error(s, e) + terrimpi_simp_triangle_error(s, f);
+    terrimpi_simp_edge_moments(s, s->x[v[2]], cz, v[3], &fresh);
+    terrimpi_simp_sides_moments(edge_sums + s->edge[terrimpi_simp_next(f)], dz - az, &fresh,
+                                cz - dz,
+                                edge_sums + s->edge[terrimpi_simp_prev(e)], az - cz, &sums);
+    after = terrimpi_simp_square_error(s, &sums, v[0], v[3], v[2]);
+    terrimpi_simp_sides_moments(edge_sums + s->edge[terrimpi_simp_prev(f)], bz - dz,
+                                edge_sums + s->edge[terrimpi_simp_next(e)], cz - bz, &fresh,
+                                dz - cz, &sums);
+    after += terrimpi_simp_square_error(s, &sums, v[3], v[1], v[2]);
+    if (after < TERRIMPI_SIMP_GAIN * before)
+        terrimpi_simp_flip(s, e, &fresh);
 }
 
-static void terrimpi_flip_all(terrimpi_simplifier *s)
+static void terrimpi_simp_flip_all(terrimpi_simplifier *s)
 {
     int32_t e;
     for (e = 0; e < s->half_edge_end; e++)
         if ((e & 3) != 3 && s->origin[e] >= 0 && s->twin[e] > e)
-            terrimpi_try_flip(s, e);
+            terrimpi_simp_try_flip(s, e);
 }
 
 /* --- collapses (Hess 3.1) --- */
@@ -11931,24 +12008,24 @@ static void terrimpi_flip_all(terrimpi_simplifier *s)
    negative number when the fan does not cover the ring's polygon one to one, which forbids the
    collapse. Inner vertices alone collapse here, so the outline and the corners stay (fig. 3.2);
    the borders were simplified on their own. */
-static float terrimpi_fan_miss(const terrimpi_simplifier *s, int32_t v, const terrimpi_ring *ring,
-                               int32_t k)
+static float terrimpi_simp_fan_residual(const terrimpi_simplifier *s, int32_t v,
+                                        const terrimpi_simp_ring *ring, int32_t k)
 {
     int32_t i, a = ring->vertex[k], j, b, c, before = 1;
     float miss = 0.0f;
-    j = terrimpi_ring_next(ring, k);
+    j = terrimpi_simp_ring_next(ring, k);
     c = ring->vertex[j];
     for (i = 2; i < ring->count; i++) {
         int32_t area, after;
-        j = terrimpi_ring_next(ring, j);
+        j = terrimpi_simp_ring_next(ring, j);
         b = c;
         c = ring->vertex[j];
-        area = terrimpi_area(s, a, b, c);
-        if (!terrimpi_faces_up(s, a, b, c))
+        area = terrimpi_simp_area(s, a, b, c);
+        if (!terrimpi_simp_faces_up(s, a, b, c))
             return -1.0f;
-        after = before > 0 ? terrimpi_area(s, a, c, v) : -1;
+        after = before > 0 ? terrimpi_simp_area(s, a, c, v) : -1;
         if (before > 0 && after <= 0) { /* v lies between ab and ac */
-            float wb = (float)-after, wc = (float)terrimpi_area(s, a, b, v);
+            float wb = (float)-after, wc = (float)terrimpi_simp_area(s, a, b, v);
             float ha = s->height[a];
             miss = ha - s->height[v] +
                    (wb * (s->height[b] - ha) + wc * (s->height[c] - ha)) / (float)area;
@@ -11961,57 +12038,59 @@ static float terrimpi_fan_miss(const terrimpi_simplifier *s, int32_t v, const te
 
 /* Sums of the edge between corners k and j of a ring: of the ring's own edge when they are
    neighbours, else worked out once for all fans. */
-static const terrimpi_sums *terrimpi_diagonal(const terrimpi_simplifier *s,
-                                              const terrimpi_ring *ring, uint32_t *known,
-                                              int32_t k, int32_t j)
+static const terrimpi_simp_moments *terrimpi_simp_diagonal(const terrimpi_simplifier *s,
+                                                           const terrimpi_simp_ring *ring,
+                                                           uint32_t *known, int32_t k, int32_t j)
 {
     int32_t n = ring->count, low = k < j ? k : j, high = k < j ? j : k;
-    terrimpi_sums *sums = s->spare + low * TERRIMPI_MAX_DEGREE + high;
+    terrimpi_simp_moments *sums = s->spare + low * TERRIMPI_SIMP_MAX_DEGREE + high;
     if (high == low + 1)
-        return s->sums + s->edge[terrimpi_next(ring->spoke[low])];
+        return s->sums + s->edge[terrimpi_simp_next(ring->spoke[low])];
     if (low == 0 && high == n - 1)
-        return s->sums + s->edge[terrimpi_next(ring->spoke[high])];
+        return s->sums + s->edge[terrimpi_simp_next(ring->spoke[high])];
     if (!(known[low] & (1u << high))) {
         int32_t v = ring->vertex[low];
         known[low] |= 1u << high;
-        terrimpi_sum_edge(s, s->x[v], s->z[v], ring->vertex[high], sums);
+        terrimpi_simp_edge_moments(s, s->x[v], s->z[v], ring->vertex[high], sums);
     }
     return sums;
 }
 
 /* Squared error of the fan from corner k of a ring, or anything from `limit` up. */
-static float terrimpi_fan_error(const terrimpi_simplifier *s, const terrimpi_ring *ring,
-                                uint32_t *known, int32_t k, float limit)
+static float terrimpi_simp_fan_error(const terrimpi_simplifier *s, const terrimpi_simp_ring *ring,
+                                     uint32_t *known, int32_t k, float limit)
 {
-    int32_t i, a = ring->vertex[k], j = terrimpi_ring_next(ring, k);
+    int32_t i, a = ring->vertex[k], j = terrimpi_simp_ring_next(ring, k);
     float error = 0.0f;
     for (i = 2; i < ring->count && error < limit; i++) {
-        int32_t next = terrimpi_ring_next(ring, j);
+        int32_t next = terrimpi_simp_ring_next(ring, j);
         int32_t b = ring->vertex[j], c = ring->vertex[next];
-        terrimpi_sums sums;
-        terrimpi_sum_sides(terrimpi_diagonal(s, ring, known, k, j), s->z[b] - s->z[a],
-                           terrimpi_diagonal(s, ring, known, j, next), s->z[c] - s->z[b],
-                           terrimpi_diagonal(s, ring, known, k, next), s->z[a] - s->z[c], &sums);
-        error += terrimpi_square_error(s, &sums, a, b, c);
+        terrimpi_simp_moments sums;
+        terrimpi_simp_sides_moments(terrimpi_simp_diagonal(s, ring, known, k, j), s->z[b] - s->z[a],
+                                    terrimpi_simp_diagonal(s, ring, known, j, next),
+                                    s->z[c] - s->z[b],
+                                    terrimpi_simp_diagonal(s, ring, known, k, next),
+                                    s->z[a] - s->z[c], &sums);
+        error += terrimpi_simp_square_error(s, &sums, a, b, c);
         j = next;
     }
     return error;
 }
 
 /* Finds the best collapse of inner vertex v and its cost. */
-static void terrimpi_price(terrimpi_simplifier *s, int32_t v)
+static void terrimpi_simp_price(terrimpi_simplifier *s, int32_t v)
 {
-    uint32_t known[TERRIMPI_MAX_DEGREE];
-    int32_t fan[TERRIMPI_MAX_DEGREE], fans = 0, i, k;
-    float miss[TERRIMPI_MAX_DEGREE], best = TERRIMPI_FLOAT_MAX;
-    terrimpi_ring ring;
-    terrimpi_find_ring(s, v, &ring);
+    uint32_t known[TERRIMPI_SIMP_MAX_DEGREE];
+    int32_t fan[TERRIMPI_SIMP_MAX_DEGREE], fans = 0, i, k;
+    float miss[TERRIMPI_SIMP_MAX_DEGREE], best = TERRIMPI_FLOAT_MAX;
+    terrimpi_simp_ring ring;
+    terrimpi_simp_find_ring(s, v, &ring);
     s->stale[v] = 0;
     s->target[v] = -1;
     s->cost[v] = TERRIMPI_FLOAT_MAX;
     memset(known, 0, sizeof known);
     for (k = 0; k < ring.count; k++) { /* sort the fans by what they miss at v itself */
-        float m = terrimpi_fan_miss(s, v, &ring, k);
+        float m = terrimpi_simp_fan_residual(s, v, &ring, k);
         if (m < 0.0f)
             continue;
         for (i = fans++; i > 0 && miss[i - 1] > m; i--) {
@@ -12021,8 +12100,8 @@ static void terrimpi_price(terrimpi_simplifier *s, int32_t v)
         miss[i] = m;
         fan[i] = k;
     }
-    for (i = 0; i < fans && i < TERRIMPI_FANS; i++) {
-        float error = terrimpi_fan_error(s, &ring, known, fan[i], best);
+    for (i = 0; i < fans && i < TERRIMPI_SIMP_FANS; i++) {
+        float error = terrimpi_simp_fan_error(s, &ring, known, fan[i], best);
         if (error < best) {
             best = error;
             s->target[v] = ring.vertex[fan[i]];
@@ -12032,21 +12111,21 @@ static void terrimpi_price(terrimpi_simplifier *s, int32_t v)
         return;
     s->cost[v] = best;
     for (k = 0; k < ring.count; k++)
-        s->cost[v] -= terrimpi_triangle_error(s, ring.spoke[k]);
+        s->cost[v] -= terrimpi_simp_triangle_error(s, ring.spoke[k]);
 }
 
-static void terrimpi_drop_triangle(terrimpi_simplifier *s, int32_t e)
+static void terrimpi_simp_drop_triangle(terrimpi_simplifier *s, int32_t e)
 {
-    s->origin[e] = s->origin[terrimpi_next(e)] = s->origin[terrimpi_prev(e)] = -1;
+    s->origin[e] = s->origin[terrimpi_simp_next(e)] = s->origin[terrimpi_simp_prev(e)] = -1;
     s->triangle_count--;
 }
 
 /* Collapses inner vertex v on to its neighbour `target`. */
-static void terrimpi_collapse(terrimpi_simplifier *s, int32_t v, int32_t target)
+static void terrimpi_simp_collapse(terrimpi_simplifier *s, int32_t v, int32_t target)
 {
-    terrimpi_ring ring;
+    terrimpi_simp_ring ring;
     int32_t i, k = 0, n, first, last, after, before;
-    terrimpi_find_ring(s, v, &ring);
+    terrimpi_simp_find_ring(s, v, &ring);
     n = ring.count;
     while (ring.vertex[k] != target)
         k++;
@@ -12054,22 +12133,24 @@ static void terrimpi_collapse(terrimpi_simplifier *s, int32_t v, int32_t target)
         s->stale[ring.vertex[i]] = 1;
         s->origin[ring.spoke[i]] = target;
     }
-    terrimpi_forget(s, &ring);
+    terrimpi_simp_forget_errors(s, &ring);
     /* the triangles on both sides of the collapsed edge close up */
     first = ring.spoke[k];
     last = ring.spoke[(k + n - 1) % n];
     after = ring.spoke[(k + 1) % n];
-    before = terrimpi_prev(ring.spoke[(k + n - 2) % n]);
-    terrimpi_link(s, after, s->twin[terrimpi_next(first)], s->edge[terrimpi_next(first)]);
-    terrimpi_link(s, before, s->twin[terrimpi_next(last)], s->edge[terrimpi_next(last)]);
-    terrimpi_drop_triangle(s, first);
-    terrimpi_drop_triangle(s, last);
+    before = terrimpi_simp_prev(ring.spoke[(k + n - 2) % n]);
+    terrimpi_simp_link(s, after, s->twin[terrimpi_simp_next(first)],
+                       s->edge[terrimpi_simp_next(first)]);
+    terrimpi_simp_link(s, before, s->twin[terrimpi_simp_next(last)],
+                       s->edge[terrimpi_simp_next(last)]);
+    terrimpi_simp_drop_triangle(s, first);
+    terrimpi_simp_drop_triangle(s, last);
     s->out_edge[v] = -1;
     for (i = 1; i < n - 1; i++) {
-        int32_t outer = terrimpi_next(ring.spoke[(k + i) % n]);
+        int32_t outer = terrimpi_simp_next(ring.spoke[(k + i) % n]);
         s->out_edge[s->origin[outer]] = outer;
         if (i > 1)
-            terrimpi_renew_edge(s, ring.spoke[(k + i) % n]);
+            terrimpi_simp_update_edge(s, ring.spoke[(k + i) % n]);
     }
     s->out_edge[ring.vertex[(k + n - 1) % n]] = before;
     s->out_edge[target] = after;
@@ -12077,28 +12158,28 @@ static void terrimpi_collapse(terrimpi_simplifier *s, int32_t v, int32_t target)
 
 /* Makes some vertex collapsible where none is: turns edges away from it, which is possible until
    three triangles are left or a collapse is. Returns the vertex, -1 when none is left. */
-static int32_t terrimpi_force(terrimpi_simplifier *s)
+static int32_t terrimpi_simp_force_collapse(terrimpi_simplifier *s)
 {
     int32_t v;
     for (v = s->border_count; v < s->vertex_count; v++) {
         int turned = s->out_edge[v] >= 0;
         while (turned) {
             int32_t e = s->out_edge[v];
-            terrimpi_price(s, v);
+            terrimpi_simp_price(s, v);
             if (s->target[v] >= 0)
                 return v;
             do {
                 int32_t corner[4];
-                turned = terrimpi_can_flip(s, e, corner);
+                turned = terrimpi_simp_can_flip(s, e, corner);
                 if (turned) {
-                    terrimpi_sums sums;
+                    terrimpi_simp_moments sums;
                     int32_t c = corner[2], d = corner[3];
-                    terrimpi_sum_edge(s, s->x[c], s->z[c], d, &sums);
-                    terrimpi_flip(s, e, &sums);
+                    terrimpi_simp_edge_moments(s, s->x[c], s->z[c], d, &sums);
+                    terrimpi_simp_flip(s, e, &sums);
                     s->stale[c] = s->stale[d] = 1;
                     break;
                 }
-                e = s->twin[terrimpi_prev(e)];
+                e = s->twin[terrimpi_simp_prev(e)];
             } while (e != s->out_edge[v]);
         }
     }
@@ -12107,7 +12188,7 @@ static int32_t terrimpi_force(terrimpi_simplifier *s)
 
 /* The cheapest vertex whose price is up to date, -1 when none can be collapsed. Prices that went
    stale are looked at again only when they come up: a removal nearby makes them rise as a rule. */
-static int32_t terrimpi_cheapest(terrimpi_simplifier *s)
+static int32_t terrimpi_simp_cheapest(terrimpi_simplifier *s)
 {
     for (;;) {
         int32_t v, best = -1;
@@ -12115,23 +12196,23 @@ static int32_t terrimpi_cheapest(terrimpi_simplifier *s)
             if (s->out_edge[v] >= 0 && (best < 0 || s->cost[v] < s->cost[best]))
                 best = v;
         if (best < 0 || !s->stale[best])
-            return best < 0 || s->target[best] >= 0 ? best : terrimpi_force(s);
-        terrimpi_price(s, best);
+            return best < 0 || s->target[best] >= 0 ? best : terrimpi_simp_force_collapse(s);
+        terrimpi_simp_price(s, best);
     }
 }
 
 /* Collapses until the budget is met. The vertex that stays is moved to its best place each time. */
-static void terrimpi_collapse_to(terrimpi_simplifier *s, int32_t budget)
+static void terrimpi_simp_collapse_to(terrimpi_simplifier *s, int32_t budget)
 {
     int32_t v;
     for (v = s->border_count; v < s->vertex_count; v++)
-        terrimpi_price(s, v);
-    while (s->triangle_count > budget && (v = terrimpi_cheapest(s)) >= 0) {
+        terrimpi_simp_price(s, v);
+    while (s->triangle_count > budget && (v = terrimpi_simp_cheapest(s)) >= 0) {
         int32_t target = s->target[v];
-        terrimpi_collapse(s, v, target);
-        if (target >= s->border_count && terrimpi_improve_vertex(s, target)) {
-            terrimpi_ring ring;
-            terrimpi_find_ring(s, target, &ring);
+        terrimpi_simp_collapse(s, v, target);
+        if (target >= s->border_count && terrimpi_simp_improve_vertex(s, target)) {
+            terrimpi_simp_ring ring;
+            terrimpi_simp_find_ring(s, target, &ring);
             while (ring.count-- > 0)
                 s->stale[ring.vertex[ring.count]] = 1;
         }
@@ -12141,37 +12222,38 @@ static void terrimpi_collapse_to(terrimpi_simplifier *s, int32_t budget)
 /* --- insertion --- */
 
 /* Where a vertex helps most: the worst sample of the triangle of half-edge e. */
-typedef struct terrimpi_spot {
+typedef struct terrimpi_simp_candidate {
     int32_t e, x, z;
     float score;
-} terrimpi_spot;
+} terrimpi_simp_candidate;
 
 /* Looks for the worst sample strictly inside the tile among those of e's triangle. Not where a
    corner lies on a last column or row that is squeezed: there a sample within the triangle on the
    grid may lie outside of the true one. */
-static void terrimpi_scan_triangle(const terrimpi_simplifier *s, int32_t e, terrimpi_spot *best)
+static void terrimpi_simp_scan_triangle(const terrimpi_simplifier *s, int32_t e,
+                                        terrimpi_simp_candidate *best)
 {
     const int32_t *corner = s->origin + e;
     terrimp_mesh_vertex v[3];
-    terrimpi_span span;
+    terrimpi_simp_span span;
     int32_t k, x, z;
     float limit = best->score / s->square[e >> 2], h0, gx, gz;
-    terrimpi_sums none;
-    terrimpi_local l;
+    terrimpi_simp_moments none;
+    terrimpi_simp_local l;
     for (k = 0; k < 3; k++) {
         v[k].x = (uint16_t)s->x[corner[k]];
         v[k].z = (uint16_t)s->z[corner[k]];
         if (s->squeeze && (v[k].x == s->cols - 1 || v[k].z == s->rows - 1))
             return;
     }
-    terrimpi_find_span(v, &span);
+    terrimpi_simp_find_span(v, &span);
     memset(&none, 0, sizeof none);
-    terrimpi_localise(s, &none, corner[0], corner[1], corner[2], 0, &l);
+    terrimpi_simp_recentre(s, &none, corner[0], corner[1], corner[2], 0, &l);
     h0 = s->height[corner[0]];
     gx = l.gx + h0 * l.wx;
     gz = l.gz + h0 * l.wz;
     for (z = span.low > 0 ? span.low : 1; z < span.high; z++) {
-        const terrimpi_row_sum *row = s->row_sums + z * s->cols;
+        const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols;
         float base = h0 + (float)(z - v[0].z) * gz;
         for (x = span.left[z] > 0 ? span.left[z] : 1; x < span.right[z]; x++) {
             float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - v[0].x) * gx);
@@ -12191,27 +12273,27 @@ static void terrimpi_scan_triangle(const terrimpi_simplifier *s, int32_t e, terr
 
 /* The sample where the product of its own squared error and its triangle's is largest: the first
    alone chases single samples (max better, rms worse), the second alone misses peaks. */
-static terrimpi_spot terrimpi_worst_spot(terrimpi_simplifier *s)
+static terrimpi_simp_candidate terrimpi_simp_worst_sample(terrimpi_simplifier *s)
 {
     int32_t e, first = -1;
-    terrimpi_spot best = {-1, 0, 0, 0.0f};
+    terrimpi_simp_candidate best = {-1, 0, 0, 0.0f};
     for (e = 0; e < s->half_edge_end; e += 4)
         if (s->origin[e] >= 0) {
-            float error = terrimpi_triangle_error(s, e);
+            float error = terrimpi_simp_triangle_error(s, e);
             if (first < 0 || error > s->square[first >> 2])
                 first = e;
         }
     if (first >= 0 && s->square[first >> 2] > 0.0f)
-        terrimpi_scan_triangle(s, first, &best);
+        terrimpi_simp_scan_triangle(s, first, &best);
     /* a sample rarely has more than a quarter of its triangle's error: others need no scan */
     for (e = 0; e < s->half_edge_end; e += 4)
         if (e != first && s->origin[e] >= 0 &&
             s->square[e >> 2] * s->square[e >> 2] > 4.0f * best.score)
-            terrimpi_scan_triangle(s, e, &best);
+            terrimpi_simp_scan_triangle(s, e, &best);
     return best;
 }
 
-static int32_t terrimpi_free_triangle(const terrimpi_simplifier *s, int32_t from)
+static int32_t terrimpi_simp_free_triangle(const terrimpi_simplifier *s, int32_t from)
 {
     while (from < s->half_edge_end && s->origin[from] >= 0)
         from += 4;
@@ -12219,130 +12301,133 @@ static int32_t terrimpi_free_triangle(const terrimpi_simplifier *s, int32_t from
 }
 
 /* Puts vertex v into triangle abc of half-edge e = ab, which leaves abv, bcv, cav. */
-static void terrimpi_split_triangle(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                    int32_t v)
+static void terrimpi_simp_split_triangle(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
+                                         int32_t v)
 {
-    int32_t e1 = terrimpi_next(e), e2 = terrimpi_prev(e), fresh = s->edge_count;
+    int32_t e1 = terrimpi_simp_next(e), e2 = terrimpi_simp_prev(e), fresh = s->edge_count;
     int32_t a = s->origin[e], b = s->origin[e1], c = s->origin[e2];
     s->origin[t] = b;
     s->origin[t + 1] = c;
     s->origin[u] = c;
     s->origin[u + 1] = a;
     s->origin[e2] = s->origin[t + 2] = s->origin[u + 2] = v;
-    terrimpi_link(s, t, s->twin[e1], s->edge[e1]);
-    terrimpi_link(s, u, s->twin[e2], s->edge[e2]);
-    terrimpi_link(s, e1, t + 2, fresh);
-    terrimpi_link(s, t + 1, u + 2, fresh + 1);
-    terrimpi_link(s, u + 1, e2, fresh + 2);
+    terrimpi_simp_link(s, t, s->twin[e1], s->edge[e1]);
+    terrimpi_simp_link(s, u, s->twin[e2], s->edge[e2]);
+    terrimpi_simp_link(s, e1, t + 2, fresh);
+    terrimpi_simp_link(s, t + 1, u + 2, fresh + 1);
+    terrimpi_simp_link(s, u + 1, e2, fresh + 2);
     s->out_edge[v] = e2;
     s->out_edge[a] = e;
     s->out_edge[b] = t;
     s->out_edge[c] = u;
-    terrimpi_renew_edge(s, e1);
-    terrimpi_renew_edge(s, t + 1);
-    terrimpi_renew_edge(s, u + 1);
+    terrimpi_simp_update_edge(s, e1);
+    terrimpi_simp_update_edge(s, t + 1);
+    terrimpi_simp_update_edge(s, u + 1);
     s->square[e >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
 }
 
 /* Puts vertex v on the edge ab of triangles abc (half-edge e) and bad, which leaves avc, vbc, bvd
    and vad. */
-static void terrimpi_split_edge(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u, int32_t v)
+static void terrimpi_simp_split_edge(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
+                                     int32_t v)
 {
-    int32_t f = s->twin[e], bc = terrimpi_next(e), ad = terrimpi_next(f), fresh = s->edge_count;
+    int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f), fresh =
+        s->edge_count;
     int32_t a = s->origin[e], b = s->origin[f];
-    int32_t c = s->origin[terrimpi_prev(e)], d = s->origin[terrimpi_prev(f)];
+    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
     s->origin[t] = s->origin[u] = v;
     s->origin[t + 1] = b;
     s->origin[t + 2] = c;
     s->origin[u + 1] = a;
     s->origin[u + 2] = d;
-    terrimpi_link(s, t + 1, s->twin[bc], s->edge[bc]);
-    terrimpi_link(s, u + 1, s->twin[ad], s->edge[ad]);
+    terrimpi_simp_link(s, t + 1, s->twin[bc], s->edge[bc]);
+    terrimpi_simp_link(s, u + 1, s->twin[ad], s->edge[ad]);
     s->origin[bc] = s->origin[ad] = v; /* vc and vd now */
-    terrimpi_link(s, e, u, s->edge[e]);
-    terrimpi_link(s, f, t, fresh);
-    terrimpi_link(s, bc, t + 2, fresh + 1);
-    terrimpi_link(s, ad, u + 2, fresh + 2);
+    terrimpi_simp_link(s, e, u, s->edge[e]);
+    terrimpi_simp_link(s, f, t, fresh);
+    terrimpi_simp_link(s, bc, t + 2, fresh + 1);
+    terrimpi_simp_link(s, ad, u + 2, fresh + 2);
     s->out_edge[v] = bc;
     s->out_edge[a] = e;
     s->out_edge[b] = f;
     s->out_edge[c] = t + 2;
     s->out_edge[d] = u + 2;
-    terrimpi_renew_edge(s, e);
-    terrimpi_renew_edge(s, f);
-    terrimpi_renew_edge(s, bc);
-    terrimpi_renew_edge(s, ad);
+    terrimpi_simp_update_edge(s, e);
+    terrimpi_simp_update_edge(s, f);
+    terrimpi_simp_update_edge(s, bc);
+    terrimpi_simp_update_edge(s, ad);
     s->square[e >> 2] = s->square[f >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
 }
 
 /* Inserts a vertex; takes the places of one that was collapsed. Returns it. */
-static int32_t terrimpi_insert(terrimpi_simplifier *s, const terrimpi_spot *spot)
+static int32_t terrimpi_simp_insert(terrimpi_simplifier *s, const terrimpi_simp_candidate *spot)
 {
     int32_t v = s->border_count, e = spot->e, k;
-    int32_t t = terrimpi_free_triangle(s, 0), u = terrimpi_free_triangle(s, t + 4);
-    const terrimpi_row_sum *at = s->row_sums + spot->z * s->cols + spot->x;
+    int32_t t = terrimpi_simp_free_triangle(s, 0), u = terrimpi_simp_free_triangle(s, t + 4);
+    const terrimpi_simp_row_prefix *at = s->row_sums + spot->z * s->cols + spot->x;
     while (s->out_edge[v] >= 0)
         v++;
     s->x[v] = spot->x;
     s->z[v] = spot->z;
     s->height[v] = (float)(at[1].h - at[0].h);
-    for (k = 0; k < 3; k++, e = terrimpi_next(e))
-        if (terrimpi_area(s, s->origin[e], s->origin[terrimpi_next(e)], v) == 0)
+    for (k = 0; k < 3; k++, e = terrimpi_simp_next(e))
+        if (terrimpi_simp_area(s, s->origin[e], s->origin[terrimpi_simp_next(e)], v) == 0)
             break;
     if (k < 3)
-        terrimpi_split_edge(s, e, t, u, v);
+        terrimpi_simp_split_edge(s, e, t, u, v);
     else
-        terrimpi_split_triangle(s, e, t, u, v);
+        terrimpi_simp_split_triangle(s, e, t, u, v);
     s->edge_count += 3;
     s->triangle_count += 2;
     return v;
 }
 
 /* Inserts vertices at the worst samples while the budget lasts. */
-static void terrimpi_refine(terrimpi_simplifier *s, int32_t budget)
+static void terrimpi_simp_insert_all(terrimpi_simplifier *s, int32_t budget)
 {
     while (s->triangle_count + 2 <= budget) {
-        terrimpi_spot spot = terrimpi_worst_spot(s);
-        terrimpi_ring ring;
+        terrimpi_simp_candidate spot = terrimpi_simp_worst_sample(s);
+        terrimpi_simp_ring ring;
         int32_t v, i;
         if (spot.e < 0)
             return;
-        v = terrimpi_insert(s, &spot);
-        terrimpi_find_ring(s, v, &ring);
+        v = terrimpi_simp_insert(s, &spot);
+        terrimpi_simp_find_ring(s, v, &ring);
         for (i = 0; i < ring.count; i++)
-            terrimpi_try_flip(s, terrimpi_next(ring.spoke[i]));
-        terrimpi_fit_height(s, v);
-        terrimpi_find_ring(s, v, &ring);
+            terrimpi_simp_try_flip(s, terrimpi_simp_next(ring.spoke[i]));
+        terrimpi_simp_fit_height(s, v);
+        terrimpi_simp_find_ring(s, v, &ring);
         for (i = 0; i < ring.count; i++)
             if (ring.vertex[i] >= s->border_count)
-                terrimpi_fit_height(s, ring.vertex[i]);
+                terrimpi_simp_fit_height(s, ring.vertex[i]);
     }
 }
 
 /* Flips and moves on the mesh of the final size, then the last fit of the heights. */
-static void terrimpi_polish(terrimpi_simplifier *s)
+static void terrimpi_simp_polish(terrimpi_simplifier *s)
 {
     int32_t v, round;
-    for (round = 0; round < TERRIMPI_ROUNDS; round++) {
-        terrimpi_flip_all(s);
+    for (round = 0; round < TERRIMPI_SIMP_ROUNDS; round++) {
+        terrimpi_simp_flip_all(s);
         for (v = s->border_count; v < s->vertex_count; v++)
             if (s->out_edge[v] >= 0)
-                terrimpi_improve_vertex(s, v);
+                terrimpi_simp_improve_vertex(s, v);
     }
-    terrimpi_flip_all(s);
-    terrimpi_fit_all(s);
+    terrimpi_simp_flip_all(s);
+    terrimpi_simp_fit_all(s);
 }
 
 /* --- the start mesh --- */
 
 /* Some vertices in a row: first, first + step, ...; at `wrap` the count begins again at 0. */
-typedef struct terrimpi_chain {
+typedef struct terrimpi_simp_chain {
     int32_t first, step, count, wrap;
-} terrimpi_chain;
+} terrimpi_simp_chain;
 
-static terrimpi_chain terrimpi_make_chain(int32_t first, int32_t step, int32_t count, int32_t wrap)
+static terrimpi_simp_chain terrimpi_simp_make_chain(int32_t first, int32_t step, int32_t count,
+                                                    int32_t wrap)
 {
-    terrimpi_chain chain;
+    terrimpi_simp_chain chain;
     chain.first = first;
     chain.step = step;
     chain.count = count;
@@ -12350,13 +12435,13 @@ static terrimpi_chain terrimpi_make_chain(int32_t first, int32_t step, int32_t c
     return chain;
 }
 
-static int32_t terrimpi_chain_at(const terrimpi_chain *chain, int32_t i)
+static int32_t terrimpi_simp_chain_at(const terrimpi_simp_chain *chain, int32_t i)
 {
     int32_t v = chain->first + i * chain->step;
     return v >= chain->wrap ? v - chain->wrap : v;
 }
 
-static void terrimpi_add_face(terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
+static void terrimpi_simp_add_face(terrimpi_simplifier *s, int32_t a, int32_t b, int32_t c)
 {
     int32_t e = s->half_edge_end;
     s->origin[e] = a;
@@ -12367,43 +12452,46 @@ static void terrimpi_add_face(terrimpi_simplifier *s, int32_t a, int32_t b, int3
 }
 
 /* Position of the middle between items i and i + 1 of a chain, along a direction. */
-static int32_t terrimpi_middle_along(const terrimpi_simplifier *s, const terrimpi_chain *chain,
-                                     int32_t i, int32_t dx, int32_t dz)
+static int32_t terrimpi_simp_middle_along(const terrimpi_simplifier *s,
+                                          const terrimpi_simp_chain *chain,
+                                          int32_t i, int32_t dx, int32_t dz)
 {
-    int32_t v = terrimpi_chain_at(chain, i), w = terrimpi_chain_at(chain, i + 1);
+    int32_t v = terrimpi_simp_chain_at(chain, i), w = terrimpi_simp_chain_at(chain, i + 1);
     return (s->x[v] + s->x[w]) * dx + (s->z[v] + s->z[w]) * dz;
 }
 
 /* Fills the strip between two parallel chains that run the same way; seen from above, inner lies
    on the left of outer. Whichever chain steps first, the triangles face up: the chain that is
    behind steps. */
-static void terrimpi_zip(terrimpi_simplifier *s, const terrimpi_chain *outer,
-                         const terrimpi_chain *inner)
+static void terrimpi_simp_zip(terrimpi_simplifier *s, const terrimpi_simp_chain *outer,
+                              const terrimpi_simp_chain *inner)
 {
-    int32_t first = terrimpi_chain_at(outer, 0), last = terrimpi_chain_at(outer, outer->count - 1);
+    int32_t first = terrimpi_simp_chain_at(outer, 0), last =
+        terrimpi_simp_chain_at(outer, outer->count - 1);
     int32_t dx = s->x[last] - s->x[first], dz = s->z[last] - s->z[first], i = 0, j = 0;
     while (i + 1 < outer->count || j + 1 < inner->count) {
-        int32_t o = terrimpi_chain_at(outer, i), n = terrimpi_chain_at(inner, j);
+        int32_t o = terrimpi_simp_chain_at(outer, i), n = terrimpi_simp_chain_at(inner, j);
         int step_outer = j + 1 == inner->count;
         if (i + 1 < outer->count && j + 1 < inner->count)
-            step_outer = terrimpi_middle_along(s, outer, i, dx, dz) <
-                         terrimpi_middle_along(s, inner, j, dx, dz);
+            step_outer = terrimpi_simp_middle_along(s, outer, i, dx, dz) <
+                         terrimpi_simp_middle_along(s, inner, j, dx, dz);
         if (step_outer)
-            terrimpi_add_face(s, o, terrimpi_chain_at(outer, ++i), n);
+            terrimpi_simp_add_face(s, o, terrimpi_simp_chain_at(outer, ++i), n);
         else
-            terrimpi_add_face(s, o, terrimpi_chain_at(inner, ++j), n);
+            terrimpi_simp_add_face(s, o, terrimpi_simp_chain_at(inner, ++j), n);
     }
 }
 
 /* Columns and rows of the start lattice: at most `limit` points (1 if that is 0), in the
    proportions of the inside, none outside. */
-static void terrimpi_lattice_size(int32_t inner_cols, int32_t inner_rows, int32_t limit,
-                                  int32_t *cols, int32_t *rows)
+static void terrimpi_simp_lattice_size(int32_t inner_cols, int32_t inner_rows, int32_t limit,
+                                       int32_t *cols, int32_t *rows)
 {
     int32_t c = inner_cols, r = inner_rows;
     limit = limit < 1 ? 1 : limit;
     if (c * r > limit) {
-        c = terrimpi_round(TERRIMP_SQRTF((float)limit * (float)inner_cols / (float)inner_rows));
+        c = terrimpi_simp_round(TERRIMP_SQRTF((float)limit * (float)inner_cols /
+                                              (float)inner_rows));
         c = c < 1 ? 1 : c > inner_cols ? inner_cols : c;
         c = c > limit ? limit : c;
         r = limit / c < inner_rows ? limit / c : inner_rows;
@@ -12415,8 +12503,8 @@ static void terrimpi_lattice_size(int32_t inner_cols, int32_t inner_rows, int32_
 
 /* Places the border's vertices as a loop, counter-clockwise seen from above from (0, 0) along +z.
    side[i] is where the loop's side i begins. */
-static void terrimpi_place_border(terrimpi_simplifier *s, const terrimp_border *borders,
-                                  terrimp_mesh_vertex *loop, int32_t side[5])
+static void terrimpi_simp_place_border(terrimpi_simplifier *s, const terrimp_border *borders,
+                                       terrimp_mesh_vertex *loop, int32_t side[5])
 {
     static const int order[4] = {TERRIMP_SIDE_X0, TERRIMP_SIDE_Z1, TERRIMP_SIDE_X1,
                                  TERRIMP_SIDE_Z0};
@@ -12431,8 +12519,8 @@ static void terrimpi_place_border(terrimpi_simplifier *s, const terrimp_border *
             s->x[v] = i == 0 ? 0 : i == 2 ? w : p->at;
             s->z[v] = i == 1 ? h : i == 3 ? 0 : p->at;
             steps = (p->height - s->middle) / s->unit;
-            steps = terrimpi_min(steps, TERRIMPI_MAX_STEPS);
-            s->height[v] = terrimpi_max(steps, -TERRIMPI_MAX_STEPS);
+            steps = terrimpi_min(steps, TERRIMPI_SIMP_MAX_STEPS);
+            s->height[v] = terrimpi_max(steps, -TERRIMPI_SIMP_MAX_STEPS);
             loop[v].x = (uint16_t)s->x[v];
             loop[v].z = (uint16_t)s->z[v];
             loop[v].height = p->height;
@@ -12442,7 +12530,7 @@ static void terrimpi_place_border(terrimpi_simplifier *s, const terrimp_border *
 }
 
 /* Finds the twin of every half-edge, numbers the edges and works out their sums. */
-static void terrimpi_join(terrimpi_simplifier *s)
+static void terrimpi_simp_join(terrimpi_simplifier *s)
 {
     int32_t e, v;
     for (v = 0; v < s->vertex_count; v++)
@@ -12455,8 +12543,8 @@ static void terrimpi_join(terrimpi_simplifier *s)
         }
     for (e = 0; e < s->half_edge_end; e++)
         if ((e & 3) != 3 && s->twin[e] < 0) {
-            int32_t f = s->out_edge[s->origin[terrimpi_next(e)]];
-            while (f >= 0 && s->origin[terrimpi_next(f)] != s->origin[e])
+            int32_t f = s->out_edge[s->origin[terrimpi_simp_next(e)]];
+            while (f >= 0 && s->origin[terrimpi_simp_next(f)] != s->origin[e])
                 f = s->edge[f];
             s->twin[e] = f;
             if (f >= 0)
@@ -12467,21 +12555,21 @@ static void terrimpi_join(terrimpi_simplifier *s)
     s->edge_count = 0;
     for (e = 0; e < s->half_edge_end; e++)
         if ((e & 3) != 3 && s->twin[e] < e) {
-            terrimpi_link(s, e, s->twin[e], s->edge_count++);
-            terrimpi_renew_edge(s, e);
+            terrimpi_simp_link(s, e, s->twin[e], s->edge_count++);
+            terrimpi_simp_update_edge(s, e);
         }
 }
 
 /* Builds the start mesh: the border polylines round a regular lattice of samples, or round nothing
    where the tile has no inside. Returns whether the lattice holds every inner sample. */
-static int terrimpi_start(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
-                          int32_t lattice_limit, terrimp_mesh_vertex *loop)
+static int terrimpi_simp_start(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
+                               int32_t lattice_limit, terrimp_mesh_vertex *loop)
 {
     int32_t w = s->cols - 1, h = s->rows - 1, side[5], cols = 0, rows = 0, i, j, v;
-    terrimpi_chain outer[4], inner[4];
-    terrimpi_place_border(s, desc->borders, loop, side);
+    terrimpi_simp_chain outer[4], inner[4];
+    terrimpi_simp_place_border(s, desc->borders, loop, side);
     if (w > 1 && h > 1)
-        terrimpi_lattice_size(w - 1, h - 1, lattice_limit, &cols, &rows);
+        terrimpi_simp_lattice_size(w - 1, h - 1, lattice_limit, &cols, &rows);
     v = s->border_count;
     for (j = 1; j <= rows; j++)
         for (i = 1; i <= cols; i++, v++) {
@@ -12492,32 +12580,32 @@ static int terrimpi_start(terrimpi_simplifier *s, const terrimp_simplify_desc *d
     s->vertex_count = v;
     s->half_edge_end = s->triangle_count = 0;
     for (i = 0; i < 4; i++)
-        outer[i] = terrimpi_make_chain(side[i], 1, side[i + 1] - side[i] + 1, s->border_count);
+        outer[i] = terrimpi_simp_make_chain(side[i], 1, side[i + 1] - side[i] + 1, s->border_count);
     v = s->border_count;
     if (cols > 0) {
-        inner[0] = terrimpi_make_chain(v, cols, rows, s->vertex_count);
-        inner[1] = terrimpi_make_chain(v + cols * (rows - 1), 1, cols, s->vertex_count);
-        inner[2] = terrimpi_make_chain(s->vertex_count - 1, -cols, rows, s->vertex_count);
-        inner[3] = terrimpi_make_chain(v + cols - 1, -1, cols, s->vertex_count);
+        inner[0] = terrimpi_simp_make_chain(v, cols, rows, s->vertex_count);
+        inner[1] = terrimpi_simp_make_chain(v + cols * (rows - 1), 1, cols, s->vertex_count);
+        inner[2] = terrimpi_simp_make_chain(s->vertex_count - 1, -cols, rows, s->vertex_count);
+        inner[3] = terrimpi_simp_make_chain(v + cols - 1, -1, cols, s->vertex_count);
         for (i = 0; i < 4; i++)
-            terrimpi_zip(s, outer + i, inner + i);
+            terrimpi_simp_zip(s, outer + i, inner + i);
     } else { /* one strip from one long side to the other, which runs the other way */
         i = w > 1 ? 1 : 0;
-        inner[0] = terrimpi_make_chain(side[i + 3], -1, outer[i + 2].count, v);
-        terrimpi_zip(s, outer + i, inner);
+        inner[0] = terrimpi_simp_make_chain(side[i + 3], -1, outer[i + 2].count, v);
+        terrimpi_simp_zip(s, outer + i, inner);
     }
     for (j = 0; j + 1 < rows; j++)
         for (i = 0; i + 1 < cols; i++) {
             int32_t a = v + j * cols + i;
-            terrimpi_add_face(s, a, a + cols, a + cols + 1);
-            terrimpi_add_face(s, a, a + cols + 1, a + 1);
+            terrimpi_simp_add_face(s, a, a + cols, a + cols + 1);
+            terrimpi_simp_add_face(s, a, a + cols + 1, a + 1);
         }
-    terrimpi_join(s);
+    terrimpi_simp_join(s);
     return cols * rows == (w - 1) * (h - 1);
 }
 
 /* Range of the tile and the running sums of its samples in steps. */
-static void terrimpi_read_samples(terrimpi_simplifier *s, const float *heights)
+static void terrimpi_simp_read_samples(terrimpi_simplifier *s, const float *heights)
 {
     int32_t count = s->cols * s->rows, i, x, z;
     float low = heights[0], high = heights[0], scale;
@@ -12526,15 +12614,15 @@ static void terrimpi_read_samples(terrimpi_simplifier *s, const float *heights)
         high = heights[i] > high ? heights[i] : high;
     }
     s->middle = 0.5f * low + 0.5f * high;
-    s->unit = (0.5f * high - 0.5f * low) / (float)TERRIMPI_STEPS;
+    s->unit = (0.5f * high - 0.5f * low) / (float)TERRIMPI_SIMP_STEPS;
     if (!(s->unit > 1e-30f)) /* flat: any unit will do */
         s->unit = 1.0f;
     scale = 1.0f / s->unit;
     for (z = 0; z < s->rows; z++) {
         const float *in = heights + z * s->cols;
-        terrimpi_row_sum *row = s->row_sums + z * s->cols, sum = {0, 0, 0};
+        terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols, sum = {0, 0, 0};
         for (x = 0; x < s->cols; x++) {
-            int32_t h = terrimpi_round((in[x] - s->middle) * scale);
+            int32_t h = terrimpi_simp_round((in[x] - s->middle) * scale);
             row[x] = sum;
             sum.h += h;
             sum.hx += h * x;
@@ -12547,8 +12635,8 @@ static void terrimpi_read_samples(terrimpi_simplifier *s, const float *heights)
 
 /* Adds the squared error of the samples strictly between a kept point and sample `at`, where the
    polyline has height ref, as a function of that height. */
-static void terrimpi_add_slope(const float *heights, const terrimp_border_point *from, int32_t at,
-                               float ref, terrimpi_parabola *p)
+static void terrimpi_simp_add_slope(const float *heights, const terrimp_border_point *from,
+                                    int32_t at, float ref, terrimpi_simp_quadric *p)
 {
     int32_t way = from->at < at ? 1 : -1, i, count = (at - from->at) * way;
     float weight = 1.0f / (float)count, slope = (ref - from->height) * weight;
@@ -12562,31 +12650,32 @@ static void terrimpi_add_slope(const float *heights, const terrimp_border_point 
 }
 
 /* Squared error between the neighbours of inner point p when it stands on sample `at`. */
-static terrimpi_parabola terrimpi_point_error(const float *heights, const terrimp_border_point *p,
-                                              int32_t at, float ref)
+static terrimpi_simp_quadric terrimpi_simp_point_error(const float *heights,
+                                                       const terrimp_border_point *p,
+                                                       int32_t at, float ref)
 {
     float r = heights[at] - ref;
-    terrimpi_parabola error;
+    terrimpi_simp_quadric error;
     error.a = 1.0f;
     error.b = r;
     error.c = r * r;
-    terrimpi_add_slope(heights, p - 1, at, ref, &error);
-    terrimpi_add_slope(heights, p + 1, at, ref, &error);
+    terrimpi_simp_add_slope(heights, p - 1, at, ref, &error);
+    terrimpi_simp_add_slope(heights, p + 1, at, ref, &error);
     return error;
 }
 
 /* Squared error between the neighbours of inner point p when it is gone. */
-static float terrimpi_gap_error(const float *heights, const terrimp_border_point *p)
+static float terrimpi_simp_gap_error(const float *heights, const terrimp_border_point *p)
 {
-    terrimpi_parabola error = {0.0f, 0.0f, 0.0f};
-    terrimpi_add_slope(heights, p - 1, p[1].at, p[1].height, &error);
+    terrimpi_simp_quadric error = {0.0f, 0.0f, 0.0f};
+    terrimpi_simp_add_slope(heights, p - 1, p[1].at, p[1].height, &error);
     return error.c;
 }
 
 /* Moves every inner point to the sample and the height that fit best while its neighbours hold
    still. Returns whether one moved. */
-static int terrimpi_improve_border(const float *heights, terrimp_border_point *points,
-                                   uint32_t count)
+static int terrimpi_simp_improve_border(const float *heights, terrimp_border_point *points,
+                                        uint32_t count)
 {
     uint32_t i;
     int moved = 0;
@@ -12596,7 +12685,7 @@ static int terrimpi_improve_border(const float *heights, terrimp_border_point *p
         float ref = p->height, least = TERRIMPI_FLOAT_MAX;
         int32_t end = (p->at + p[1].at) / 2;
         for (at = (p[-1].at + p->at) / 2 + 1; at <= end; at++) {
-            terrimpi_parabola error = terrimpi_point_error(heights, p, at, ref);
+            terrimpi_simp_quadric error = terrimpi_simp_point_error(heights, p, at, ref);
             float fitted = error.c - error.b * (error.b / error.a);
             if (fitted < least) {
                 least = fitted;
@@ -12611,13 +12700,13 @@ static int terrimpi_improve_border(const float *heights, terrimp_border_point *p
 }
 
 /* Removes inner points, the cheapest first, until `count` points are left in all. */
-static void terrimpi_thin_border(const float *heights, terrimp_border_point *points,
-                                 uint32_t point_count, uint32_t count)
+static void terrimpi_simp_thin_border(const float *heights, terrimp_border_point *points,
+                                      uint32_t point_count, uint32_t count)
 {
     float cost[TERRIMP_MAX_TILE_DIM];
     uint32_t i;
     for (i = 1; i + 1 < point_count; i++)
-        cost[i] = terrimpi_gap_error(heights, points + i);
+        cost[i] = terrimpi_simp_gap_error(heights, points + i);
     while (point_count > count) {
         uint32_t best = 1;
         for (i = 2; i + 1 < point_count; i++)
@@ -12627,9 +12716,9 @@ static void terrimpi_thin_border(const float *heights, terrimp_border_point *poi
         memmove(points + best, points + best + 1, (point_count - best) * sizeof *points);
         memmove(cost + best, cost + best + 1, (point_count - best) * sizeof *cost);
         if (best > 1)
-            cost[best - 1] = terrimpi_gap_error(heights, points + best - 1);
+            cost[best - 1] = terrimpi_simp_gap_error(heights, points + best - 1);
         if (best + 1 < point_count)
-            cost[best] = terrimpi_gap_error(heights, points + best);
+            cost[best] = terrimpi_simp_gap_error(heights, points + best);
     }
 }
 
@@ -12653,8 +12742,8 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
     wanted = wanted < count ? wanted : count;
     TERRIMPI_REFUSE(capacity < wanted, TERRIMP_E_CAPACITY);
     if (wanted < count) {
-        terrimpi_thin_border(heights, kept, count, wanted);
-        for (round = 0; round < 8 && terrimpi_improve_border(heights, kept, wanted); round++) {
+        terrimpi_simp_thin_border(heights, kept, count, wanted);
+        for (round = 0; round < 8 && terrimpi_simp_improve_border(heights, kept, wanted); round++) {
         }
     }
     memcpy(points, kept, wanted * sizeof *points);
@@ -12665,17 +12754,17 @@ TERRIMP_API terrimp_result terrimp_border_simplify(const float *heights, uint32_
 /* --- a tile --- */
 
 /* The numbers that every size follows from; `budget` is never 0. */
-typedef struct terrimpi_plan {
+typedef struct terrimpi_simp_plan {
     uint32_t cols, rows, budget;
     uint32_t border; /* vertices of the loop; in a size query the largest possible number */
     uint32_t inner;  /* vertices inside the final mesh at most */
     uint32_t lattice; /* vertices inside the start mesh at most */
-} terrimpi_plan;
+} terrimpi_simp_plan;
 
-static terrimpi_plan terrimpi_make_plan(uint32_t cols, uint32_t rows, uint32_t budget,
-                                        uint32_t border)
+static terrimpi_simp_plan terrimpi_simp_make_plan(uint32_t cols, uint32_t rows, uint32_t budget,
+                                                  uint32_t border)
 {
-    terrimpi_plan plan;
+    terrimpi_simp_plan plan;
     uint32_t inside = (cols - 2) * (rows - 2);
     plan.cols = cols;
     plan.rows = rows;
@@ -12683,22 +12772,23 @@ static terrimpi_plan terrimpi_make_plan(uint32_t cols, uint32_t rows, uint32_t b
     plan.border = border;
     plan.inner = (plan.budget + 2 - border) / 2;
     plan.inner = plan.inner < inside ? plan.inner : inside;
-    plan.lattice = TERRIMPI_START_TENTHS * plan.inner / 10;
+    plan.lattice = TERRIMPI_SIMP_START_TENTHS * plan.inner / 10;
     plan.lattice = plan.lattice < 1 ? 1 : plan.lattice;
     return plan;
 }
 
 /* Lays the arrays out at `base`, or only counts their bytes when that is null. Every count is at
    most a few times 65537, so nothing can overflow. */
-static size_t terrimpi_lay_out(terrimpi_simplifier *s, const terrimpi_plan *plan, void *base)
+static size_t terrimpi_simp_layout(terrimpi_simplifier *s, const terrimpi_simp_plan *plan,
+                                   void *base)
 {
     terrimpi_arena b = terrimpi_arena_at(base);
     size_t vertices = plan->lattice + plan->border, samples = (size_t)plan->cols * plan->rows;
-    size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_MAX_DEGREE;
+    size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_SIMP_MAX_DEGREE;
     size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
-    s->sums = (terrimpi_sums *)terrimpi_take(&b, edges, sizeof *s->sums);
-    s->spare = (terrimpi_sums *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
-    s->row_sums = (terrimpi_row_sum *)terrimpi_take(&b, samples, sizeof *s->row_sums);
+    s->sums = (terrimpi_simp_moments *)terrimpi_take(&b, edges, sizeof *s->sums);
+    s->spare = (terrimpi_simp_moments *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
+    s->row_sums = (terrimpi_simp_row_prefix *)terrimpi_take(&b, samples, sizeof *s->row_sums);
     s->x = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->x);
     s->z = (int32_t *)terrimpi_take(&b, vertices, sizeof *s->z);
     s->height = (float *)terrimpi_take(&b, vertices, sizeof *s->height);
@@ -12713,14 +12803,14 @@ static size_t terrimpi_lay_out(terrimpi_simplifier *s, const terrimpi_plan *plan
     return b.bytes;
 }
 
-static int terrimpi_all_finite(const float *values, uint32_t count)
+static int terrimpi_simp_all_finite(const float *values, uint32_t count)
 {
     while (count > 0 && terrimpi_finite(values[count - 1]))
         count--;
     return count == 0;
 }
 
-static int terrimpi_tile_size_ok(uint32_t cols, uint32_t rows)
+static int terrimpi_simp_tile_size_ok(uint32_t cols, uint32_t rows)
 {
     return terrimpi_within_u32(cols, 2, TERRIMP_MAX_TILE_DIM) &&
            terrimpi_within_u32(rows, 2, TERRIMP_MAX_TILE_DIM);
@@ -12730,13 +12820,13 @@ TERRIMP_API size_t terrimp_simplify_scratch_bytes(uint32_t cols, uint32_t rows,
                                                   uint32_t triangle_budget)
 {
     terrimpi_simplifier s;
-    terrimpi_plan plan;
-    if (!terrimpi_tile_size_ok(cols, rows) || triangle_budget == 1 ||
+    terrimpi_simp_plan plan;
+    if (!terrimpi_simp_tile_size_ok(cols, rows) || triangle_budget == 1 ||
         triangle_budget > TERRIMP_MAX_TRIANGLES)
         return 0;
-    plan = terrimpi_make_plan(cols, rows, triangle_budget, 4);
+    plan = terrimpi_simp_make_plan(cols, rows, triangle_budget, 4);
     plan.border = plan.budget + 2; /* whatever border comes, the arrays are large enough */
-    return terrimpi_lay_out(&s, &plan, NULL);
+    return terrimpi_simp_layout(&s, &plan, NULL);
 }
 
 TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
@@ -12753,7 +12843,7 @@ TERRIMP_API terrimp_result terrimp_mesh_capacity(uint32_t triangle_budget,
 }
 
 /* Checks one border polyline: from sample 0 to the last one, rising, finite. */
-static terrimp_result terrimpi_check_border(const terrimp_border *border, uint32_t samples)
+static terrimp_result terrimpi_simp_check_border(const terrimp_border *border, uint32_t samples)
 {
     uint32_t i;
     TERRIMPI_REFUSE(!border->points, TERRIMP_E_NULL);
@@ -12767,15 +12857,16 @@ static terrimp_result terrimpi_check_border(const terrimp_border *border, uint32
     return TERRIMP_OK;
 }
 
-static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
+static terrimp_result terrimpi_simp_check_desc(const terrimp_simplify_desc *desc)
 {
     const terrimp_border *b = desc->borders;
     uint32_t i;
     TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows) || desc->triangle_budget == 1 ||
+    TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows) ||
+                    desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
     for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
-        terrimp_result r = terrimpi_check_border(
+        terrimp_result r = terrimpi_simp_check_border(
             b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
         if (r != TERRIMP_OK)
             return r;
@@ -12788,13 +12879,13 @@ static terrimp_result terrimpi_check_desc(const terrimp_simplify_desc *desc)
             q->points[z_end ? q->point_count - 1 : 0].height)
             return TERRIMP_E_RANGE;
     }
-    return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
+    return terrimpi_simp_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
                                                                        : TERRIMP_E_NOT_FINITE;
 }
 
 /* Writes the inner vertices and the triangles; the border's vertices are in place. */
-static void terrimpi_emit(const terrimpi_simplifier *s, const float *exact_heights,
-                          terrimp_mesh *mesh)
+static void terrimpi_simp_emit(const terrimpi_simplifier *s, const float *exact_heights,
+                               terrimp_mesh *mesh)
 {
     int32_t v, e, vertices = s->border_count, indices = 0;
     for (v = 0; v < s->border_count; v++)
@@ -12818,65 +12909,65 @@ static void terrimpi_emit(const terrimpi_simplifier *s, const float *exact_heigh
 
 /* Makes the mesh between its borders: collapses, insertions, moves. On a squeezed tile a collapse
    can be barred on every side: then the start mesh is made anew, so coarse that it needs none. */
-static void terrimpi_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
-                            const terrimpi_plan *plan, terrimp_mesh_vertex *loop)
+static void terrimpi_simp_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
+                                 const terrimpi_simp_plan *plan, terrimp_mesh_vertex *loop)
 {
     int32_t budget = (int32_t)plan->budget;
-    int32_t inserted = (int32_t)plan->inner / TERRIMPI_INSERT_SHARE;
-    terrimpi_fit_all(s);
-    terrimpi_collapse_to(s, budget - 2 * inserted);
+    int32_t inserted = (int32_t)plan->inner / TERRIMPI_SIMP_INSERT_SHARE;
+    terrimpi_simp_fit_all(s);
+    terrimpi_simp_collapse_to(s, budget - 2 * inserted);
     if (s->triangle_count > budget) {
-        terrimpi_start(s, desc, (int32_t)plan->inner, loop);
-        terrimpi_fit_all(s);
+        terrimpi_simp_start(s, desc, (int32_t)plan->inner, loop);
+        terrimpi_simp_fit_all(s);
     }
-    terrimpi_refine(s, budget);
-    terrimpi_polish(s);
+    terrimpi_simp_insert_all(s, budget);
+    terrimpi_simp_polish(s);
 }
 
 /* terrimp_simplify, of a tile whose last column and row may be squeezed. */
-static terrimp_result terrimpi_simplify(const terrimp_simplify_desc *desc,
-                                        const terrimpi_squeeze *squeeze, void *scratch,
+static terrimp_result terrimpi_simp_run(const terrimp_simplify_desc *desc,
+                                        const terrimpi_simp_last_spacing *squeeze, void *scratch,
                                         size_t scratch_bytes, terrimp_mesh *mesh)
 {
     terrimpi_simplifier s;
-    terrimpi_plan plan;
+    terrimpi_simp_plan plan;
     uint32_t budget, border = 0;
     int whole, i;
     TERRIMPI_REFUSE(!desc || !scratch || !mesh, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_desc(desc));
+    TERRIMPI_TRY(terrimpi_simp_check_desc(desc));
     budget = desc->triangle_budget ? desc->triangle_budget : TERRIMP_TRIANGLE_BUDGET;
     for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
         border += desc->borders[i].point_count - 1;
     TERRIMPI_REFUSE(border > budget + 2, TERRIMP_E_RANGE);
-    plan = terrimpi_make_plan(desc->cols, desc->rows, budget, border);
+    plan = terrimpi_simp_make_plan(desc->cols, desc->rows, budget, border);
     TERRIMPI_REFUSE(!mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(mesh->vertex_capacity < border + plan.inner ||
                     mesh->index_capacity < 3 * (border - 2 + 2 * plan.inner), TERRIMP_E_CAPACITY);
     TERRIMPI_REFUSE(scratch_bytes < terrimp_simplify_scratch_bytes(desc->cols, desc->rows, budget),
                     TERRIMP_E_MEMORY);
     TERRIMPI_REFUSE((uintptr_t)scratch % sizeof(int64_t) != 0, TERRIMP_E_ALIGN);
-    terrimpi_lay_out(&s, &plan, scratch);
+    terrimpi_simp_layout(&s, &plan, scratch);
     s.cols = (int32_t)desc->cols;
     s.rows = (int32_t)desc->rows;
     s.squeeze = squeeze;
-    terrimpi_read_samples(&s, desc->heights);
-    whole = terrimpi_start(&s, desc, (int32_t)plan.lattice, mesh->vertices) &&
+    terrimpi_simp_read_samples(&s, desc->heights);
+    whole = terrimpi_simp_start(&s, desc, (int32_t)plan.lattice, mesh->vertices) &&
             s.triangle_count <= (int32_t)budget;
     if (!whole)
-        terrimpi_reduce(&s, desc, &plan, mesh->vertices);
-    terrimpi_emit(&s, whole ? desc->heights : 0, mesh);
+        terrimpi_simp_reduce(&s, desc, &plan, mesh->vertices);
+    terrimpi_simp_emit(&s, whole ? desc->heights : 0, mesh);
     return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, void *scratch,
                                             size_t scratch_bytes, terrimp_mesh *mesh)
 {
-    return terrimpi_simplify(desc, NULL, scratch, scratch_bytes, mesh);
+    return terrimpi_simp_run(desc, NULL, scratch, scratch_bytes, mesh);
 }
 
 /* --- skirts (Hess 4.2) --- */
 
-static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
+static terrimp_result terrimpi_raise_check_surface(const terrimp_mesh *mesh)
 {
     TERRIMPI_REFUSE(!mesh || !mesh->vertices || !mesh->indices, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(mesh->border_vertex_count < 4 || mesh->surface_index_count < 6 ||
@@ -12891,7 +12982,7 @@ static terrimp_result terrimpi_check_surface(const terrimp_mesh *mesh)
 TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height)
 {
     uint32_t i, n;
-    TERRIMPI_TRY(terrimpi_check_surface(mesh));
+    TERRIMPI_TRY(terrimpi_raise_check_surface(mesh));
     n = mesh->border_vertex_count;
     TERRIMPI_REFUSE(mesh->vertex_capacity - mesh->vertex_count < n ||
                     mesh->index_capacity - mesh->index_count < 6 * n, TERRIMP_E_CAPACITY);
@@ -12902,7 +12993,7 @@ TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper,
         *rim = mesh->vertices[i];
         rim->height = upper ? rim->height + height : terrimpi_min(rim->height, height);
     }
-    terrimpi_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
+    terrimpi_terrain_write_wall(mesh->indices + mesh->index_count, n, mesh->vertex_count, upper);
     mesh->vertex_count += n;
     mesh->index_count += 6 * n;
     return TERRIMP_OK;
@@ -12914,22 +13005,22 @@ TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper,
    would throw the vertex at the other end up. Over 65 x 65 samples of the Pyrenees 0.25
    leaves 0.46 % of all samples standing out, 0.5 leaves 1.2 %, 1 leaves 2.8 %, with a mean largest
    error of 10.3, 7.2 and 5.5 % of the terrain's range; pictures in flight are best at 0.5. */
-#define TERRIMPI_LEAST_HOLD 0.5f
+#define TERRIMPI_RAISE_LEAST_HOLD 0.5f
 
 /* Passes of lowering. Each takes away about a third of what is too high. */
-#define TERRIMPI_LOWER_PASSES 12
+#define TERRIMPI_RAISE_LOWER_PASSES 12
 
 /* Raise of a sample's free vertices, of weight `hold` together, that lifts the surface by `rest`,
    what is left of the sample's first shortfall. */
-static float terrimpi_wanted_raise(float rest, float shortfall, float hold)
+static float terrimpi_raise_wanted(float rest, float shortfall, float hold)
 {
     if (!(rest > 0.0f) || !(hold > 0.0f))
         return 0.0f;
-    return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_LEAST_HOLD);
+    return terrimpi_min(rest / hold, terrimpi_max(shortfall, rest) / TERRIMPI_RAISE_LEAST_HOLD);
 }
 
 /* A vertex of weight w in a sample rises by what that wants. */
-static void terrimpi_rise(float w, float wanted, float *change)
+static void terrimpi_raise_up(float w, float wanted, float *change)
 {
     if (w > 1e-6f)
         *change = terrimpi_max(*change, wanted);
@@ -12938,22 +13029,22 @@ static void terrimpi_rise(float w, float wanted, float *change)
 /* A vertex of weight w in a sample, one of n round it, may lose its share of the surface's height
    over the sample. That this is no less than it may lose by others, a product mostly tells without
    a division. */
-static void terrimpi_lower(float w, float n, float over, float *change)
+static void terrimpi_raise_down(float w, float n, float over, float *change)
 {
     if (w > 1e-6f && over < *change * (n * w) * 1.00001f)
         *change = terrimpi_min(*change, over / (n * w));
 }
 
-static int terrimpi_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
+static int terrimpi_raise_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
 {
     return (v->x == 0 || v->x == desc->cols - 1) && (v->z == 0 || v->z == desc->rows - 1);
 }
 
 /* Goes once over the samples of a border between vertices a and b, which are in rising order
    whichever way the loop runs: both neighbours compute the same bits. */
-static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                  uint32_t a, uint32_t b, const float *raise, float *change,
-                                  int lowering)
+static void terrimpi_raise_segment(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
+                                   uint32_t a, uint32_t b, const float *raise, float *change,
+                                   int lowering)
 {
     const terrimp_mesh_vertex *p = mesh->vertices + a, *q = mesh->vertices + b;
     uint32_t cols = desc->cols, stride = p->z == q->z ? 1 : cols;
@@ -12962,22 +13053,22 @@ static void terrimpi_rise_segment(const terrimp_raise_desc *desc, const terrimp_
     float *to[2], w[2], is_free[2];
     to[0] = change + a;
     to[1] = change + b;
-    is_free[0] = terrimpi_is_corner(desc, p) ? 0.0f : 1.0f;
-    is_free[1] = terrimpi_is_corner(desc, q) ? 0.0f : 1.0f;
+    is_free[0] = terrimpi_raise_is_corner(desc, p) ? 0.0f : 1.0f;
+    is_free[1] = terrimpi_raise_is_corner(desc, q) ? 0.0f : 1.0f;
     for (k = 0; k <= count; k++, samples += stride) {
         float surface, wanted;
         int i;
         w[1] = (float)k / (float)count;
         w[0] = 1.0f - w[1];
         surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
-        wanted = terrimpi_wanted_raise(*samples - surface,
+        wanted = terrimpi_raise_wanted(*samples - surface,
                                        *samples - (w[0] * p->height + w[1] * q->height),
                                        w[0] * is_free[0] + w[1] * is_free[1]);
         for (i = 0; i < 2; i++)
             if (lowering)
-                terrimpi_lower(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
+                terrimpi_raise_down(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
             else
-                terrimpi_rise(w[i], wanted, to[i]);
+                terrimpi_raise_up(w[i], wanted, to[i]);
     }
 }
 
@@ -12995,12 +13086,12 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
         }
         if (side < 3)
             last--; /* the loop's end closes the last side itself */
-        for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
+        for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
             for (i = first; i <= last; i++)
                 change[i % n] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
             for (i = first; i < last; i++)
-                terrimpi_rise_segment(desc, mesh, backwards ? (i + 1) % n : i,
-                                      backwards ? i : (i + 1) % n, raise, change, pass > 0);
+                terrimpi_raise_segment(desc, mesh, backwards ? (i + 1) % n : i,
+                                       backwards ? i : (i + 1) % n, raise, change, pass > 0);
             for (i = first + 1; i < last; i++)
                 raise[i] = pass ? terrimpi_max(0.0f, raise[i] - change[i]) : change[i];
         }
@@ -13008,7 +13099,7 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
 }
 
 /* The slopes of the plane through three vertices. */
-static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
+static void terrimpi_raise_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
 {
     int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
     int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
@@ -13019,12 +13110,12 @@ static void terrimpi_find_plane(const terrimp_mesh_vertex v[3], float *gx, float
 }
 
 /* Goes once over the samples of a triangle. */
-static void terrimpi_rise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
-                                   const uint16_t *t, const float *raise, float *change,
-                                   int lowering)
+static void terrimpi_raise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
+                                    const uint16_t *t, const float *raise, float *change,
+                                    int lowering)
 {
     terrimp_mesh_vertex v[3];
-    terrimpi_span span;
+    terrimpi_simp_span span;
     float slope_x[3], slope_z[3], gx, gz, to[3];
     float limit; /* from which on a sample takes nothing away, as no weight is above 1 */
     int32_t x, z, k;
@@ -13035,13 +13126,13 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
     }
     for (k = 0; k < 3; k++) { /* slopes of the weights */
         v[k].height = 1.0f;
-        terrimpi_find_plane(v, &slope_x[k], &slope_z[k]);
+        terrimpi_raise_plane(v, &slope_x[k], &slope_z[k]);
         v[k].height = 0.0f;
     }
     for (k = 0; k < 3; k++)
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
-    terrimpi_find_span(v, &span);
-    terrimpi_find_plane(v, &gx, &gz);
+    terrimpi_simp_find_span(v, &span);
+    terrimpi_raise_plane(v, &gx, &gz);
     limit = 3.001f * terrimpi_largest(to);
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
@@ -13053,30 +13144,30 @@ static void terrimpi_rise_triangle(const float *heights, int32_t cols, const ter
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
             if (lowering) {
                 over = terrimpi_max(over, 0.0f);
-                terrimpi_lower(w[0], 3.0f, over, &to[0]);
-                terrimpi_lower(w[1], 3.0f, over, &to[1]);
-                terrimpi_lower(w[2], 3.0f, over, &to[2]);
+                terrimpi_raise_down(w[0], 3.0f, over, &to[0]);
+                terrimpi_raise_down(w[1], 3.0f, over, &to[1]);
+                terrimpi_raise_down(w[2], 3.0f, over, &to[2]);
                 limit = 3.001f * terrimpi_largest(to);
                 continue;
             }
             for (k = 0; k < 3; k++)
                 hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
             wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            wanted = terrimpi_wanted_raise(-over, wanted - over, hold);
+            wanted = terrimpi_raise_wanted(-over, wanted - over, hold);
             for (k = 0; k < 3; k++)
-                terrimpi_rise(w[k], wanted, &to[k]);
+                terrimpi_raise_up(w[k], wanted, &to[k]);
         }
     for (k = 0; k < 3; k++)
         change[t[k]] = to[k];
 }
 
-static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
+static terrimp_result terrimpi_raise_check(const terrimp_raise_desc *desc,
                                            const terrimp_mesh *mesh)
 {
     uint32_t i;
-    TERRIMPI_TRY(terrimpi_check_surface(mesh));
+    TERRIMPI_TRY(terrimpi_raise_check_surface(mesh));
     TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_tile_size_ok(desc->cols, desc->rows), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows), TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(!terrimpi_finite(desc->amount), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(desc->amount < 0.0f || desc->amount > 1.0f, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(mesh->vertex_count != mesh->surface_vertex_count, TERRIMP_E_STATE);
@@ -13085,7 +13176,7 @@ static terrimp_result terrimpi_check_raise(const terrimp_raise_desc *desc,
             return TERRIMP_E_RANGE;
     for (i = 0; i < mesh->surface_index_count; i++)
         TERRIMPI_REFUSE(mesh->indices[i] >= mesh->surface_vertex_count, TERRIMP_E_RANGE);
-    return terrimpi_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
+    return terrimpi_simp_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
                                                                        : TERRIMP_E_NOT_FINITE;
 }
 
@@ -13096,18 +13187,18 @@ TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, te
     float *change;
     int pass;
     TERRIMPI_REFUSE(!desc || !mesh || !work, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_raise(desc, mesh));
+    TERRIMPI_TRY(terrimpi_raise_check(desc, mesh));
     n = mesh->surface_vertex_count;
     change = work + n;
     for (i = 0; i < n; i++)
         work[i] = 0.0f;
     terrimpi_raise_loop(desc, mesh, work, change);
-    for (pass = 0; pass <= TERRIMPI_LOWER_PASSES; pass++) {
+    for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
         for (i = 0; i < n; i++)
             change[i] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
         for (i = 0; i < mesh->surface_index_count; i += 3)
-            terrimpi_rise_triangle(desc->heights, (int32_t)desc->cols, mesh, mesh->indices + i,
-                                   work, change, pass > 0);
+            terrimpi_raise_triangle(desc->heights, (int32_t)desc->cols, mesh, mesh->indices + i,
+                                    work, change, pass > 0);
         for (i = mesh->border_vertex_count; i < n; i++)
             work[i] = pass ? terrimpi_max(0.0f, work[i] - change[i]) : change[i];
     }
@@ -13179,7 +13270,8 @@ static size_t terrimpi_fill_layout(uint32_t width, uint32_t depth, void *scratch
 TERRIMP_API size_t terrimp_heightfield_fill_voids_scratch_bytes(uint32_t width, uint32_t depth)
 {
     terrimpi_fill fill;
-    return terrimpi_size_ok(width, depth) ? terrimpi_fill_layout(width, depth, NULL, &fill) : 0;
+    return terrimpi_field_size_ok(width, depth) ? terrimpi_fill_layout(width, depth, NULL, &fill) :
+        0;
 }
 
 /* Brings row z of the field into the ring and marks its voids. */
@@ -13190,7 +13282,7 @@ static void terrimpi_fill_load(const terrimp_heightfield *field, const terrimpi_
     float *value = fill->level[0].value + first;
     uint8_t *known = fill->level[0].known + first;
     uint32_t x;
-    terrimpi_raw_row(field, 0, z, field->width, 1, value);
+    terrimpi_field_raw_row(field, 0, z, field->width, 1, value);
     for (x = 0; x < field->width; ++x)
         known[x] = (uint8_t)(value[x] != field->no_data && value[x] == value[x]);
 }
@@ -13373,7 +13465,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 {
     terrimp_heightfield f;
     terrimpi_fill fill;
-    terrimpi_scan scan;
+    terrimpi_field_scan scan;
     size_t needed;
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(samples == NULL || scratch == NULL, TERRIMP_E_NULL);
@@ -13384,7 +13476,7 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
     TERRIMPI_REFUSE(scratch_bytes < needed, TERRIMP_E_MEMORY);
 
     scan.skip_voids = 1;
-    TERRIMPI_TRY(terrimpi_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
+    TERRIMPI_TRY(terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
     TERRIMPI_REFUSE(scan.low > scan.high, TERRIMP_E_VOID);
     fill.low = scan.low;
     fill.high = scan.high;
@@ -13401,15 +13493,15 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 /* ---- heights and errors of the ground ---- */
 
 /* What the samples of a node are found to miss. */
-typedef struct terrimpi_mip_misses {
+typedef struct terrimpi_build_residual {
     float most, squares;
     float count;
     float low, high; /* of the samples beyond borders */
-} terrimpi_mip_misses;
+} terrimpi_build_residual;
 
 /* Notes how far `count` samples are from a straight line. */
-static void terrimpi_mip_run(const float *height, uint32_t count, float start, float slope,
-                             terrimpi_mip_misses *misses)
+static void terrimpi_build_residual_run(const float *height, uint32_t count, float start,
+                                        float slope, terrimpi_build_residual *misses)
 {
     float most = misses->most, squares = 0.0f;
     uint32_t k;
@@ -13425,9 +13517,9 @@ static void terrimpi_mip_run(const float *height, uint32_t count, float start, f
 
 /* Compares one row of samples, `down` of `deep` rows below the lattice row `upper`, with the
    triangles between that and the row `lower`. */
-static void terrimpi_mip_row_misses(const float *upper, const float *lower, const float *row,
-                                    uint32_t span, uint32_t step, uint32_t down, uint32_t deep,
-                                    terrimpi_mip_misses *misses)
+static void terrimpi_build_residual_row(const float *upper, const float *lower, const float *row,
+                                        uint32_t span, uint32_t step, uint32_t down, uint32_t deep,
+                                        terrimpi_build_residual *misses)
 {
     float v = (float)down / (float)deep;
     uint32_t at, i = 0;
@@ -13437,17 +13529,17 @@ static void terrimpi_mip_row_misses(const float *upper, const float *lower, cons
         uint32_t left = down * wide / deep + 1u; /* samples up to the diagonal */
         float one = 1.0f / (float)wide, u = (float)left * one;
         left = terrimpi_min_u32(left, wide);
-        terrimpi_mip_run(row + at, left, a + v * (c - a), (d - c) * one, misses);
-        terrimpi_mip_run(row + at + left, wide - left, a + v * (d - b) + u * (b - a),
-                         (b - a) * one, misses);
+        terrimpi_build_residual_run(row + at, left, a + v * (c - a), (d - c) * one, misses);
+        terrimpi_build_residual_run(row + at + left, wide - left, a + v * (d - b) + u * (b - a),
+                                    (b - a) * one, misses);
     }
-    terrimpi_mip_run(row + span, 1, upper[i] + v * (lower[i] - upper[i]), 0.0f, misses);
+    terrimpi_build_residual_run(row + span, 1, upper[i] + v * (lower[i] - upper[i]), 0.0f, misses);
     misses->count += (float)span + 1.0f;
 }
 
 /* Compares all samples of a node with its triangles in pattern 0. */
-static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
-                                      float *scratch, terrimpi_mip_misses *misses)
+static void terrimpi_build_residual_inner(const terrimp_quadtree *t, terrimp_node p,
+                                          float *scratch, terrimpi_build_residual *misses)
 {
     uint32_t quads = t->chunk_quads, j, z;
     uint32_t x0 = terrimpi_tree_col(t, p.level, p.x * quads);
@@ -13457,29 +13549,29 @@ static void terrimpi_mip_inner_misses(const terrimp_quadtree *t, terrimp_node p,
         uint32_t z0 = terrimpi_tree_row(t, p.level, j), z1 = terrimpi_tree_row(t, p.level, j + 1u);
         if (z1 == z0)
             break;
-        terrimpi_heightfield_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
-        terrimpi_heightfield_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
+        terrimpi_field_tile(&t->field, x0, z0, quads + 1u, 1, 1u << p.level, upper);
+        terrimpi_field_tile(&t->field, x0, z1, quads + 1u, 1, 1u << p.level, lower);
         for (z = z0; z <= z1; z++) { /* lattice rows twice: which weighs next to nothing in rms */
-            terrimpi_heightfield_tile(&t->field, x0, z, span + 1u, 1, 1, row);
-            terrimpi_mip_row_misses(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
-                                    misses);
+            terrimpi_field_tile(&t->field, x0, z, span + 1u, 1, 1, row);
+            terrimpi_build_residual_row(upper, lower, row, span, 1u << p.level, z - z0, z1 - z0,
+                                        misses);
         }
     }
 }
 
-static float terrimpi_mip_sample(const terrimp_quadtree *t, const int64_t at[2])
+static float terrimpi_build_sample(const terrimp_quadtree *t, const int64_t at[2])
 {
-    return terrimpi_sample(&t->field, (uint32_t)at[0], (uint32_t)at[1]);
+    return terrimpi_field_sample(&t->field, (uint32_t)at[0], (uint32_t)at[1]);
 }
 
 /* Compares the samples in a triangle of three samples, counter-clockwise, with it. */
-static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const int64_t a[2],
-                                         const int64_t b[2], const int64_t c[2],
-                                         terrimpi_mip_misses *misses)
+static void terrimpi_build_residual_triangle(const terrimp_quadtree *t, const int64_t a[2],
+                                             const int64_t b[2], const int64_t c[2],
+                                             terrimpi_build_residual *misses)
 {
     int64_t all = terrimpi_twice_area(a, b, c), low[2], high[2], at[2];
-    float height = terrimpi_mip_sample(t, a);
-    float to_b = terrimpi_mip_sample(t, b) - height, to_c = terrimpi_mip_sample(t, c) - height;
+    float height = terrimpi_build_sample(t, a);
+    float to_b = terrimpi_build_sample(t, b) - height, to_c = terrimpi_build_sample(t, c) - height;
     int k;
     if (all <= 0)
         return;
@@ -13495,7 +13587,7 @@ static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const int64_
             float sample, miss;
             if (by_b < 0 || by_c < 0 || by_b + by_c > all)
                 continue;
-            sample = terrimpi_mip_sample(t, at);
+            sample = terrimpi_build_sample(t, at);
             miss = sample - height;
             miss -= (to_b * (float)by_b + to_c * (float)by_c) / (float)all;
             misses->most = terrimpi_max(misses->most, terrimpi_abs(miss));
@@ -13506,8 +13598,8 @@ static void terrimpi_mip_triangle_misses(const terrimp_quadtree *t, const int64_
 
 /* Compares with what a finer neighbour beyond a side draws up to it: two of its quads for each of
    the node's, in the pattern in which that side is coarse. */
-static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p, int side,
-                                       terrimpi_mip_misses *misses)
+static void terrimpi_build_residual_border(const terrimp_quadtree *t, terrimp_node p, int side,
+                                           terrimpi_build_residual *misses)
 {
     uint32_t quads = t->chunk_quads, along, k, c;
     int along_x = terrimpi_along_x(side), last = side & 1;
@@ -13526,17 +13618,17 @@ static void terrimpi_mip_border_misses(const terrimp_quadtree *t, terrimp_node p
             at[c][0] = terrimpi_tree_col(t, p.level - 1u, 2u * p.x * quads + first[0] + k % 3u);
             at[c][1] = terrimpi_tree_row(t, p.level - 1u, 2u * p.z * quads + first[1] + k / 3u);
         }
-        terrimpi_mip_triangle_misses(t, at[0], at[2], at[3], misses);
-        terrimpi_mip_triangle_misses(t, at[0], at[1], at[2], misses);
+        terrimpi_build_residual_triangle(t, at[0], at[2], at[3], misses);
+        terrimpi_build_residual_triangle(t, at[0], at[1], at[2], misses);
     }
 }
 
-static terrimp_result terrimpi_mip_build_leaf(const terrimp_quadtree *t, terrimp_node p)
+static terrimp_result terrimpi_build_geomip_leaf(const terrimp_quadtree *t, terrimp_node p)
 {
     terrimp_geomip_node *node = &t->nodes[p.number];
     uint32_t quads = t->chunk_quads;
     terrimp_rect samples = terrimpi_rect(p.x * quads, p.z * quads, quads + 1u, quads + 1u);
-    TERRIMPI_TRY(terrimpi_height_range(&t->field, samples, 0, &node->low, &node->high));
+    TERRIMPI_TRY(terrimpi_field_range(&t->field, samples, 0, &node->low, &node->high));
     node->error = node->rms = 0.0f;
     return TERRIMP_OK;
 }
@@ -13545,21 +13637,21 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tre
                                                      float *scratch)
 {
     terrimp_node p, beyond;
-    terrimpi_mip_misses misses;
+    terrimpi_build_residual misses;
     int side;
     TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     p = terrimpi_tree_node(tree, node);
     if (p.level == 0)
-        return terrimpi_mip_build_leaf(tree, p);
+        return terrimpi_build_geomip_leaf(tree, p);
     memset(&misses, 0, sizeof misses);
-    terrimpi_mip_inner_misses(tree, p, scratch, &misses);
-    misses.low = misses.high = terrimpi_sample(
+    terrimpi_build_residual_inner(tree, p, scratch, &misses);
+    misses.low = misses.high = terrimpi_field_sample(
         &tree->field, terrimpi_tree_col(tree, p.level, p.x * tree->chunk_quads),
         terrimpi_tree_row(tree, p.level, p.z * tree->chunk_quads));
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
         if (terrimpi_tree_beyond(tree, &p, side, &beyond))
-            terrimpi_mip_border_misses(tree, p, side, &misses);
+            terrimpi_build_residual_border(tree, p, side, &misses);
     tree->nodes[node].low = misses.low;
     tree->nodes[node].high = misses.high;
     tree->nodes[node].error = misses.most;
@@ -13593,27 +13685,27 @@ TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, fl
 
 /* An edge of a triangle as the rows of samples meet it: in row z, of low <= z < high, it stands at
    column x + (z - low) * slope and height h + (z - low) * rise. */
-typedef struct terrimpi_side {
+typedef struct terrimpi_build_edge {
     uint32_t low, high;
     float x, slope, h, rise;
-} terrimpi_side;
+} terrimpi_build_edge;
 
 /* A triangle: the sides that have it on their right, and those that have it on their left. */
-typedef struct terrimpi_facet {
+typedef struct terrimpi_build_triangle {
     uint32_t low, high, left_count, right_count;
-    terrimpi_side left[2], right[2];
-} terrimpi_facet;
+    terrimpi_build_edge left[2], right[2];
+} terrimpi_build_triangle;
 
 /* Scratch of one node. */
 typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
     float *row;             /* samples of one row or column of the node; scratch of its errors */
-    float *tops;            /* of a border: see terrimpi_ground_tops */
+    float *tops;            /* of a border: see terrimpi_build_ground_tops */
     float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
     uint16_t *indices;
-    terrimpi_facet *facets; /* [triangle] */
+    terrimpi_build_triangle *facets; /* [triangle] */
     uint32_t vertex_capacity, index_capacity;
     void *rest;
     size_t rest_bytes;
@@ -13639,17 +13731,17 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     build->indices =
         (uint16_t *)terrimpi_take(&b, build->index_capacity, sizeof *build->indices);
     build->facets =
-        (terrimpi_facet *)terrimpi_take(&b, desc->triangle_budget, sizeof *build->facets);
+        (terrimpi_build_triangle *)terrimpi_take(&b, desc->triangle_budget, sizeof *build->facets);
     build->rest = terrimpi_take(&b, build->rest_bytes, 1);
     return b.ok ? b.bytes : 0;
 }
 
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
-static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex *from,
-                              const terrimp_mesh_vertex *to, terrimpi_facet *facet)
+static void terrimpi_build_add_edge(const terrimpi_terrain_tile *p, const terrimp_mesh_vertex *from,
+                                    const terrimp_mesh_vertex *to, terrimpi_build_triangle *facet)
 {
     const terrimp_mesh_vertex *a = from->z < to->z ? from : to, *b = a == from ? to : from;
-    terrimpi_side *side;
+    terrimpi_build_edge *side;
     float x, inverse;
     if (a->z == b->z)
         return;
@@ -13667,8 +13759,8 @@ static void terrimpi_add_side(const terrimpi_patch *p, const terrimp_mesh_vertex
 }
 
 /* Describes the triangles of a surface. */
-static void terrimpi_make_facets(const terrimpi_patch *p, const terrimp_mesh *mesh,
-                                 terrimpi_facet *facets)
+static void terrimpi_build_setup_triangles(const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                           terrimpi_build_triangle *facets)
 {
     uint32_t i, k;
     for (i = 0; i < mesh->surface_index_count; i += 3u, facets++) {
@@ -13676,16 +13768,17 @@ static void terrimpi_make_facets(const terrimpi_patch *p, const terrimp_mesh *me
         memset(facets, 0, sizeof *facets);
         facets->low = 0xffffffffu;
         for (k = 0; k < 3u; k++)
-            terrimpi_add_side(p, mesh->vertices + corner[k],
-                              mesh->vertices + corner[k == 2u ? 0 : k + 1u], facets);
+            terrimpi_build_add_edge(p, mesh->vertices + corner[k],
+                                    mesh->vertices + corner[k == 2u ? 0 : k + 1u], facets);
     }
 }
 
 /* Where the row meets the one of two sides that crosses it; returns that side. */
-static const terrimpi_side *terrimpi_meet(const terrimpi_side *sides, uint32_t count, uint32_t z,
-                                          float *x, float *h)
+static const terrimpi_build_edge *terrimpi_build_cross_row(const terrimpi_build_edge *sides,
+                                                           uint32_t count, uint32_t z,
+                                                           float *x, float *h)
 {
-    const terrimpi_side *side = count > 1u && z - sides[1].low < sides[1].high - sides[1].low
+    const terrimpi_build_edge *side = count > 1u && z - sides[1].low < sides[1].high - sides[1].low
                                     ? sides + 1
                                     : sides;
     float down = (float)(z - side->low);
@@ -13696,8 +13789,8 @@ static const terrimpi_side *terrimpi_meet(const terrimpi_side *sides, uint32_t c
 
 /* Takes the surface away from samples that lie on a straight line of it: from column `first` to the
    one before `end`, when it has height h at column x. */
-static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x, float h,
-                               float slope)
+static void terrimpi_build_subtract(float *row, uint32_t first, uint32_t end, float x, float h,
+                                    float slope)
 {
     float start = h + ((float)first - x) * slope;
     uint32_t i, count = end > first ? end - first : 0;
@@ -13707,13 +13800,13 @@ static void terrimpi_take_away(float *row, uint32_t first, uint32_t end, float x
 
 /* A segment of the loop, in rising order, and the samples of the border that it begins and ends
    at. */
-typedef struct terrimpi_segment {
+typedef struct terrimpi_build_segment {
     uint32_t a, b, from, to;
-} terrimpi_segment;
+} terrimpi_build_segment;
 
 /* The segment from vertex i of the loop to the next; returns 0 when it is not on that side. */
-static int terrimpi_segment_of(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
-                               uint32_t i, terrimpi_segment *s)
+static int terrimpi_build_segment_of(const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                     int side, uint32_t i, terrimpi_build_segment *s)
 {
     const terrimp_mesh_vertex *v = mesh->vertices;
     int along_x = terrimpi_along_x(side), last = side & 1; /* Z1, X1 */
@@ -13732,44 +13825,47 @@ static int terrimpi_segment_of(const terrimpi_patch *p, const terrimp_mesh *mesh
 }
 
 /* Takes the surface away from the samples of one border, whose line the loop has. */
-static void terrimpi_take_border(const terrimpi_patch *p, const terrimp_mesh *mesh, int side,
-                                 float *line)
+static void terrimpi_build_subtract_border(const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                           int side, float *line)
 {
     uint32_t i, span = terrimpi_along_x(side) ? p->span_x : p->span_z;
-    terrimpi_segment s;
+    terrimpi_build_segment s;
     for (i = 0; i < mesh->border_vertex_count; i++) {
         const terrimp_mesh_vertex *v = mesh->vertices;
-        if (terrimpi_segment_of(p, mesh, side, i, &s))
-            terrimpi_take_away(line, s.from, s.to + (s.to == span), (float)s.from, v[s.a].height,
-                               (v[s.b].height - v[s.a].height) / (float)(s.to - s.from));
+        if (terrimpi_build_segment_of(p, mesh, side, i, &s))
+            terrimpi_build_subtract(line, s.from, s.to + (s.to == span), (float)s.from,
+                                    v[s.a].height,
+                                    (v[s.b].height - v[s.a].height) / (float)(s.to - s.from));
     }
 }
 
 /* Reads row z of a node and takes the surface away: what is left is how far each sample is above
    it. Triangles share the columns at which a row crosses their sides, so every sample counts for
    exactly one of them. */
-static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *p,
-                                const terrimp_mesh *mesh, const terrimpi_build *build, uint32_t z)
+static void terrimpi_build_residual_of_row(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                           const terrimp_mesh *mesh, const terrimpi_build *build,
+                                           uint32_t z)
 {
-    const terrimpi_facet *facet = build->facets, *end = facet + mesh->surface_index_count / 3u;
+    const terrimpi_build_triangle *facet = build->facets, *end = facet + mesh->surface_index_count /
+        3u;
     float *row = build->row, last = (float)p->span_x;
-    terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
+    terrimpi_field_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
-        terrimpi_take_border(p, mesh, TERRIMP_SIDE_Z1, row);
+        terrimpi_build_subtract_border(p, mesh, TERRIMP_SIDE_Z1, row);
         return;
     }
     for (; facet < end; facet++) {
-        const terrimpi_side *right;
+        const terrimpi_build_edge *right;
         float x0, x1, h0, h1;
         uint32_t first, limit;
         if (z < facet->low || z >= facet->high)
             continue;
-        terrimpi_meet(facet->left, facet->left_count, z, &x0, &h0);
-        right = terrimpi_meet(facet->right, facet->right_count, z, &x1, &h1);
+        terrimpi_build_cross_row(facet->left, facet->left_count, z, &x0, &h0);
+        right = terrimpi_build_cross_row(facet->right, facet->right_count, z, &x1, &h1);
         first = terrimpi_ceil_u32(terrimpi_min(x0, last));
         limit = terrimpi_ceil_u32(terrimpi_min(x1, last));
         if (x1 > x0)
-            terrimpi_take_away(row, first, limit, x0, h0, (h1 - h0) / (x1 - x0));
+            terrimpi_build_subtract(row, first, limit, x0, h0, (h1 - h0) / (x1 - x0));
         if (x1 >= last && right->slope == 0.0f) /* this side is the last column */
             row[p->span_x] -= h1;
     }
@@ -13779,8 +13875,8 @@ static void terrimpi_survey_row(const terrimp_terrain *t, const terrimpi_patch *
 
 /* The samples that column or row k inside a tile stands for, first and end: of those inside the
    node, the ones that are closer to it than to another. */
-static void terrimpi_window(uint32_t k, uint32_t level, uint32_t count, uint32_t span,
-                            uint32_t *first, uint32_t *end)
+static void terrimpi_build_window(uint32_t k, uint32_t level, uint32_t count, uint32_t span,
+                                  uint32_t *first, uint32_t *end)
 {
     uint32_t half = (1u << level) / 2u;
     *first = k == 1u ? 1u : (k << level) - half;
@@ -13788,7 +13884,7 @@ static void terrimpi_window(uint32_t k, uint32_t level, uint32_t count, uint32_t
 }
 
 /* The mean of the samples round place k of a line, half a step to either side. */
-static float terrimpi_line_mean(const float *line, uint32_t k, uint32_t level, uint32_t span)
+static float terrimpi_build_line_mean(const float *line, uint32_t k, uint32_t level, uint32_t span)
 {
     uint32_t half = (1u << level) / 2u, i, first = (k << level) - half;
     uint32_t end = terrimpi_min_u32((k << level) + half + 1u, span);
@@ -13799,21 +13895,21 @@ static float terrimpi_line_mean(const float *line, uint32_t k, uint32_t level, u
 }
 
 /* Reads one of a node's borders, along +x or +z; returns how many quads it spans. */
-static uint32_t terrimpi_read_border(const terrimp_terrain *t, const terrimpi_patch *p, int side,
-                                     float *line)
+static uint32_t terrimpi_build_read_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                           int side, float *line)
 {
     int along_x = terrimpi_along_x(side);
     uint32_t x = side == TERRIMP_SIDE_X1 ? p->x + p->span_x : p->x;
     uint32_t z = side == TERRIMP_SIDE_Z1 ? p->z + p->span_z : p->z;
     uint32_t span = along_x ? p->span_x : p->span_z;
-    terrimpi_heightfield_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
-                              along_x ? 1u : span + 1u, 1, line);
+    terrimpi_field_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
+                        along_x ? 1u : span + 1u, 1, line);
     return span;
 }
 
 /* Where a border stands in a tile: its first place, and the way to the next; returns the places. */
-static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t *first,
-                                     uint32_t *step)
+static uint32_t terrimpi_build_tile_border(const terrimpi_terrain_tile *p, int side,
+                                           uint32_t *first, uint32_t *step)
 {
     *first = side == TERRIMP_SIDE_Z1   ? (p->rows - 1u) * p->cols
              : side == TERRIMP_SIDE_X1 ? p->cols - 1u
@@ -13825,8 +13921,8 @@ static uint32_t terrimpi_tile_border(const terrimpi_patch *p, int side, uint32_t
 /* Fills the tile that the simplifier works on: at level 0 the samples, above that the mean of those
    round each place (single samples give 1 to 7 % more error). Borders are made of their own samples
    alone, and corners are samples, so that the nodes that share them agree. */
-static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                               const terrimpi_build *build)
+static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                const terrimpi_build *build)
 {
     uint32_t i, k, z, half = (1u << p->level) / 2u, first, step;
     int side;
@@ -13837,42 +13933,43 @@ static void terrimpi_fill_tile(const terrimp_terrain *t, const terrimpi_patch *p
         for (i = 0; i < p->cols; i++)
             out[i] = 0.0f;
         for (z = from; z < to; z++) {
-            terrimpi_heightfield_tile(&t->desc.field, p->x, p->z + z, p->span_x, 1, 1, build->row);
+            terrimpi_field_tile(&t->desc.field, p->x, p->z + z, p->span_x, 1, 1, build->row);
             for (i = 1; i + 1u < p->cols; i++)
-                out[i] += terrimpi_line_mean(build->row, i, p->level, p->span_x);
+                out[i] += terrimpi_build_line_mean(build->row, i, p->level, p->span_x);
         }
         for (i = 0; i < p->cols; i++)
             out[i] /= (float)(to - from);
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t span = terrimpi_read_border(t, p, side, build->row);
-        uint32_t count = terrimpi_tile_border(p, side, &first, &step);
+        uint32_t span = terrimpi_build_read_border(t, p, side, build->row);
+        uint32_t count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             build->tile[first + k * step] =
                 k == 0 || k + 1u == count ? build->row[terrimpi_lattice(k, p->level, span)]
-                                          : terrimpi_line_mean(build->row, k, p->level, span);
+                                          : terrimpi_build_line_mean(build->row, k, p->level, span);
     }
 }
 
 /* Simplifies the tile between its four borders. */
-static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                                             const terrimpi_build *build, terrimp_mesh *mesh)
+static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
+                                              const terrimpi_terrain_tile *p,
+                                              const terrimpi_build *build, terrimp_mesh *mesh)
 {
     terrimp_border_point points[TERRIMP_SIDE_COUNT][16];
     float line[129];
     terrimp_simplify_desc desc;
-    terrimpi_squeeze squeeze;
+    terrimpi_simp_last_spacing squeeze;
     int side, even;
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
     desc.triangle_budget = t->desc.triangle_budget;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t first, step, k, count = terrimpi_tile_border(p, side, &first, &step);
+        uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
         TERRIMPI_TRY(terrimp_border_simplify(line, count,
-                                             terrimpi_border_points(t->desc.triangle_budget),
+                                             terrimpi_terrain_border_points(t->desc.triangle_budget),
                                              points[side], 16,
                                              &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
@@ -13886,22 +13983,23 @@ static terrimp_result terrimpi_simplify_tile(const terrimp_terrain *t, const ter
     mesh->vertex_capacity = build->vertex_capacity;
     mesh->index_capacity = build->index_capacity;
     even = (p->span_x | p->span_z) % (1u << p->level) == 0;
-    return terrimpi_simplify(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
+    return terrimpi_simp_run(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
    a sample round it over the polyline. From the border's own samples alone. */
-static void terrimpi_miss_border(const terrimp_terrain *t, const terrimpi_patch *p, int side,
-                                 const terrimp_mesh *mesh, const terrimpi_build *build)
+static void terrimpi_build_border_shortfall(const terrimp_terrain *t,
+                                            const terrimpi_terrain_tile *p, int side,
+                                            const terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    uint32_t span = terrimpi_read_border(t, p, side, build->row), first, step, i, k;
-    uint32_t count = terrimpi_tile_border(p, side, &first, &step);
-    terrimpi_take_border(p, mesh, side, build->row);
+    uint32_t span = terrimpi_build_read_border(t, p, side, build->row), first, step, i, k;
+    uint32_t count = terrimpi_build_tile_border(p, side, &first, &step);
+    terrimpi_build_subtract_border(p, mesh, side, build->row);
     build->tile[first] = build->tile[first + (count - 1u) * step] = 0.0f;
     for (k = 1; k + 1u < count; k++) {
         uint32_t from, end;
         float most;
-        terrimpi_window(k, p->level, count, span, &from, &end);
+        terrimpi_build_window(k, p->level, count, span, &from, &end);
         most = build->row[from];
         for (i = from + 1u; i < end; i++)
             most = terrimpi_max(most, build->row[i]);
@@ -13911,22 +14009,22 @@ static void terrimpi_miss_border(const terrimp_terrain *t, const terrimpi_patch 
 
 /* Fills the tile with what the mesh misses: for each place the largest height of a sample round it
    over the surface. */
-static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch *p,
-                                 const terrimp_mesh *mesh, const terrimpi_build *build)
+static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                     const terrimp_mesh *mesh, const terrimpi_build *build)
 {
     uint32_t i, k, x, z;
     int side;
-    terrimpi_make_facets(p, mesh, build->facets);
+    terrimpi_build_setup_triangles(p, mesh, build->facets);
     for (k = 1; k + 1u < p->rows; k++) {
         float *out = build->tile + k * p->cols;
         uint32_t from, to;
-        terrimpi_window(k, p->level, p->rows, p->span_z, &from, &to);
+        terrimpi_build_window(k, p->level, p->rows, p->span_z, &from, &to);
         for (z = from; z < to; z++) {
-            terrimpi_survey_row(t, p, mesh, build, z);
+            terrimpi_build_residual_of_row(t, p, mesh, build, z);
             for (i = 1; i + 1u < p->cols; i++) {
                 uint32_t first, end;
                 float most;
-                terrimpi_window(i, p->level, p->cols, p->span_x, &first, &end);
+                terrimpi_build_window(i, p->level, p->cols, p->span_x, &first, &end);
                 most = z == from ? build->row[first] : terrimpi_max(out[i], build->row[first]);
                 for (x = first + 1u; x < end; x++)
                     most = terrimpi_max(most, build->row[x]);
@@ -13935,7 +14033,7 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
         }
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        terrimpi_miss_border(t, p, side, mesh, build);
+        terrimpi_build_border_shortfall(t, p, side, mesh, build);
 }
 
 /* Raises the mesh so that it stands proud of all samples. Since a raise is a piecewise linear
@@ -13943,12 +14041,12 @@ static void terrimpi_fill_misses(const terrimp_terrain *t, const terrimpi_patch 
    there the places of the tile stand for all samples round them, however steep the terrain is.
    To do so twice halves the samples that still stand out, from 0.3 to 0.15 %, and makes the error
    larger by a tenth to a fifth: not worth it. */
-static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrimpi_patch *p,
-                                          terrimp_mesh *mesh, const terrimpi_build *build)
+static terrimp_result terrimpi_build_raise(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                           terrimp_mesh *mesh, const terrimpi_build *build)
 {
     terrimp_raise_desc raise;
     uint32_t i;
-    terrimpi_fill_misses(t, p, mesh, build);
+    terrimpi_build_shortfall(t, p, mesh, build);
     raise.heights = build->tile;
     raise.cols = p->cols;
     raise.rows = p->rows;
@@ -13965,7 +14063,8 @@ static terrimp_result terrimpi_raise_tile(const terrimp_terrain *t, const terrim
 
 /* The highest that ground can be drawn at each sample of a border: of levels up to one the lines
    between every 2^level-th sample. */
-static void terrimpi_ground_tops(const terrimpi_build *build, uint32_t span, uint32_t top_level)
+static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t span,
+                                       uint32_t top_level)
 {
     const float *line = build->row;
     uint32_t level, from, to, k;
@@ -13986,28 +14085,29 @@ static void terrimpi_ground_tops(const terrimpi_build *build, uint32_t span, uin
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
+   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
    that is coarser than by one level could leave one, of less than its tolerance; to lift borders
    over all of it would double the errors of meshes where ridges are steep. Neighbours of a level
    still share what lies between the corners. */
-static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch *p,
-                                 terrimp_mesh *mesh, const terrimpi_build *build)
+static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                       terrimp_mesh *mesh, const terrimpi_build *build)
 {
     float *lift = build->work;
     uint32_t i, k;
     int side;
-    terrimpi_segment s;
+    terrimpi_build_segment s;
     for (i = 0; i < mesh->border_vertex_count; i++) {
         float *height = &mesh->vertices[i].height;
-        *height = terrimpi_min(*height, terrimpi_border_height(t, TERRIMPI_BORDER_STEPS));
+        *height = terrimpi_min(*height,
+                               terrimpi_terrain_border_height(t, TERRIMPI_MESH_BORDER_STEPS));
         lift[i] = 0.0f;
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t span = terrimpi_read_border(t, p, side, build->row);
-        terrimpi_ground_tops(build, span, p->level + 1u);
-        terrimpi_take_border(p, mesh, side, build->tops);
+        uint32_t span = terrimpi_build_read_border(t, p, side, build->row);
+        terrimpi_build_ground_tops(build, span, p->level + 1u);
+        terrimpi_build_subtract_border(p, mesh, side, build->tops);
         for (i = 0; i < mesh->border_vertex_count; i++) {
-            if (!terrimpi_segment_of(p, mesh, side, i, &s))
+            if (!terrimpi_build_segment_of(p, mesh, side, i, &s))
                 continue;
             for (k = s.from; k <= s.to; k++) {
                 float w = (float)(k - s.from) / (float)(s.to - s.from);
@@ -14021,7 +14121,8 @@ static void terrimpi_lift_border(const terrimp_terrain *t, const terrimpi_patch 
 }
 
 /* The steps above `low` that a height is stored as: rounded up when meshes stand proud. */
-static uint32_t terrimpi_height_steps(float height, float low, float step, uint32_t most, int up)
+static uint32_t terrimpi_build_height_steps(float height, float low, float step, uint32_t most,
+                                            int up)
 {
     float steps = height - low;
     uint32_t whole;
@@ -14036,10 +14137,10 @@ static uint32_t terrimpi_height_steps(float height, float low, float step, uint3
 
 /* Settles what the heights of a node's inner vertices count from, in which steps: the exponent of
    the least power of two with which they reach to the highest. */
-static uint32_t terrimpi_inner_range(const terrimp_terrain *t, const terrimp_mesh *mesh,
-                                     float *base)
+static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terrimp_mesh *mesh,
+                                           float *base)
 {
-    float most = terrimpi_border_height(t, TERRIMPI_BORDER_STEPS), low = most, step;
+    float most = terrimpi_terrain_border_height(t, TERRIMPI_MESH_BORDER_STEPS), low = most, step;
     float high = t->range_low;
     uint32_t i, bits;
     for (i = mesh->border_vertex_count; i < mesh->surface_vertex_count; i++) {
@@ -14048,33 +14149,34 @@ static uint32_t terrimpi_inner_range(const terrimp_terrain *t, const terrimp_mes
         high = terrimpi_max(high, mesh->vertices[i].height);
     }
     *base = low;
-    step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_INNER_STEPS;
+    step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_MESH_INNER_STEPS;
     memcpy(&bits, &step, sizeof bits);
     return (bits + 0x7fffffu) >> 23;
 }
 
 /* A vertex of a surface as it is stored. */
-static uint32_t terrimpi_store_point(const terrimp_terrain *t, const terrimpi_patch *p,
-                                     const terrimpi_mesh *mesh, const terrimp_mesh_vertex *v,
-                                     int inner)
+static uint32_t terrimpi_build_store_point(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                           const terrimpi_mesh *mesh, const terrimp_mesh_vertex *v,
+                                           int inner)
 {
     int up = t->desc.proud > 0.0f, side;
     if (inner)
         return v->x | (uint32_t)v->z << 8 |
-               terrimpi_height_steps(v->height, mesh->base, terrimpi_mesh_step(mesh),
-                                     TERRIMPI_INNER_STEPS, up) << 16;
+               terrimpi_build_height_steps(v->height, mesh->base, terrimpi_mesh_step(mesh),
+                                           TERRIMPI_MESH_INNER_STEPS, up) << 16;
     side = v->x == 0               ? TERRIMP_SIDE_X0
            : v->z == 0             ? TERRIMP_SIDE_Z0
            : v->x == p->cols - 1u  ? TERRIMP_SIDE_X1
                                    : TERRIMP_SIDE_Z1;
     return (terrimpi_along_x(side) ? v->x : v->z) | (uint32_t)side << 8 |
-           terrimpi_height_steps(v->height, t->range_low, t->range_step, TERRIMPI_BORDER_STEPS, up)
+           terrimpi_build_height_steps(v->height, t->range_low, t->range_step,
+                                       TERRIMPI_MESH_BORDER_STEPS, up)
                << 10;
 }
 
 /* Stores a surface, and leaves in it the heights that have been stored. */
-static void terrimpi_store_surface(terrimp_terrain *t, const terrimpi_patch *p, uint32_t node,
-                                   const terrimp_mesh *mesh)
+static void terrimpi_build_store_surface(terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                         uint32_t node, const terrimp_mesh *mesh)
 {
     terrimpi_mesh *out = &t->meshes[node];
     uint32_t *points = t->points + (size_t)node * t->vertex_limit;
@@ -14083,12 +14185,12 @@ static void terrimpi_store_surface(terrimp_terrain *t, const terrimpi_patch *p, 
     TERRIMP_ASSERT(mesh->border_vertex_count <= t->border_limit);
     memset(points, 0, t->vertex_limit * sizeof *points);
     memset(corners, 0, t->index_limit);
-    out->counts = terrimpi_inner_range(t, mesh, &out->base) << 24 |
+    out->counts = terrimpi_build_inner_range(t, mesh, &out->base) << 24 |
                   mesh->surface_vertex_count << 16 | mesh->border_vertex_count << 9 |
                   mesh->surface_index_count / 3u;
     for (i = 0; i < mesh->surface_vertex_count; i++) {
         terrimp_mesh_vertex *v = &mesh->vertices[i];
-        points[i] = terrimpi_store_point(t, p, out, v, i >= mesh->border_vertex_count);
+        points[i] = terrimpi_build_store_point(t, p, out, v, i >= mesh->border_vertex_count);
         v->height = terrimpi_mesh_point(t, p, node, i).height;
         out->low = i == 0 ? v->height : terrimpi_min(out->low, v->height);
         out->high = i == 0 ? v->height : terrimpi_max(out->high, v->height);
@@ -14098,11 +14200,11 @@ static void terrimpi_store_surface(terrimp_terrain *t, const terrimpi_patch *p, 
 }
 
 /* Differences of samples to the surface. */
-typedef struct terrimpi_error {
+typedef struct terrimpi_build_error {
     float above, below, squares;
-} terrimpi_error;
+} terrimpi_build_error;
 
-static void terrimpi_add_error(terrimpi_error *error, float difference)
+static void terrimpi_build_add_error(terrimpi_build_error *error, float difference)
 {
     error->above = terrimpi_max(error->above, difference);
     error->below = terrimpi_max(error->below, -difference);
@@ -14110,19 +14212,19 @@ static void terrimpi_add_error(terrimpi_error *error, float difference)
 }
 
 /* Measures a mesh against every sample of its node. */
-static void terrimpi_measure_node(const terrimp_terrain *t, const terrimpi_patch *p,
-                                  const terrimp_mesh *mesh, const terrimpi_build *build,
-                                  terrimpi_error *error, float *rms)
+static void terrimpi_build_measure_node(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+                                        const terrimp_mesh *mesh, const terrimpi_build *build,
+                                        terrimpi_build_error *error, float *rms)
 {
     uint32_t x, z;
     float squares = 0.0f;
     error->above = error->below = 0.0f;
-    terrimpi_make_facets(p, mesh, build->facets);
+    terrimpi_build_setup_triangles(p, mesh, build->facets);
     for (z = 0; z <= p->span_z; z++) {
-        terrimpi_survey_row(t, p, mesh, build, z);
+        terrimpi_build_residual_of_row(t, p, mesh, build, z);
         error->squares = 0.0f; /* summed by row, as small sums round less */
         for (x = 0; x <= p->span_x; x++)
-            terrimpi_add_error(error, build->row[x]);
+            terrimpi_build_add_error(error, build->row[x]);
         squares += error->squares;
     }
     *rms = TERRIMP_SQRTF(squares / ((float)(p->span_x + 1u) * (float)(p->span_z + 1u)));
@@ -14131,18 +14233,18 @@ static void terrimpi_measure_node(const terrimp_terrain *t, const terrimpi_patch
 static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
                                           const terrimpi_build *build)
 {
-    terrimpi_patch p = terrimpi_patch_of(t, node);
+    terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     terrimp_mesh mesh;
-    terrimpi_error error;
+    terrimpi_build_error error;
     float rms;
-    terrimpi_fill_tile(t, &p, build);
-    TERRIMPI_TRY(terrimpi_simplify_tile(t, &p, build, &mesh));
+    terrimpi_build_tile(t, &p, build);
+    TERRIMPI_TRY(terrimpi_build_simplify(t, &p, build, &mesh));
     if (t->desc.proud > 0.0f) {
-        TERRIMPI_TRY(terrimpi_raise_tile(t, &p, &mesh, build));
-        terrimpi_lift_border(t, &p, &mesh, build);
+        TERRIMPI_TRY(terrimpi_build_raise(t, &p, &mesh, build));
+        terrimpi_build_lift_border(t, &p, &mesh, build);
     }
-    terrimpi_store_surface(t, &p, node, &mesh);
-    terrimpi_measure_node(t, &p, &mesh, build, &error, &rms);
+    terrimpi_build_store_surface(t, &p, node, &mesh);
+    terrimpi_build_measure_node(t, &p, &mesh, build, &error, &rms);
     if (!terrimpi_finite2(error.above, error.below)) {
         t->meshes[node].counts = 0;
         return TERRIMP_E_NOT_FINITE;
@@ -14198,7 +14300,7 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
 
 /* The room that vertices get below and above the samples, as a part of their range: heights fitted
    to one side of a ridge swing over on the other. */
-#define TERRIMPI_RANGE_ROOM 1.0f
+#define TERRIMPI_BUILD_OVERSHOOT 1.0f
 
 TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 {
@@ -14209,11 +14311,12 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
     if (low == 0.0f && high == 0.0f) {
         const terrimp_heightfield *f = &terrain->desc.field;
         terrimp_rect all = terrimpi_rect(0, 0, f->width, f->depth);
-        TERRIMPI_TRY(terrimpi_height_range(f, all, 0, &low, &high));
+        TERRIMPI_TRY(terrimpi_field_range(f, all, 0, &low, &high));
     }
-    room = TERRIMPI_RANGE_ROOM * (high - low);
-    step = (high - low + 2.0f * room) / (float)TERRIMPI_BORDER_STEPS;
-    TERRIMPI_REFUSE(!terrimpi_range_fits(&terrain->desc.field, low - room, step), TERRIMP_E_RANGE);
+    room = TERRIMPI_BUILD_OVERSHOOT * (high - low);
+    step = (high - low + 2.0f * room) / (float)TERRIMPI_MESH_BORDER_STEPS;
+    TERRIMPI_REFUSE(!terrimpi_terrain_range_fits(&terrain->desc.field, low - room, step),
+                    TERRIMP_E_RANGE);
     terrain->sample_low = low;
     terrain->sample_high = high;
     terrain->range_low = low - room;
@@ -14239,7 +14342,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
 }
 
 /* Notes that a node holds another one, or its own samples. */
-static void terrimpi_hold(terrimpi_mesh *mesh, float low, float high)
+static void terrimpi_build_hold(terrimpi_mesh *mesh, float low, float high)
 {
     mesh->low = terrimpi_min(mesh->low, low);
     mesh->high = terrimpi_max(mesh->high, high);
@@ -14256,12 +14359,12 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     terrimp_geomip_build_finish(tree);
     terrain->mesh_triangle_count = 0;
     for (node = 0; node < tree->node_count; node++) {
-        terrimpi_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
+        terrimpi_build_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
         terrain->mesh_triangle_count += terrimpi_mesh_triangles(&terrain->meshes[node]);
     }
     for (node = 0; node + 1u < tree->node_count; node++)
-        terrimpi_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
-                      terrain->meshes[node].low, terrain->meshes[node].high);
+        terrimpi_build_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
+                            terrain->meshes[node].low, terrain->meshes[node].high);
     terrain->built = 1;
     return TERRIMP_OK;
 }
@@ -14289,14 +14392,14 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
     terrimpi_build build;
     uint32_t level, x, z;
     float low, high;
-    TERRIMPI_TRY(terrimpi_check_touched(terrain, samples));
+    TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
                                       terrimpi_build_layout(&terrain->desc, NULL, &build)));
-    TERRIMPI_TRY(terrimpi_height_range(&terrain->desc.field, *samples, 0, &low, &high));
+    TERRIMPI_TRY(terrimpi_field_range(&terrain->desc.field, *samples, 0, &low, &high));
     TERRIMPI_REFUSE(low < terrain->sample_low || high > terrain->sample_high, TERRIMP_E_RANGE);
     for (level = 0; level < terrain->tree.level_count; level++) {
-        terrimpi_touched in = terrimpi_touched_nodes(terrain, samples, level, 0);
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, level, 0);
         for (z = in.z0; z <= in.z1; z++)
             for (x = in.x0; x <= in.x1; x++)
                 TERRIMPI_TRY(terrimp_terrain_build_node(
@@ -14319,7 +14422,7 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
     terrimp_result result;
     size_t bytes, scratch_bytes;
     void *memory, *scratch;
-    TERRIMPI_REFUSE(!terrain || !terrimpi_pick_allocator(allocator, &from), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain || !terrimpi_terrain_allocator(allocator, &from), TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &resolved));
     bytes = terrimp_terrain_bytes(&resolved);
     scratch_bytes = terrimp_terrain_scratch_bytes(&resolved);
@@ -14348,7 +14451,7 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 /* ---- the bake ---- */
 
 /* The bytes of the arrays, 0 when they and the header pass what 32 bits can count. */
-static size_t terrimpi_bake_arrays(const terrimp_terrain *t)
+static size_t terrimpi_bake_array_bytes(const terrimp_terrain *t)
 {
     terrimp_terrain counted = *t;
     size_t bytes = terrimpi_terrain_layout(&counted, NULL);
@@ -14357,11 +14460,11 @@ static size_t terrimpi_bake_arrays(const terrimp_terrain *t)
 
 TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
 {
-    size_t arrays = terrain && terrain->built ? terrimpi_bake_arrays(terrain) : 0;
+    size_t arrays = terrain && terrain->built ? terrimpi_bake_array_bytes(terrain) : 0;
     return arrays ? sizeof(terrimpi_bake) + arrays : 0;
 }
 
-static void terrimpi_swap_words(unsigned char *words, size_t bytes)
+static void terrimpi_bake_swap_words(unsigned char *words, size_t bytes)
 {
     size_t i;
     for (i = 0; i + 4u <= bytes; i += 4u) {
@@ -14381,7 +14484,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     size_t arrays;
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
-    arrays = terrimpi_bake_arrays(terrain);
+    arrays = terrimpi_bake_array_bytes(terrain);
     TERRIMPI_REFUSE(arrays == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_REFUSE(bytes < sizeof bake + arrays, TERRIMP_E_CAPACITY);
     TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
@@ -14401,7 +14504,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.vertex_limit = terrain->vertex_limit;
     bake.index_limit = terrain->index_limit;
     bake.mesh_triangle_count = terrain->mesh_triangle_count;
-    bake.samples = terrimpi_samples_hash(&desc->field);
+    bake.samples = terrimpi_bake_hash_samples(&desc->field);
     bake.height_scale = desc->field.height_scale;
     bake.height_offset = desc->field.height_offset;
     bake.height_low = desc->height_low;
@@ -14416,7 +14519,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     bake.checksum = terrimpi_bake_hash(out);
     memcpy(out, &bake, sizeof bake);
     if (swapped)
-        terrimpi_swap_words((unsigned char *)out, bake.bytes);
+        terrimpi_bake_swap_words((unsigned char *)out, bake.bytes);
     return TERRIMP_OK;
 }
 
@@ -14445,8 +14548,8 @@ static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, ui
     line = terrimpi_min_u32(line, (axis == 0 ? field->width : field->depth) - 1u);
     for (k = 0; k <= s->form.quads; k++) {
         uint32_t at = terrimpi_min_u32(from + k, last);
-        lowest = terrimpi_min(lowest, axis == 0 ? terrimpi_sample(field, line, at)
-                                                : terrimpi_sample(field, at, line));
+        lowest = terrimpi_min(lowest, axis == 0 ? terrimpi_field_sample(field, line, at)
+                                                : terrimpi_field_sample(field, at, line));
     }
     return lowest;
 }
@@ -14488,8 +14591,9 @@ static float terrimpi_wall_highest(const terrimpi_wall_site *s, uint32_t x, uint
     for (j = j0; j < j0 + size; j++)
         for (i = i0; i < i0 + size; i++)
             highest = terrimpi_max(highest,
-                                   terrimpi_sample(field, terrimpi_min_u32(i, field->width - 1u),
-                                                   terrimpi_min_u32(j, field->depth - 1u)));
+                                   terrimpi_field_sample(field,
+                                                         terrimpi_min_u32(i, field->width - 1u),
+                                                         terrimpi_min_u32(j, field->depth - 1u)));
     return highest;
 }
 
@@ -14624,16 +14728,16 @@ TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
 #define TERRIMPI_LAYERS_MAX 65535.0f
 
 /* What a descriptor comes to. */
-typedef struct terrimpi_spacing {
+typedef struct terrimpi_layers_gaps {
     float start, end;    /* 1 / depth */
     float spare;         /* by which 1 / depth may be off */
     float texel;         /* or less, where half a texel in both directions is more than allowed */
     float side;          /* largest |x0| from the near side of the cell */
     float shrink, shift; /* of the step that the far side asks for */
     float change;        /* 1 / depth below which that is the smaller one */
-} terrimpi_spacing;
+} terrimpi_layers_gaps;
 
-static float terrimpi_hypot(float a, float b)
+static float terrimpi_layers_hypot(float a, float b)
 {
     float v[3];
     v[0] = a;
@@ -14645,8 +14749,9 @@ static float terrimpi_hypot(float a, float b)
 /* The largest r of the bound of parallax. Over h it has one peak, at end - 2 size / q. */
 static float terrimpi_layers_reach(const terrimp_layers_desc *d)
 {
-    float r = 0.5f * terrimpi_hypot(d->cell_size[0], d->cell_size[1]);
-    float q = terrimpi_hypot(d->cell_tan[0] + d->view_tan[0], d->cell_tan[1] + d->view_tan[1]);
+    float r = 0.5f * terrimpi_layers_hypot(d->cell_size[0], d->cell_size[1]);
+    float q = terrimpi_layers_hypot(d->cell_tan[0] + d->view_tan[0],
+                                    d->cell_tan[1] + d->view_tan[1]);
     float end = d->distance + d->depth, h, ratio;
     if (!terrimpi_finite(end))
         return r + d->cell_depth * q;
@@ -14655,7 +14760,7 @@ static float terrimpi_layers_reach(const terrimp_layers_desc *d)
     return (r + h * q) * ratio * ratio;
 }
 
-static void terrimpi_layers_spacing(const terrimp_layers_desc *d, terrimpi_spacing *s)
+static void terrimpi_layers_spacing(const terrimp_layers_desc *d, terrimpi_layers_gaps *s)
 {
     float tolerance = d->tolerance_rad > 0.0f ? d->tolerance_rad : d->texel;
     float q[2], m = d->cell_depth, sum, reach = terrimpi_layers_reach(d);
@@ -14723,7 +14828,7 @@ static uint32_t terrimpi_layers_steps(float d, float shrink, float shift, float 
 }
 
 /* The number of layers, first those that the near side rules. */
-static terrimp_result terrimpi_layers_count(const terrimpi_spacing *s, terrimp_layers *l)
+static terrimp_result terrimpi_layers_count(const terrimpi_layers_gaps *s, terrimp_layers *l)
 {
     float way = l->first - l->last, even = 0.0f, d;
     uint32_t steps;
@@ -14750,7 +14855,7 @@ static terrimp_result terrimpi_layers_count(const terrimpi_spacing *s, terrimp_l
 TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
                                                terrimp_layers *layers)
 {
-    terrimpi_spacing s;
+    terrimpi_layers_gaps s;
     terrimp_layers l;
     TERRIMPI_REFUSE(!desc || !layers, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_layers_check(desc));
@@ -14786,7 +14891,7 @@ static uint32_t terrimpi_mask_tail(uint32_t width)
 }
 
 /* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
-static void terrimpi_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
+static void terrimpi_mask_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
 {
     uint32_t words = TERRIMP_MASK_WORDS(width), i, other = 0;
     row[words - 1u] &= terrimpi_mask_tail(width);
@@ -14807,12 +14912,12 @@ static void terrimpi_cull_row(const uint32_t *opaque, uint32_t width, int dx, ui
 
 /* One step of a mask of state from a layer to the next: what has neighbours at dx, dy and across
    there hides what is behind it. */
-static void terrimpi_cull_step(const uint32_t *opaque, uint32_t width, uint32_t height, int dx,
-                               int dy, uint32_t *state)
+static void terrimpi_mask_cull_step(const uint32_t *opaque, uint32_t width, uint32_t height, int dx,
+                                    int dy, uint32_t *state)
 {
     size_t words = TERRIMP_MASK_WORDS(width), y, i;
     for (y = 0; y < height; y++)
-        terrimpi_cull_row(opaque + y * words, width, dx, state + y * words);
+        terrimpi_mask_cull_row(opaque + y * words, width, dx, state + y * words);
     if (dy > 0) {
         for (i = 0; i < (height - 1u) * words; i++)
             state[i] &= state[i + words];
@@ -14835,16 +14940,16 @@ TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t w
     if (rule == TERRIMP_CULL_BLOCK) {
         for (i = 0; i < count; i++)
             visible[i] = opaque[i] & ~state[i];
-        terrimpi_cull_step(visible, width, height, 1, 1, state);
-        terrimpi_cull_step(state, width, height, -1, -1, state);
+        terrimpi_mask_cull_step(visible, width, height, 1, 1, state);
+        terrimpi_mask_cull_step(state, width, height, -1, -1, state);
         return TERRIMP_OK;
     }
     for (i = 0; i < count; i++)
         visible[i] = opaque[i] & ~(state[i] & state[count + i] & state[2u * count + i] &
                                    state[3u * count + i]);
     for (k = 0; k < 4; k++) /* what was culled is in all four, and so is not missing in visible */
-        terrimpi_cull_step(visible, width, height, k & 1 ? 1 : -1, k & 2 ? 1 : -1,
-                           state + (size_t)k * count);
+        terrimpi_mask_cull_step(visible, width, height, k & 1 ? 1 : -1, k & 2 ? 1 : -1,
+                                state + (size_t)k * count);
     return TERRIMP_OK;
 }
 
@@ -14877,7 +14982,7 @@ typedef struct terrimpi_cover {
     terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
 } terrimpi_cover;
 
-static uint32_t terrimpi_bit_count(uint32_t bits)
+static uint32_t terrimpi_mask_bit_count(uint32_t bits)
 {
     bits -= bits >> 1 & 0x55555555u;
     bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
@@ -14885,9 +14990,9 @@ static uint32_t terrimpi_bit_count(uint32_t bits)
 }
 
 /* The number of the lowest bit that is set, and clears it. */
-static uint32_t terrimpi_next_bit(uint32_t *bits)
+static uint32_t terrimpi_mask_next_bit(uint32_t *bits)
 {
-    uint32_t below = terrimpi_bit_count((*bits & (0u - *bits)) - 1u);
+    uint32_t below = terrimpi_mask_bit_count((*bits & (0u - *bits)) - 1u);
     *bits &= *bits - 1u;
     return below;
 }
@@ -14921,7 +15026,8 @@ static void terrimpi_cover_columns(terrimpi_cover *c, const terrimp_rect *r)
                 fresh &= ~c->seen[word];
                 c->seen[word] |= fresh;
                 while (fresh)
-                    (turn ? c->high : c->low)[word * 32u + terrimpi_next_bit(&fresh) - r->x] = y;
+                    (turn ? c->high : c->low)[word * 32u + terrimpi_mask_next_bit(&fresh) - r->x] =
+                        y;
             }
         }
     }
@@ -14938,21 +15044,21 @@ static uint32_t terrimpi_cover_rows(terrimpi_cover *c, const terrimp_rect *r)
             uint32_t bits = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end), last = bits;
             if (!bits)
                 continue;
-            opaque += terrimpi_bit_count(bits);
+            opaque += terrimpi_mask_bit_count(bits);
             if (c->low[y] > c->high[y])
-                c->low[y] = word * 32u + terrimpi_next_bit(&bits) - r->x;
+                c->low[y] = word * 32u + terrimpi_mask_next_bit(&bits) - r->x;
             last |= last >> 1, last |= last >> 2, last |= last >> 4, last |= last >> 8;
             last |= last >> 16;
-            c->high[y] = word * 32u + terrimpi_bit_count(last) - 1u - r->x;
+            c->high[y] = word * 32u + terrimpi_mask_bit_count(last) - 1u - r->x;
         }
     }
     return opaque;
 }
 
 /* A growing extent of rows or columns. */
-typedef struct terrimpi_extent {
+typedef struct terrimpi_cover_extent {
     uint32_t first, last, low, high;
-} terrimpi_extent;
+} terrimpi_cover_extent;
 
 static uint32_t terrimpi_cover_cost(const terrimpi_cover *c, uint32_t width, uint32_t height)
 {
@@ -14960,7 +15066,8 @@ static uint32_t terrimpi_cover_cost(const terrimpi_cover *c, uint32_t width, uin
 }
 
 /* Adds column or row i; returns what the rectangle of all so far costs. */
-static uint32_t terrimpi_extent_add(const terrimpi_cover *c, terrimpi_extent *e, uint32_t i)
+static uint32_t terrimpi_cover_extent_add(const terrimpi_cover *c, terrimpi_cover_extent *e,
+                                          uint32_t i)
 {
     if (c->low[i] <= c->high[i]) {
         if (e->first > e->last) {
@@ -14981,14 +15088,14 @@ static uint32_t terrimpi_extent_add(const terrimpi_cover *c, terrimpi_extent *e,
 /* The cut between `count` columns or rows with the cheapest two parts; returns their cost. */
 static uint32_t terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
 {
-    terrimpi_extent e = {1, 0, 0, 0};
+    terrimpi_cover_extent e = {1, 0, 0, 0};
     uint32_t i, best = 0xffffffffu;
     for (i = count; i-- > 0;)
-        c->beyond[i] = terrimpi_extent_add(c, &e, i);
+        c->beyond[i] = terrimpi_cover_extent_add(c, &e, i);
     e.first = 1;
     e.last = 0;
     for (i = 1; i < count; i++) {
-        uint32_t cost = terrimpi_extent_add(c, &e, i - 1u) + c->beyond[i];
+        uint32_t cost = terrimpi_cover_extent_add(c, &e, i - 1u) + c->beyond[i];
         if (cost < best) {
             best = cost;
             *at = i;
@@ -15001,9 +15108,9 @@ static uint32_t terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *
 static uint32_t terrimpi_cover_tighten(terrimpi_cover *c, terrimp_rect *r)
 {
     uint32_t opaque = terrimpi_cover_rows(c, r), y;
-    terrimpi_extent e = {1, 0, 0, 0};
+    terrimpi_cover_extent e = {1, 0, 0, 0};
     for (y = 0; y < r->height; y++)
-        terrimpi_extent_add(c, &e, y);
+        terrimpi_cover_extent_add(c, &e, y);
     if (opaque)
         *r = terrimpi_rect(r->x + e.low, r->y + e.first, e.high - e.low + 1u,
                            e.last - e.first + 1u);
@@ -15203,7 +15310,7 @@ static float terrimpi_cover_gain(const terrimpi_cover *c, const terrimp_rect *r,
     return gain;
 }
 
-static terrimp_rect terrimpi_rect_union(const terrimp_rect *a, const terrimp_rect *b)
+static terrimp_rect terrimpi_cover_union(const terrimp_rect *a, const terrimp_rect *b)
 {
     uint32_t x = terrimpi_min_u32(a->x, b->x), y = terrimpi_min_u32(a->y, b->y);
     return terrimpi_rect(x, y, terrimpi_max_u32(a->x + a->width, b->x + b->width) - x,
@@ -15233,7 +15340,7 @@ static uint32_t terrimpi_cover_join(const terrimpi_cover *c, terrimp_rect *rects
         joined = 0;
         for (a = 0; a < count; a++)
             for (b = a + 1u; b < count; b++) {
-                terrimp_rect r = terrimpi_rect_union(&rects[a], &rects[b]);
+                terrimp_rect r = terrimpi_cover_union(&rects[a], &rects[b]);
                 if (terrimpi_cover_cost(c, r.width, r.height) / 2u > /* far apart */
                         terrimpi_cover_cost(c, rects[a].width, rects[a].height) +
                             terrimpi_cover_cost(c, rects[b].width, rects[b].height) ||
@@ -15356,8 +15463,8 @@ TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_l
 /* --- recording without gaps --- */
 
 /* Appends the point of edge a-b at a depth between those of its ends. */
-static void terrimpi_clip_cut(const float *vertices, uint32_t stride, const float depths[3],
-                              uint32_t a, uint32_t b, float depth, float *out)
+static void terrimpi_layer_clip_cut(const float *vertices, uint32_t stride, const float depths[3],
+                                    uint32_t a, uint32_t b, float depth, float *out)
 {
     uint32_t low = depths[a] < depths[b] ? a : b, high = low == a ? b : a, i;
     float part = (depth - depths[low]) / (depths[high] - depths[low]);
@@ -15383,8 +15490,8 @@ static uint32_t terrimpi_layer_clip(const float *vertices, uint32_t stride, cons
             float plane = (k == 0) == rises ? low : high;
             if ((depths[a] < plane && plane < depths[b]) ||
                 (depths[b] < plane && plane < depths[a]))
-                terrimpi_clip_cut(vertices, stride, depths, a, b, plane,
-                                  out + (size_t)count++ * stride);
+                terrimpi_layer_clip_cut(vertices, stride, depths, a, b, plane,
+                                        out + (size_t)count++ * stride);
         }
     }
     return count;
@@ -15425,8 +15532,8 @@ static void terrimpi_mask_fill(uint32_t *row, uint32_t x, uint32_t end)
 }
 
 /* The part of a convex polygon [count][2] between two heights, in columns; 0 when there is none. */
-static int terrimpi_polygon_row(const float *uv, uint32_t count, float bottom, float top,
-                                float *left, float *right)
+static int terrimpi_record_polygon_row(const float *uv, uint32_t count, float bottom, float top,
+                                       float *left, float *right)
 {
     uint32_t a, k;
     *left = TERRIMPI_FLOAT_MAX;
@@ -15455,7 +15562,7 @@ static int terrimpi_polygon_row(const float *uv, uint32_t count, float bottom, f
 }
 
 /* The least column or row from which texels count, for a coordinate; within 0..size. */
-static uint32_t terrimpi_texel(float at, uint32_t size)
+static uint32_t terrimpi_record_texel(float at, uint32_t size)
 {
     return !(at > 0.0f) ? 0u : at >= (float)size ? size : (uint32_t)at;
 }
@@ -15472,20 +15579,20 @@ static void terrimpi_record_polygon(const terrimp_layer_record *r, uint32_t laye
     }
     if (!count || high < 0.0f)
         return;
-    end = terrimpi_min_u32(terrimpi_texel(high, r->height) + 1u, r->height);
-    for (y = terrimpi_texel(low, r->height); y < end; y++) {
+    end = terrimpi_min_u32(terrimpi_record_texel(high, r->height) + 1u, r->height);
+    for (y = terrimpi_record_texel(low, r->height); y < end; y++) {
         float bottom = (float)y + (r->no_outline ? 0.5f : 0.0f);
         float top = (float)y + (r->no_outline ? 0.5f : 1.0f);
-        if (!terrimpi_polygon_row(uv, count, bottom, top, &left, &right) || right < 0.0f)
+        if (!terrimpi_record_polygon_row(uv, count, bottom, top, &left, &right) || right < 0.0f)
             continue;
         if (r->no_outline)
             terrimpi_mask_fill(terrimpi_record_row(r, layer, y),
-                               terrimpi_texel(left + 0.5f, r->width),
-                               terrimpi_texel(right + 0.5f, r->width));
+                               terrimpi_record_texel(left + 0.5f, r->width),
+                               terrimpi_record_texel(right + 0.5f, r->width));
         else
             terrimpi_mask_fill(
-                terrimpi_record_row(r, layer, y), terrimpi_texel(left, r->width),
-                terrimpi_min_u32(terrimpi_texel(right, r->width) + 1u, r->width));
+                terrimpi_record_row(r, layer, y), terrimpi_record_texel(left, r->width),
+                terrimpi_min_u32(terrimpi_record_texel(right, r->width) + 1u, r->width));
     }
 }
 
@@ -16411,7 +16518,7 @@ static void terrimpi_depth_write_sheets(terrimpi_depth *d, terrimp_depth_mesh *m
     for (i = 0; i < d->cell_count; i++) {
         terrimp_rect *r = &m->sheets[d->cells[i].sheet].texels;
         terrimp_rect cell = terrimpi_rect(d->cells[i].x, d->cells[i].y, 1, 1);
-        *r = r->width ? terrimpi_rect_union(r, &cell) : cell;
+        *r = r->width ? terrimpi_cover_union(r, &cell) : cell;
     }
     for (sheet = 0; sheet < d->sheet_count; sheet++) {
         m->sheets[sheet].first_texel = m->texel_count;
@@ -16573,7 +16680,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
 enum { TERRIMPI_PLACE_NEVER = 1, TERRIMPI_PLACE_FIRST }; /* is chosen; 0: by its score */
 #define TERRIMPI_PLACE_WORK 3000000u /* numbers that attempts may go over, some 10 ns each */
 
-typedef struct terrimpi_placing {
+typedef struct terrimpi_place_work {
     const terrimp_place_desc *desc;
     float *costs;       /* [view_count] as they are now */
     uint8_t *shown;     /* [gain_count] */
@@ -16590,9 +16697,9 @@ typedef struct terrimpi_placing {
     uint32_t *another;  /* [gain_count] */
     uint32_t *log;      /* [3 * gain_count] gains that were shown or hidden, to be undone */
     uint32_t log_count;
-} terrimpi_placing;
+} terrimpi_place_work;
 
-static size_t terrimpi_place_layout(const terrimp_place_desc *d, void *base, terrimpi_placing *p)
+static size_t terrimpi_place_layout(const terrimp_place_desc *d, void *base, terrimpi_place_work *p)
 {
     terrimpi_arena arena = terrimpi_arena_at(base);
     p->desc = d;
@@ -16612,12 +16719,12 @@ static size_t terrimpi_place_layout(const terrimp_place_desc *d, void *base, ter
 
 TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc)
 {
-    terrimpi_placing p;
+    terrimpi_place_work p;
     return desc ? terrimpi_place_layout(desc, NULL, &p) : 0;
 }
 
 /* Whether a cluster is another one or lies within it: parents have greater numbers. */
-static int terrimpi_place_within(const terrimpi_placing *p, uint32_t cluster, uint32_t other)
+static int terrimpi_place_within(const terrimpi_place_work *p, uint32_t cluster, uint32_t other)
 {
     while (cluster < other && p->desc->parents[cluster] != cluster)
         cluster = p->desc->parents[cluster];
@@ -16626,7 +16733,7 @@ static int terrimpi_place_within(const terrimpi_placing *p, uint32_t cluster, ui
 
 /* What a picture would take off a view's cost: less what pictures of its parts have, whose place
    it takes; nothing when one already shows all of it. */
-static float terrimpi_place_net(const terrimpi_placing *p, uint32_t gain)
+static float terrimpi_place_net(const terrimpi_place_work *p, uint32_t gain)
 {
     const terrimp_place_gain *g = &p->desc->gains[gain];
     uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i;
@@ -16642,13 +16749,13 @@ static float terrimpi_place_net(const terrimpi_placing *p, uint32_t gain)
 }
 
 /* But for rounding: costs are added to and taken from many times. */
-static int terrimpi_place_solved(const terrimpi_placing *p, float cost)
+static int terrimpi_place_solved(const terrimpi_place_work *p, float cost)
 {
     return cost <= p->desc->budget + 1e-5f * terrimpi_abs(p->desc->budget);
 }
 
 /* What of that counts: nothing below the budget does (his equation 5.4). */
-static float terrimpi_place_useful(const terrimpi_placing *p, uint32_t gain)
+static float terrimpi_place_useful(const terrimpi_place_work *p, uint32_t gain)
 {
     float cost = p->costs[p->desc->gains[gain].view], over = cost - p->desc->budget;
     return !terrimpi_place_solved(p, cost) && p->desc->gains[gain].saved > 0.0f
@@ -16656,7 +16763,7 @@ static float terrimpi_place_useful(const terrimpi_placing *p, uint32_t gain)
                : 0.0f;
 }
 
-static float terrimpi_place_score(const terrimpi_placing *p, uint32_t candidate)
+static float terrimpi_place_score(const terrimpi_place_work *p, uint32_t candidate)
 {
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
     float sum = 0.0f;
@@ -16666,12 +16773,12 @@ static float terrimpi_place_score(const terrimpi_placing *p, uint32_t candidate)
     return sum / c->memory;
 }
 
-static int terrimpi_place_better(const terrimpi_placing *p, uint32_t a, uint32_t b)
+static int terrimpi_place_better(const terrimpi_place_work *p, uint32_t a, uint32_t b)
 {
     return p->scores[a] > p->scores[b] || (!(p->scores[a] < p->scores[b]) && a < b);
 }
 
-static void terrimpi_place_sink(terrimpi_placing *p, uint32_t at)
+static void terrimpi_place_sink(terrimpi_place_work *p, uint32_t at)
 {
     uint32_t item = p->heap[at];
     for (;;) {
@@ -16688,7 +16795,7 @@ static void terrimpi_place_sink(terrimpi_placing *p, uint32_t at)
 }
 
 /* Shows a gain in its view that was not shown, or the reverse. */
-static void terrimpi_place_toggle(terrimpi_placing *p, uint32_t gain)
+static void terrimpi_place_toggle(terrimpi_place_work *p, uint32_t gain)
 {
     const terrimp_place_gain *g = &p->desc->gains[gain];
     uint32_t *at = &p->first[g->view];
@@ -16707,7 +16814,7 @@ static void terrimpi_place_toggle(terrimpi_placing *p, uint32_t gain)
 }
 
 /* Shows a picture in a view, in place of the pictures of its parts. */
-static void terrimpi_place_show(terrimpi_placing *p, uint32_t gain)
+static void terrimpi_place_show(terrimpi_place_work *p, uint32_t gain)
 {
     uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i, after;
     for (i = p->first[p->desc->gains[gain].view]; i != TERRIMPI_PLACE_NONE; i = after) {
@@ -16719,7 +16826,7 @@ static void terrimpi_place_show(terrimpi_placing *p, uint32_t gain)
 }
 
 /* Shows a candidate wherever it is of use. */
-static void terrimpi_place_choose(terrimpi_placing *p, uint32_t candidate)
+static void terrimpi_place_choose(terrimpi_place_work *p, uint32_t candidate)
 {
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
     uint32_t i;
@@ -16729,7 +16836,7 @@ static void terrimpi_place_choose(terrimpi_placing *p, uint32_t candidate)
             terrimpi_place_show(p, i);
 }
 
-static void terrimpi_place_greedily(terrimpi_placing *p)
+static void terrimpi_place_greedily(terrimpi_place_work *p)
 {
     uint32_t i;
     for (i = 0; i < p->desc->candidate_count; i++)
@@ -16757,7 +16864,7 @@ static void terrimpi_place_greedily(terrimpi_placing *p)
     }
 }
 
-static int terrimpi_place_is_shown(const terrimpi_placing *p, uint32_t candidate)
+static int terrimpi_place_is_shown(const terrimpi_place_work *p, uint32_t candidate)
 {
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
     uint32_t i;
@@ -16768,7 +16875,7 @@ static int terrimpi_place_is_shown(const terrimpi_placing *p, uint32_t candidate
 }
 
 /* Brings a view back to a cost, with pictures that are paid for; returns whether that worked. */
-static int terrimpi_place_stand_in(terrimpi_placing *p, uint32_t view, float cost)
+static int terrimpi_place_stand_in(terrimpi_place_work *p, uint32_t view, float cost)
 {
     while (!terrimpi_place_solved(p, p->costs[view]) && p->costs[view] > cost) {
         uint32_t i, best = TERRIMPI_PLACE_NONE;
@@ -16788,7 +16895,7 @@ static int terrimpi_place_stand_in(terrimpi_placing *p, uint32_t view, float cos
 }
 
 /* Does without a candidate, if no view comes to cost more than the budget by that. */
-static void terrimpi_place_drop(terrimpi_placing *p, uint32_t candidate)
+static void terrimpi_place_drop(terrimpi_place_work *p, uint32_t candidate)
 {
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
     uint32_t i;
@@ -16812,7 +16919,7 @@ static void terrimpi_place_drop(terrimpi_placing *p, uint32_t candidate)
 }
 
 /* Lists, view by view, what pictures that are paid for could do. */
-static void terrimpi_place_spares(terrimpi_placing *p)
+static void terrimpi_place_spares(terrimpi_place_work *p)
 {
     uint32_t i;
     for (i = 0; i < p->desc->candidate_count; i++)
@@ -16829,7 +16936,7 @@ static void terrimpi_place_spares(terrimpi_placing *p)
 }
 
 /* Gives back what others can stand in for, the largest first. */
-static void terrimpi_place_give_back(terrimpi_placing *p)
+static void terrimpi_place_give_back(terrimpi_place_work *p)
 {
     uint32_t i;
     terrimpi_place_spares(p);
@@ -16873,7 +16980,7 @@ static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
     return TERRIMP_OK;
 }
 
-static void terrimpi_place_sum(const terrimpi_placing *p, terrimp_placement *out)
+static void terrimpi_place_sum(const terrimpi_place_work *p, terrimp_placement *out)
 {
     uint32_t i;
     memset(out, 0, sizeof *out);
@@ -16889,7 +16996,7 @@ static void terrimpi_place_sum(const terrimpi_placing *p, terrimp_placement *out
 }
 
 /* Places from the beginning, as wished. */
-static void terrimpi_place_attempt(terrimpi_placing *p, terrimp_placement *out)
+static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *out)
 {
     uint32_t i;
     memcpy(p->costs, p->desc->costs, p->desc->view_count * sizeof *p->costs);
@@ -16901,7 +17008,7 @@ static void terrimpi_place_attempt(terrimpi_placing *p, terrimp_placement *out)
     terrimpi_place_sum(p, out);
 }
 
-static int terrimpi_place_uses(const terrimpi_placing *p, uint32_t candidate)
+static int terrimpi_place_uses(const terrimpi_place_work *p, uint32_t candidate)
 {
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
     return c->gain_count && memchr(p->best + c->first_gain, 1, c->gain_count) != NULL;
@@ -16909,7 +17016,7 @@ static int terrimpi_place_uses(const terrimpi_placing *p, uint32_t candidate)
 
 /* Attempts to do without each chosen candidate, and to begin with each other one, as long as that
    pays and work is left to spend. */
-static void terrimpi_place_improve(terrimpi_placing *p, terrimp_placement *best)
+static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *best)
 {
     uint32_t n = p->desc->candidate_count, i = 0, since = 0;
     uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
@@ -16935,7 +17042,7 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
                                          size_t bytes, uint8_t *shown, float *costs,
                                          terrimp_placement *placement)
 {
-    terrimpi_placing p;
+    terrimpi_place_work p;
     uint32_t i, k;
     TERRIMPI_REFUSE(!desc || !scratch || !shown || !costs || !placement, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!desc->candidates || !desc->gains || !desc->parents || !desc->costs,
@@ -16980,7 +17087,7 @@ typedef struct terrimpi_prepare {
                            TERRIMPI_PLACE_NONE: it cannot be prepared */
 } terrimpi_prepare;
 
-static float terrimpi_boxes_distance(const terrimp_box *a, const terrimp_box *b)
+static float terrimpi_prepare_distance(const terrimp_box *a, const terrimp_box *b)
 {
     float gap[3];
     int k;
@@ -17012,7 +17119,7 @@ static uint32_t terrimpi_prepare_first(const terrimpi_prepare *p, uint32_t level
     return first;
 }
 
-static float terrimpi_half_diagonal(const terrimp_box *box)
+static float terrimpi_prepare_half_diagonal(const terrimp_box *box)
 {
     float size[3];
     terrimpi_sub(box->max, box->min, size);
@@ -17029,12 +17136,12 @@ static int terrimpi_prepare_picture(const terrimpi_prepare *p, const terrimp_box
     terrimp_mesh_info mesh;
     terrimp_capture capture;
     uint32_t size[2];
-    float r = terrimpi_half_diagonal(square), d, closer, scale;
+    float r = terrimpi_prepare_half_diagonal(square), d, closer, scale;
     int k;
     if (terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
         terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
         return 0;
-    d = terrimpi_boxes_distance(square, &box);
+    d = terrimpi_prepare_distance(square, &box);
     for (k = 0; k < 3; k++)
         out->eye[k] = 0.5f * (square->min[k] + square->max[k]);
     if (!(r <= p->desc.max_angle_rad * d) ||
@@ -17062,7 +17169,7 @@ static void terrimpi_prepare_ground(const terrimpi_prepare *p, const terrimp_box
         terrimpi_mip_error_box(tree, &n, &box);
         p->whole[i] = n.level == 0 ||
                       tree->nodes[i].error * p->desc.pixel_factor <=
-                          p->desc.tolerance_px * terrimpi_boxes_distance(cell, &box);
+                          p->desc.tolerance_px * terrimpi_prepare_distance(cell, &box);
         p->below[i] = 0;
         if (i + 1u == p->nodes)
             continue;
@@ -17080,10 +17187,11 @@ static int terrimpi_prepare_sees(const terrimpi_prepare *p, const terrimp_box *c
     float middle = circle * ((float)k + 0.5f) / (float)p->desc.directions;
     float x = 0.5f * (box->min[0] + box->max[0] - cell->min[0] - cell->max[0]);
     float z = 0.5f * (box->min[2] + box->max[2] - cell->min[2] - cell->max[2]);
-    float far_off = terrimpi_hypot(x, z), angle, spread;
-    float round = 0.5f * (terrimpi_hypot(box->max[0] - box->min[0], box->max[2] - box->min[2]) +
-                          terrimpi_hypot(cell->max[0] - cell->min[0],
-                                         cell->max[2] - cell->min[2]));
+    float far_off = terrimpi_layers_hypot(x, z), angle, spread;
+    float round = 0.5f * (terrimpi_layers_hypot(box->max[0] - box->min[0],
+                                                box->max[2] - box->min[2]) +
+                          terrimpi_layers_hypot(cell->max[0] - cell->min[0],
+                                                cell->max[2] - cell->min[2]));
     if (!(far_off > round))
         return 1;
     spread = 0.5f * (p->desc.fov_rad + circle / (float)p->desc.directions) +

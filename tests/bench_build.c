@@ -16,7 +16,7 @@
 /* The part of a node's samples that stand out of its mesh. */
 static double standing_out(const terrimp_terrain *t, uint32_t node, float slack)
 {
-    terrimpi_patch p = terrimpi_patch_of(t, node);
+    terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     terrimpi_build build;
     terrimp_mesh mesh;
     uint32_t i, x, z, count = 0;
@@ -29,16 +29,16 @@ static double standing_out(const terrimp_terrain *t, uint32_t node, float slack)
     mesh.border_vertex_count = terrimpi_mesh_border(&t->meshes[node]);
     mesh.surface_index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
     for (i = 0; i < terrimpi_mesh_vertices(&t->meshes[node]); i++) {
-        terrimpi_point point = terrimpi_mesh_point(t, &p, node, i);
+        terrimpi_mesh_point_steps point = terrimpi_mesh_point(t, &p, node, i);
         build.vertices[i].x = (uint16_t)point.x;
         build.vertices[i].z = (uint16_t)point.z;
         build.vertices[i].height = point.height;
     }
     for (i = 0; i < mesh.surface_index_count; i++)
         build.indices[i] = (uint16_t)terrimpi_mesh_corner(t, node, i);
-    terrimpi_make_facets(&p, &mesh, build.facets);
+    terrimpi_build_setup_triangles(&p, &mesh, build.facets);
     for (z = 0; z <= p.span_z; z++) {
-        terrimpi_survey_row(t, &p, &mesh, &build, z);
+        terrimpi_build_residual_of_row(t, &p, &mesh, &build, z);
         for (x = 0; x <= p.span_x; x++)
             count += build.row[x] > slack;
     }

@@ -246,8 +246,9 @@ static void hess_draw_block(const hess *h, uint32_t chunk, const terrimp_callbac
     memset(&ground, 0, sizeof ground);
     for (cell = 0; cell < 9; cell++) {
         uint32_t nx = x + cell % 3 - 1, nz = z + cell / 3 - 1; /* below 0 it wraps: too large */
-        uint32_t which = cell == 4 ? 0 : terrimpi_strip_pattern(quads, 0, cell - (cell > 4));
-        terrimpi_pattern p = terrimpi_find_pattern(quads, which);
+        uint32_t which = cell == 4 ? 0 : terrimpi_terrain_apron_pattern(quads, 0,
+                                                                        cell - (cell > 4));
+        terrimpi_terrain_pattern p = terrimpi_terrain_pattern_of(quads, which);
         if (nx >= wide || nz >= h->info.chunks_z)
             continue;
         ground.node = nz * wide + nx;
@@ -266,7 +267,7 @@ static void hess_capture(hess *h, uint32_t chunk, const terrimp_callbacks *callb
     terrimp_capture_command command;
     uint32_t quads = h->info.chunk_quads, size[2], i;
     float border = (c->box.max[0] - c->box.min[0]) / (float)quads
-                   * (float)terrimpi_strip_quads(quads, 0);
+                   * (float)terrimpi_terrain_apron_quads(quads, 0);
     memset(&command, 0, sizeof command);
     command.node = chunk;
     command.atlas = h->pair.newest;

@@ -36,7 +36,7 @@ static uint32_t bits_set(const uint32_t *mask, size_t words)
     uint32_t sum = 0;
     size_t i;
     for (i = 0; i < words; i++)
-        sum += terrimpi_bit_count(mask[i]);
+        sum += terrimpi_mask_bit_count(mask[i]);
     return sum;
 }
 

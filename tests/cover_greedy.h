@@ -20,7 +20,7 @@ static uint32_t greedy_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t
     uint32_t y, word, filled = 0;
     for (y = y0; y < y1 && x0 < x1; y++)
         for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
-            filled += terrimpi_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
+            filled += terrimpi_mask_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
     return filled;
 }
 
@@ -89,7 +89,7 @@ static terrimp_cover_desc greedy_grid(const terrimpi_cover *c, uint32_t cell, ui
             uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
             uint32_t *row = cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
             while (bits) {
-                uint32_t x = (word * 32u + terrimpi_next_bit(&bits)) / cell;
+                uint32_t x = (word * 32u + terrimpi_mask_next_bit(&bits)) / cell;
                 row[x / 32u] |= 1u << x % 32u;
             }
         }
@@ -134,7 +134,7 @@ static uint32_t cover_greedily(const terrimp_cover_desc *desc, uint32_t cell, fl
         for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
             uint32_t bits;
             while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
-                uint32_t x = word * 32u + terrimpi_next_bit(&bits);
+                uint32_t x = word * 32u + terrimpi_mask_next_bit(&bits);
                 terrimp_rect r = greedy_take(&c, &g, cells, x, y, cell, min_fill);
                 terrimpi_cover_tighten(&c, &r);
                 if (made++ < capacity)

@@ -619,17 +619,17 @@ static void hf_a_position_lies_between_the_lines_of_its_quad(void)
         uint32_t count = random_range(2, 5000), quad = 0, at = random_range(0, count - 2);
         float spacing = random_float(0.5f, 3.0f);
         float origin = -spacing * (float)at + random_float(-1.0f, 1.0f);
-        float x = random_float(terrimpi_line(origin, spacing, at),
-                               terrimpi_line(origin, spacing, at + 1u));
+        float x = random_float(terrimpi_field_line(origin, spacing, at),
+                               terrimpi_field_line(origin, spacing, at + 1u));
         if (round & 1)
-            x = terrimpi_line(origin, spacing, at);
-        if (!terrimpi_locate_along(origin, spacing, count, x, &quad)) {
+            x = terrimpi_field_line(origin, spacing, at);
+        if (!terrimpi_field_locate_along(origin, spacing, count, x, &quad)) {
             CHECK(0);
             continue;
         }
-        CHECK(quad <= count - 2 && terrimpi_line(origin, spacing, quad) <= x);
-        CHECK(x < terrimpi_line(origin, spacing, quad + 1u) ||
-              (quad == count - 2 && x == terrimpi_line(origin, spacing, count - 1u)));
+        CHECK(quad <= count - 2 && terrimpi_field_line(origin, spacing, quad) <= x);
+        CHECK(x < terrimpi_field_line(origin, spacing, quad + 1u) ||
+              (quad == count - 2 && x == terrimpi_field_line(origin, spacing, count - 1u)));
     }
 }
 

@@ -785,7 +785,7 @@ static void layers_of_pictures_with_depth_show_no_gap(void)
     CHECK(terrimp_layer_depths(&scene.record, scene.depths) == TERRIMP_OK);
     for (turn = 0, y = 0; turn < SCENE_LAYERS; turn++)
         for (x = 0; x < SCENE_SIDE * SCENE_WORDS; x++)
-            y += (int)terrimpi_bit_count(scene.masks[turn][x]);
+            y += (int)terrimpi_mask_bit_count(scene.masks[turn][x]);
     CHECK(y == 4); /* the texels round that corner */
 }
 

@@ -958,7 +958,7 @@ static void patterns_are_those_of_the_geomipmap(void)
         land l;
         uint32_t count = terrimp_pattern_index_count(quads[i], TERRIMP_FORM_LIST);
         uint16_t *wanted = (uint16_t *)malloc(count * sizeof *wanted);
-        terrimpi_pattern whole = terrimpi_find_pattern(quads[i], 0);
+        terrimpi_terrain_pattern whole = terrimpi_terrain_pattern_of(quads[i], 0);
         terrimp_pattern first = {0, 0, 0};
         land_prepare(&l, 3, 3, TERRIMP_FORMAT_U8, LAND_FLAT);
         l.desc.chunk_quads = quads[i];
@@ -1001,8 +1001,8 @@ static void strips_cover_exactly_their_quads(void)
                     to[k] = way[d][k] > 0 ? strip : n;
                 }
                 count = (to[0] - from[0]) * (to[1] - from[1]) * 6u;
-                CHECK(terrimpi_find_pattern(n, pattern).first_index == first);
-                CHECK(terrimpi_find_pattern(n, pattern++).index_count == count);
+                CHECK(terrimpi_terrain_pattern_of(n, pattern).first_index == first);
+                CHECK(terrimpi_terrain_pattern_of(n, pattern++).index_count == count);
                 count_quads(&l, first, count, covered);
                 for (z = 0; z < n; z++)
                     for (x = 0; x < n; x++)

@@ -84,8 +84,8 @@ static terrimp_camera visible_camera(const visible_scene *s)
     c.eye[0] += f->origin_x;
     c.eye[2] += f->origin_z;
     if (random_range(0, 3) == 0) { /* just over a sample, where rounding bites */
-        c.eye[0] = terrimpi_line(f->origin_x, f->spacing_x, random_range(0, f->width - 1u));
-        c.eye[2] = terrimpi_line(f->origin_z, f->spacing_z, random_range(0, f->depth - 1u));
+        c.eye[0] = terrimpi_field_line(f->origin_x, f->spacing_x, random_range(0, f->width - 1u));
+        c.eye[2] = terrimpi_field_line(f->origin_z, f->spacing_z, random_range(0, f->depth - 1u));
     }
     (void)terrimp_heightfield_height(f, c.eye[0], c.eye[2], &height);
     c.eye[1] = height + random_magnitude(0.05f, 30.0f) - (random_range(0, 15) == 0 ? 6.0f : 0.0f);
@@ -130,15 +130,17 @@ static double visible_over(const terrimp_heightfield *f, uint32_t along, uint32_
     uint32_t last = (along == 0 ? f->depth : f->width) - 2u, k;
     double quad = (at - (double)origin) / (double)spacing, a, b, t;
     k = quad <= 0.0 ? 0 : quad >= (double)last ? last : (uint32_t)quad;
-    while (k > 0 && at < (double)terrimpi_line(origin, spacing, k))
+    while (k > 0 && at < (double)terrimpi_field_line(origin, spacing, k))
         k--;
-    while (k < last && at > (double)terrimpi_line(origin, spacing, k + 1u))
+    while (k < last && at > (double)terrimpi_field_line(origin, spacing, k + 1u))
         k++;
-    a = (double)terrimpi_line(origin, spacing, k);
-    b = (double)terrimpi_line(origin, spacing, k + 1u);
+    a = (double)terrimpi_field_line(origin, spacing, k);
+    b = (double)terrimpi_field_line(origin, spacing, k + 1u);
     t = (at - a) / (b - a);
-    a = (double)(along == 0 ? terrimpi_sample(f, line, k) : terrimpi_sample(f, k, line));
-    b = (double)(along == 0 ? terrimpi_sample(f, line, k + 1u) : terrimpi_sample(f, k + 1u, line));
+    a = (double)(along == 0 ? terrimpi_field_sample(f, line, k) :
+                 terrimpi_field_sample(f, k, line));
+    b = (double)(along == 0 ? terrimpi_field_sample(f, line, k + 1u) :
+                 terrimpi_field_sample(f, k + 1u, line));
     return y - (a + (b - a) * t);
 }
 
@@ -157,8 +159,8 @@ static int visible_blocked(const terrimp_heightfield *f, const float eye[3], con
     for (along = 0; along < 2u; along++) {
         uint32_t k = along == 0 ? 0u : 2u, count = along == 0 ? f->width : f->depth;
         for (line = 0; line < count; line++) {
-            double at = (double)(along == 0 ? terrimpi_line(f->origin_x, f->spacing_x, line)
-                                            : terrimpi_line(f->origin_z, f->spacing_z, line));
+            double at = (double)(along == 0 ? terrimpi_field_line(f->origin_x, f->spacing_x, line)
+                                            : terrimpi_field_line(f->origin_z, f->spacing_z, line));
             double t = (at - (double)eye[k]) / (point[k] - (double)eye[k]), over;
             if (!(t > start && t < 1.0 - 1e-9))
                 continue;
@@ -182,13 +184,13 @@ static void visible_point(const visible_scene *s, const terrimp_node *n, double 
     float v = random_range(0, 1) ? random_float(0.0f, 1.0f) : 0.0f;
     x = x > f->width - 1u ? f->width - 1u : x;
     z = z > f->depth - 1u ? f->depth - 1u : z;
-    px = terrimpi_line(f->origin_x, f->spacing_x, x);
-    pz = terrimpi_line(f->origin_z, f->spacing_z, z);
+    px = terrimpi_field_line(f->origin_x, f->spacing_x, x);
+    pz = terrimpi_field_line(f->origin_z, f->spacing_z, z);
     if (x + 1u < f->width && x + 1u <= (n->x + 1u) * quads)
-        px += u * (terrimpi_line(f->origin_x, f->spacing_x, x + 1u) - px);
+        px += u * (terrimpi_field_line(f->origin_x, f->spacing_x, x + 1u) - px);
     if (z + 1u < f->depth && z + 1u <= (n->z + 1u) * quads)
-        pz += v * (terrimpi_line(f->origin_z, f->spacing_z, z + 1u) - pz);
-    y = terrimpi_sample(f, x, z);
+        pz += v * (terrimpi_field_line(f->origin_z, f->spacing_z, z + 1u) - pz);
+    y = terrimpi_field_sample(f, x, z);
     CHECK(terrimp_heightfield_height(f, px, pz, &y) == TERRIMP_OK);
     point[0] = (double)px;
     point[1] = (double)y;
