@@ -1183,7 +1183,7 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 /* Draw a ground node. */
 typedef struct terrimp_ground_command {
     uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
-    uint32_t level;
+    uint32_t level, x, z; /* its column and row on its level */
     uint32_t first_index; /* pattern: a range of the shared index buffer */
     uint32_t index_count;
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
@@ -1198,8 +1198,7 @@ typedef struct terrimp_ground_command {
    when `clear` is set, to transparent black. The ground commands up
    to end_capture are drawn with these matrices. */
 typedef struct terrimp_capture_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part;                  /* 0; or 1, for the back part of a picture in two parts: the
                                        matrices clip what lies before it */
     uint32_t atlas;                 /* < atlas_count */
@@ -1307,8 +1306,7 @@ typedef struct terrimp_view_desc {
    picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
    the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
 typedef struct terrimp_impostor_command {
-    uint32_t node;
-    uint32_t level;
+    uint32_t node, level, x, z;
     uint32_t part, part_count;
     uint32_t atlas;
     uint32_t base_vertex; /* of the buffers of terrimp_terrain_fill_meshes */
@@ -2445,6 +2443,10 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 /* ==== stop here if you only want the API ================================= */
 
+/* Private names are terrimpi_ROOM_...: field, camera, tree, mip, impostor and split, atlas and
+   pack, terrain with mesh and floor, bake, horizon and walls, capture, view with cull, candidate,
+   region, cache and job, sorted, layer; simp and raise, build and fill, layers with mask, cover,
+   record and depth, place and prepare. Those without a room are of Basics. */
 #ifdef TERRIMP_IMPLEMENTATION
 #ifndef TERRIMP_IMPLEMENTATION_ONCE
 #define TERRIMP_IMPLEMENTATION_ONCE
@@ -4760,7 +4762,7 @@ TERRIMP_API terrimp_result terrimp_geomip_morph(uint32_t chunk_quads,
 
 #define TERRIMPI_SPLIT_COUNT 24u /* places of a split that are tried */
 #define TERRIMPI_SPLIT_CELLS 16 /* along a side, of the map in which hidden triangles are found */
-#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: what hides it there is its neighbour */
+#define TERRIMPI_IMPOSTOR_IN_SIGHT 0.98f /* of the way to a point: beyond, its neighbour hides it */
 
 /* The size of a picture of width x height texels within limits; returns the scale. */
 static float terrimpi_picture_size(float width, float height, uint32_t smallest, uint32_t largest,
@@ -5942,6 +5944,17 @@ static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
     return t->real ? t->real[node] : node;
 }
 
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+{
+    terrimp_node n = *node;
+    n.number = terrimpi_real_node(t, n.number);
+    if (t->real) {
+        n.x %= t->tree.level_x[n.level] / t->tiles;
+        n.z %= t->tree.level_z[n.level] / t->tiles;
+    }
+    return n;
+}
+
 /* Vertex i of a node's mesh. */
 static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
                                                      const terrimpi_terrain_tile *p,
@@ -6361,9 +6374,9 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
    it, D, or D = 2 e with the mesh's error e; at the node's lowest sample L when it or a vertex
    beside it would end below that. So the line of feet is below every sample, and no neighbour
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
-   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most s + e
-   there. When one of them is within D of L, both end at L <= s; else each hangs by D or, since then
-   L is deeper, by more, and the line is <= s + e - D <= s - e.
+   (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most
+   s + e there. When one of them is within D of L, both end at L <= s; else each hangs by D or,
+   since then L is deeper, by more, and the line is <= s + e - D <= s - e.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
 static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
@@ -7695,12 +7708,14 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
-    terrimp_node place;
+    terrimp_node place = terrimpi_real_place(t, &plan->node);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
-    command->node = terrimpi_real_node(t, plan->node.number);
-    command->level = plan->node.level;
+    command->node = place.number;
+    command->level = place.level;
+    command->x = place.x;
+    command->z = place.z;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
@@ -7712,11 +7727,14 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (; from < to; from++) {
-        if (!terrimpi_capture_in_layer(t, plan, draws[from].node, layer))
+        terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
+        if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        place = terrimpi_tree_node(&t->tree, draws[from].node);
-        terrimpi_tile_offset(t, &place, middle, ground.offset);
-        ground.node = terrimpi_real_node(t, draws[from].node);
+        terrimpi_tile_offset(t, &node, middle, ground.offset);
+        node = terrimpi_real_place(t, &node);
+        ground.node = node.number;
+        ground.x = node.x;
+        ground.z = node.z;
         ground.first_index = draws[from].first_index;
         ground.index_count = draws[from].index_count;
         callbacks->draw_ground(callbacks->user, &ground);
@@ -9203,13 +9221,16 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
+    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
     terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
-    command.node = terrimpi_real_node(v->terrain, ground->node.number);
-    command.level = ground->node.level;
+    command.node = place.number;
+    command.level = place.level;
+    command.x = place.x;
+    command.z = place.z;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -9222,14 +9243,17 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
+    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
     terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
-    command.node = terrimpi_real_node(v->terrain, picture->node.number);
-    command.level = picture->node.level;
+    command.node = place.number;
+    command.level = place.level;
+    command.x = place.x;
+    command.z = place.z;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
@@ -9288,7 +9312,8 @@ typedef struct terrimpi_view_kind {
 } terrimpi_view_kind;
 
 static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = {
-    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list, terrimpi_view_ground_emit},
+    {terrimpi_view_ground_estimate, terrimpi_view_ground_ready, terrimpi_view_ground_list,
+     terrimpi_view_ground_emit},
     {terrimpi_view_impostor_estimate, terrimpi_view_impostor_ready, terrimpi_view_impostor_list,
      terrimpi_view_impostor_emit},
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
@@ -11418,7 +11443,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
    those left of its edges, added and subtracted. An edge costs one step a row, thanks to running
    sums along the rows. All of them are integers, so that subtracting loses nothing. */
 
-/* Heights are worked with in steps, -TERRIMPI_SIMP_STEPS to +TERRIMPI_SIMP_STEPS over the tile's range: few
+/* Heights are worked with in steps, of which a tile's range has twice TERRIMPI_SIMP_STEPS: few
    enough that the sums of a row fit 32 bits, so fine that the rounding is under 0.01 % rms. */
 #define TERRIMPI_SIMP_STEPS 2047
 
@@ -11437,8 +11462,8 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
 #define TERRIMPI_SIMP_GAIN 0.9999f         /* only a gain of more than rounding counts as a gain */
-#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that is moved or removed */
-#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height, which keeps all sums within 64 bits */
+#define TERRIMPI_SIMP_MAX_DEGREE 16        /* most triangles round a vertex that changes */
+#define TERRIMPI_SIMP_MAX_STEPS 1048576.0f /* of a border height: all sums stay within 64 bits */
 
 /* Sums over the samples of a row before this one: of h, h x and h h. */
 typedef struct terrimpi_simp_row_prefix {
@@ -11765,9 +11790,9 @@ static void terrimpi_simp_forget_errors(terrimpi_simplifier *s, const terrimpi_s
 }
 
 /* Squared error round v as a function of its height, and what it is made of, by triangle. */
-static terrimpi_simp_quadric terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v,
-                                                      const terrimpi_simp_ring *ring, int32_t ref,
-                                                      terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
+static terrimpi_simp_quadric
+terrimpi_simp_ring_error(const terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
+                         int32_t ref, terrimpi_simp_local part[TERRIMPI_SIMP_MAX_DEGREE])
 {
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     int32_t i;
@@ -13968,10 +13993,9 @@ static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
         uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        TERRIMPI_TRY(terrimp_border_simplify(line, count,
-                                             terrimpi_terrain_border_points(t->desc.triangle_budget),
-                                             points[side], 16,
-                                             &desc.borders[side].point_count));
+        TERRIMPI_TRY(terrimp_border_simplify(
+            line, count, terrimpi_terrain_border_points(t->desc.triangle_budget), points[side], 16,
+            &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
@@ -14085,10 +14109,10 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a mesh
-   that is coarser than by one level could leave one, of less than its tolerance; to lift borders
-   over all of it would double the errors of meshes where ridges are steep. Neighbours of a level
-   still share what lies between the corners. */
+   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a
+   mesh that is coarser than by one level could leave one, of less than its tolerance; to lift
+   borders over all of it would double the errors of meshes where ridges are steep. Neighbours of a
+   level still share what lies between the corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {

@@ -41,6 +41,12 @@ static flight_place flight_place_of(const land *l, uint32_t node)
     return p;
 }
 
+/* Whether a node lies where a command says. */
+static int flight_place_is(const flight_place *p, uint32_t level, uint32_t x, uint32_t z)
+{
+    return p->level == level && p->chunk[0] == x << level && p->chunk[1] == z << level;
+}
+
 /* Whether b has to be drawn before a in an order from front to back. */
 static int stands_in_front(const terrimp_box *b, const terrimp_box *a, const float eye[3])
 {
@@ -213,7 +219,8 @@ static void flight_begin_capture(void *user, const terrimp_capture_command *comm
     uint32_t i;
     CHECK(!f->in_capture && !f->screen_started);
     CHECK(command->node < f->l->info.node_count && command->atlas < f->desc.atlas_count);
-    CHECK(command->level == f->places[command->node].level && command->part < FLIGHT_PARTS);
+    CHECK(flight_place_is(&f->places[command->node], command->level, command->x, command->z));
+    CHECK(command->part < FLIGHT_PARTS);
     CHECK(command->part == 0 || (!f->desc.no_splits && f->desc.mode == TERRIMP_MODE_AUTO));
     CHECK(rect_within(&command->slot, f->desc.atlas_size, f->desc.atlas_size));
     CHECK(command->slot.width > 0 && command->slot.height > 0);
@@ -425,7 +432,7 @@ static void flight_draw_ground(void *user, const terrimp_ground_command *command
     flight_item *item;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
     CHECK(command->node < f->l->info.node_count);
-    CHECK(command->level == f->places[command->node].level);
+    CHECK(flight_place_is(&f->places[command->node], command->level, command->x, command->z));
     if (f->in_capture) {
         capture_ground(f, f->capturing, command);
         return;
@@ -521,7 +528,7 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     CHECK(!f->in_capture && f->stage <= 1);
     f->stage = 1;
     CHECK(command->node < f->l->info.node_count && command->atlas < f->desc.atlas_count);
-    CHECK(command->level == f->places[command->node].level);
+    CHECK(flight_place_is(&f->places[command->node], command->level, command->x, command->z));
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     CHECK(command->base_vertex == mesh.base_vertex && command->first_index == mesh.first_index);
     CHECK(command->index_count == mesh.index_count);
