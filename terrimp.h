@@ -7757,8 +7757,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          made from ahead, so that this falls before it grows */
 #define TERRIMPI_VIEW_AHEAD_BOX 0.8f  /* ... but not so far that a node is closer than this */
 #define TERRIMPI_VIEW_EARLY 0.8f      /* error over limit from which a picture may be renewed */
-#define TERRIMPI_VIEW_STALE 2.0f      /* ... from which it is not drawn */
-#define TERRIMPI_VIEW_STALE_OTHER 4.0f /* ... in the place of another that does not exist yet */
+#define TERRIMPI_VIEW_STALE 1.3f      /* ... from which it is not drawn: skylines of pictures that
+                                         are older are torn */
 #define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
@@ -9124,7 +9124,7 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 
 /* Lists a node's impostor, once, if it has a picture that is good. One that is drawn for several
    regions does not fade. */
-static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node, float most_urgent)
+static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
     if (!p)
@@ -9134,7 +9134,7 @@ static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node,
         return 1;
     }
     terrimpi_view_judge(&v->frame, p);
-    if (p->layers_now == 0 || p->urgency > most_urgent)
+    if (p->layers_now == 0 || p->urgency > TERRIMPI_VIEW_STALE)
         return 0;
     p->listed = p->seen = v->frame.number;
     p->draw = v->draw_count;
@@ -9156,7 +9156,7 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
             return 0;
     }
     for (i = 0; i < count; i++)
-        if (!terrimpi_view_impostor_add(v, &children[i], TERRIMPI_VIEW_STALE_OTHER))
+        if (!terrimpi_view_impostor_add(v, &children[i]))
             return 0;
     return 1;
 }
@@ -9169,7 +9169,7 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
     const terrimp_quadtree *tree = &v->terrain->tree;
     terrimp_node node = c->node;
     uint32_t up;
-    if (terrimpi_view_impostor_add(v, &node, TERRIMPI_VIEW_STALE))
+    if (terrimpi_view_impostor_add(v, &node))
         return 1;
     v->stats.waiting++;
     if (terrimpi_view_impostors(&v->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
@@ -9181,7 +9181,7 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
         node = terrimpi_tree_parent(tree, &node);
         terrimpi_terrain_node_box(v->terrain, &node, &box);
         if (terrimp_box_distance(&box, v->frame.camera.eye) >= v->desc.fade_start &&
-            terrimpi_view_impostor_add(v, &node, TERRIMPI_VIEW_STALE_OTHER))
+            terrimpi_view_impostor_add(v, &node))
             return 1;
     }
     return 0;

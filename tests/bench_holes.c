@@ -26,23 +26,28 @@ static void look(void *user, const holes_scene *s, const holes_path *p, const ho
     hunt *h = (hunt *)user;
     (void)p;
     holes_add(&h->sums[f->place][f->way], f);
-    if ((f->holes || f->added) && h->told++ < TELL)
-        say("%u.%d.%d %s, %s, %s: %u px of holes, first at %u, %u; %u px added\n",
+    if ((f->holes || f->torn || f->slits) && h->told++ < TELL)
+        say("%u.%d.%d %s, %s, %s: %u px of holes, %u torn, first at %u, %u; %u px of slits; %u "
+            "added\n",
             (unsigned)f->seed, f->path, f->pose, s->name, holes_places[f->place],
-            holes_ways[f->way], (unsigned)f->holes, (unsigned)(f->first % (size_t)f->width),
-            (unsigned)(f->first / (size_t)f->width), (unsigned)f->added);
+            holes_ways[f->way], (unsigned)f->holes, (unsigned)f->torn,
+            (unsigned)(f->first % (size_t)f->width), (unsigned)(f->first / (size_t)f->width),
+            (unsigned)f->slits, (unsigned)f->added);
 }
 
 static void tell_sums(const hunt *h)
 {
     int place, way;
-    say("\n| eye | way | frames | with holes | hole px | with added terrain | added px | dB |\n");
-    say("|-----|-----|--------|------------|---------|--------------------|----------|----|\n");
+    say("\n| eye | way | frames | with holes | px | torn | px | with slits | px | shreds px "
+        "| with added terrain | px | dB |\n");
+    say("|-----|-----|-----|-----|-----|-----|-----|-----|-----|-----|-----|-----|-----|\n");
     for (place = 0; place < HOLES_PLACES; place++)
         for (way = 0; way < HOLES_WAYS; way++) {
             const holes_sum *sum = &h->sums[place][way];
-            say("| %s | %s | %u | %u | %u | %u | %u | %.2f |\n", holes_places[place],
-                holes_ways[way], sum->frames, sum->frames_with_holes, (unsigned)sum->holes,
+            say("| %s | %s | %u | %u | %u | %u | %u | %u | %u | %u | %u | %u | %.2f |\n",
+                holes_places[place], holes_ways[way], sum->frames, sum->frames_with_holes,
+                (unsigned)sum->holes, sum->frames_with_torn, (unsigned)sum->torn,
+                sum->frames_with_slits, (unsigned)sum->slits, (unsigned)sum->shreds,
                 sum->frames_with_added, (unsigned)sum->added,
                 image_psnr(sum->squares / (sum->frames ? sum->frames : 1u)));
         }

@@ -28,10 +28,18 @@ static const char *const holes_places[HOLES_PLACES] = { "over", "low", "high", "
                                                         "under" };
 static const char *const holes_ways[HOLES_WAYS] = { "auto", "auto eager", "impostor", "geomip" };
 
-/* What came of a frame, or of many. */
+/* What came of a frame, or of many. Pixels:
+   holes   true ones, but for those that follow
+   slits   true ones of which each has sky of the full mesh beside it: a skyline within a pixel of
+           its place closes what the full mesh leaves open by less than that
+   shreds  true ones of which each looks under the terrain, where the full mesh shows slopes from
+           behind through slopes, by its sky; or at the picture's edge, whose sky may be outside
+   torn    sky, though the full mesh has none within the tolerance and 2 pixels, with or without a
+           way to the real sky: the skyline is cut off
+   added   terrain, though the full mesh has none as close as that */
 typedef struct holes_sum {
-    unsigned frames, frames_with_holes, frames_with_added;
-    size_t holes, added; /* pixels */
+    unsigned frames, frames_with_holes, frames_with_slits, frames_with_torn, frames_with_added;
+    size_t holes, slits, shreds, torn, added;
     double squares;      /* sum of the frames' mean squares over terrain */
 } holes_sum;
 
@@ -40,7 +48,8 @@ typedef struct holes_frame {
     uint32_t seed;
     int path, pose, way, place;
     int width, height;
-    size_t holes, added, first; /* pixels; first: y * width + x of the first hole */
+    size_t holes, slits, shreds, torn, added;
+    size_t first; /* y * width + x of the first pixel of a hole, else of what is torn */
     double mean_square;
     terrimp_stats stats;
     const uint8_t *rgb, *full;
@@ -491,13 +500,12 @@ static int holes_sky_by(const holes_frame *f, int x, int y, int r)
     return 0;
 }
 
-/* Takes the lost pixels that touch one another, from `pixel` on, and marks them as terrain. Returns
-   how many they are, or 0 when they touch the real sky, or keep to the picture's edge, where the
-   sky may lie just outside, or look under the terrain from a place by the sky. */
-static size_t holes_take(const holes_scene *s, const holes_path *p, const holes_frame *f,
-                         size_t pixel, int reach)
+/* Takes the lost pixels that touch one another, from `pixel` on, marks them as terrain, and counts
+   them as what they are: nothing when they touch the real sky. */
+static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f, size_t pixel,
+                       int reach)
 {
-    int is_hole = 1, inside = 0, over = 0, i, j;
+    int is_hole = 1, over = 0, wide = 0, at_edge = 0, deep = 0, i, j;
     size_t depth = 0, count = 0;
     s->marks[pixel] = HOLES_TERRAIN;
     s->stack[depth++] = (uint32_t)pixel;
@@ -506,7 +514,9 @@ static size_t holes_take(const holes_scene *s, const holes_path *p, const holes_
         int x = (int)(at % (uint32_t)f->width), y = (int)(at / (uint32_t)f->width);
         int edge = holes_smaller(holes_smaller(x, f->width - 1 - x),
                                  holes_smaller(y, f->height - 1 - y));
-        inside |= edge >= HOLES_EDGE;
+        at_edge |= edge == 0;
+        deep |= edge >= HOLES_EDGE;
+        wide |= !holes_sky_by(f, x, y, 1);
         over |= !holes_looks_under(s, p, f, at, reach) || !holes_sky_by(f, x, y, reach);
         count++;
         for (j = y > 0 ? y - 1 : 0; j <= y + 1 && j < f->height; j++)
@@ -520,24 +530,35 @@ static size_t holes_take(const holes_scene *s, const holes_path *p, const holes_
                 s->stack[depth++] = next;
             }
     }
-    return is_hole && inside && over ? count : 0;
+    if (!is_hole)
+        return;
+    if (!over || (at_edge && !deep))
+        f->shreds += count;
+    else if (!wide)
+        f->slits += count;
+    else {
+        f->first = f->holes ? f->first : pixel;
+        f->holes += count;
+    }
 }
 
 static void holes_count(const holes_scene *s, const holes_path *p, holes_frame *f, int reach)
 {
-    size_t i, count = (size_t)f->width * (size_t)f->height, found;
-    f->holes = f->first = 0;
-    for (i = 0; i < count; i++)
+    size_t i, count = (size_t)f->width * (size_t)f->height, torn = 0;
+    f->holes = f->slits = f->shreds = f->torn = 0;
+    for (i = 0; i < count; i++) {
+        int x = (int)(i % (size_t)f->width), y = (int)(i / (size_t)f->width);
         s->marks[i] = !holes_is_sky(f->rgb + i * 3) ? HOLES_TERRAIN
                       : holes_is_sky(f->full + i * 3) ? HOLES_REAL_SKY : HOLES_LOST;
-    for (i = 0; i < count; i++) {
-        if (s->marks[i] != HOLES_LOST)
+        if (s->marks[i] != HOLES_LOST || holes_sky_by(f, x, y, reach) || x < reach || y < reach
+            || x + reach >= f->width || y + reach >= f->height)
             continue;
-        found = holes_take(s, p, f, i, reach);
-        if (found && !f->holes)
-            f->first = i;
-        f->holes += found;
+        torn = f->torn++ ? torn : i;
     }
+    f->first = torn;
+    for (i = 0; i < count; i++)
+        if (s->marks[i] == HOLES_LOST)
+            holes_take(s, p, f, i, reach);
 }
 
 /* Whether the full mesh has terrain within r columns and rows of a pixel, or the edge is there. */
@@ -643,8 +664,13 @@ static void holes_add(holes_sum *sum, const holes_frame *f)
 {
     sum->frames++;
     sum->frames_with_holes += f->holes > 0;
+    sum->frames_with_slits += f->slits > 0;
+    sum->frames_with_torn += f->torn > 0;
     sum->frames_with_added += f->added > 0;
     sum->holes += f->holes;
+    sum->slits += f->slits;
+    sum->shreds += f->shreds;
+    sum->torn += f->torn;
     sum->added += f->added;
     sum->squares += f->mean_square;
 }
