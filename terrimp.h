@@ -1648,7 +1648,8 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
    `sorted`. Nothing but the eye's place within or beside the node counts.
 
    first_index  of its command
-   eye          of the frame; for the ground of a capture, that of the capture's command [wu]
+   eye          of the frame, for the ground of a capture that of the capture's command, less the
+                offset of its command [wu]
    indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
                 pattern's triangles, but none of no area
    count        out. Never more than the command's index_count
