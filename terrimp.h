@@ -395,6 +395,9 @@ typedef struct terrimp_camera {
     float z_far;            /* (required) [wu] clip distance along forward [Limits: > z_near,
                                ..1e18]. What is drawn may need more: see terrimp_stats.z_far */
     int depth_zero_to_one;  /* nonzero: clip depth 0..1 (Direct3D, Vulkan), else -1..1 (OpenGL) */
+    int rows_from_top;      /* nonzero: clip y = +1 is row 0 of a render target (Direct3D, Metal,
+                               WebGPU), else its last row (OpenGL, Vulkan). Matrices are alike; the
+                               texture matrices of pictures look where these were drawn */
 } terrimp_camera;
 
 /* Writes the effective camera: defaults filled in, forward and up orthonormal; out may be
@@ -718,6 +721,7 @@ TERRIMP_API terrimp_result terrimp_capture_pad(terrimp_capture *capture, const u
    the picture lies in the atlas at (s / q, t / q), in 0..1 over the whole atlas; r / q is the depth
    in 0..1. Relative to the eye, so that pictures stay in place however distant the origin is.
 
+   capture         if clip y = +1 is row 0 of the atlas: with tan_up and tan_down exchanged
    slot            the capture's rectangle in the atlas, margins included
    atlas_width     [texels]
    matrix          [16] out, column-major
@@ -729,7 +733,8 @@ TERRIMP_API terrimp_result terrimp_texture_matrix(const terrimp_capture *capture
                                                   uint32_t atlas_height, float matrix[16]);
 
 /* The way back: the matrix that takes (s / q, t / q, r / q, 1), the last of the three the depth of
-   a capture's picture, to the place that is seen there, relative to an eye, times a factor.
+   a capture's picture, to the place that is seen there, relative to an eye, times a factor. capture
+   and slot as for the texture matrix.
 
    eye             [3] [wu] of the frame: results are exact close to it, wherever the origin is
    matrix          [16] out, column-major
@@ -838,8 +843,8 @@ typedef struct terrimp_live_atlas_desc {
 typedef struct terrimp_live_atlas {
     terrimp_live_atlas_desc desc;
     terrimp_rect *slots; /* [max_slots] where each lies; width 0: unused, x is the next unused */
-    terrimp_rect *holes; /* [max_holes] the maximal free rectangles, which overlap each other */
-    uint32_t hole_count, max_holes;
+    terrimp_rect *free_rects; /* [max_free] the maximal ones, which overlap each other */
+    uint32_t free_count, max_free;
     uint32_t unused;     /* the first unused slot, max_slots for none */
     uint32_t slot_end;   /* above every slot that was ever used */
     uint32_t slot_count, texels_used; /* without padding */
@@ -1337,7 +1342,8 @@ typedef struct terrimp_floor_command {
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
-   the thread of terrimp_view_render and may not call functions of the same view. */
+   the thread of terrimp_view_render and may not call functions of the same view, but
+   terrimp_view_drop for captures. */
 typedef struct terrimp_callbacks {
     void *user; /* first argument of each */
     void (*begin_capture)(void *user, const terrimp_capture_command *command);
@@ -1418,7 +1424,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
    of a picture in two parts the back part first.
 
    Errors     E_NULL when a callback that is needed is missing: nothing has been called; E_STATE
-              before the first update, and after invalidate and touch until the next one */
+              before the first update, and after invalidate, touch and drop until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
@@ -1433,8 +1439,30 @@ TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 /* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
-/* Forgets every picture, for instance when the light has changed or textures were lost. */
+/* Forgets every picture, for instance when textures were lost. */
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view);
+
+#define TERRIMP_EVERY_NODE 0xffffffffu
+
+/* Makes the picture of a node due, or that of TERRIMP_EVERY_NODE: it is worn until the schedule has
+   renewed it. For what has changed, but not so that the old pictures would be wrong. */
+TERRIMP_API terrimp_result terrimp_view_expire(terrimp_view *view, uint32_t node);
+
+/* Says where the light comes from, from the next update on. Pictures whose light came from farther
+   round are due, each at a share of the tolerance of its own, 0.7 to 1, so that not all are due at
+   once; and impostors cost what such captures do. Not called, light is no matter.
+
+   direction        [3] towards the light, any length > 0; NULL: no matter any more
+   tolerance_rad    [Limits: 0.001..3.1] [Default 0 -> 0.0157: where it shines on matt ground, 4 of
+                    255 grey levels at most] */
+TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float direction[3],
+                                              float tolerance_rad);
+
+/* Forgets the picture of a node, or that of TERRIMP_EVERY_NODE: the host could not make it, or has
+   lost it. It is the one function of a view that begin_capture, end_capture and what is called
+   between the two may call: what the picture should have shown is then drawn from others or as
+   ground, in this same render. Called from elsewhere, an update has to come first. */
+TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node);
 
 /* Forgets the pictures that show a rectangle of samples, after an edit.
 
@@ -4182,9 +4210,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
     uint32_t i = x >> level, j = z >> level;
     uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
     uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
-    float a = terrimpi_field_sample(&t->field, x0, z0), d =
-        terrimpi_field_sample(&t->field, x1, z1);
-    float b, c, u, v;
+    float a = terrimpi_field_sample(&t->field, x0, z0), b, c, u, v;
+    float d = terrimpi_field_sample(&t->field, x1, z1);
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
     down = z - z0;
@@ -5350,11 +5377,11 @@ TERRIMP_API terrimp_result terrimp_pack_ffdh(uint32_t width, uint32_t height, te
 
 /* ---- the live atlas ----
 
-   The free space is kept as all of its maximal rectangles, here called holes: those that no other
-   free rectangle contains. A rectangle fits somewhere if and only if it fits into one of them, and
-   neighbouring free areas need no merging. One operation makes them all: cutting a rectangle out of
-   a list of holes. An allocation cuts the new slot out of the list. When a slot is freed, the holes
-   that overlap it are the whole atlas with every other slot cut out, as far as they overlap it.
+   The free space is kept as all of its maximal free rectangles: those that no other one contains. A
+   rectangle fits somewhere if and only if it fits into one of them, and neighbouring free areas
+   need no merging. One operation makes them all: cutting a rectangle out of a list of them. An
+   allocation cuts the new slot out of the list. When a slot is freed, those that overlap it are the
+   whole atlas with every other slot cut out, as far as they overlap it.
 
    Padding lies to the right of and above each slot, and may leave the atlas there: slots and atlas
    count as larger by it, so that the rest of the code need not know of it. */
@@ -5397,67 +5424,69 @@ static int terrimpi_atlas_touch(const terrimp_rect *a, const terrimp_rect *b)
            b->y <= a->y + a->height;
 }
 
-/* Moves the holes from `begin` on that touch a rectangle to the end; returns the first of them. */
+/* Moves the free rectangles from `begin` on that touch a rectangle to the end; returns the first
+   of them. */
 static uint32_t terrimpi_atlas_free_part(terrimp_live_atlas *atlas, uint32_t begin,
                                          const terrimp_rect *rect)
 {
     uint32_t i, first = begin;
-    for (i = begin; i < atlas->hole_count; i++)
-        if (!terrimpi_atlas_touch(&atlas->holes[i], rect)) {
-            terrimp_rect swap = atlas->holes[i];
-            atlas->holes[i] = atlas->holes[first];
-            atlas->holes[first++] = swap;
+    for (i = begin; i < atlas->free_count; i++)
+        if (!terrimpi_atlas_touch(&atlas->free_rects[i], rect)) {
+            terrimp_rect swap = atlas->free_rects[i];
+            atlas->free_rects[i] = atlas->free_rects[first];
+            atlas->free_rects[first++] = swap;
         }
     return first;
 }
 
-/* Marks the holes from `first` to `last` that one from `by` on contains: their width becomes 0. */
+/* Marks the free rectangles from `first` to `last` that one from `by` on contains: their width
+   becomes 0. */
 static void terrimpi_atlas_free_mark(terrimp_live_atlas *atlas, uint32_t first, uint32_t last,
                                      uint32_t by)
 {
-    terrimp_rect *holes = atlas->holes;
+    terrimp_rect *rects = atlas->free_rects;
     uint32_t i, k;
     for (i = first; i < last; i++)
-        for (k = by; k < atlas->hole_count; k++)
-            if (k != i && holes[k].width > 0 && terrimpi_atlas_contains(&holes[k], &holes[i])) {
-                holes[i].width = 0;
+        for (k = by; k < atlas->free_count; k++)
+            if (k != i && rects[k].width > 0 && terrimpi_atlas_contains(&rects[k], &rects[i])) {
+                rects[i].width = 0;
                 break;
             }
 }
 
-/* Removes the marked holes from `first` on. */
+/* Removes the marked free rectangles from `first` on. */
 static void terrimpi_atlas_free_compact(terrimp_live_atlas *atlas, uint32_t first)
 {
     uint32_t i, kept = first;
-    for (i = first; i < atlas->hole_count; i++)
-        if (atlas->holes[i].width > 0)
-            atlas->holes[kept++] = atlas->holes[i];
-    atlas->hole_count = kept;
+    for (i = first; i < atlas->free_count; i++)
+        if (atlas->free_rects[i].width > 0)
+            atlas->free_rects[kept++] = atlas->free_rects[i];
+    atlas->free_count = kept;
 }
 
-/* Cuts a rectangle out of the holes from `begin` on. Of the pieces, those that are maximal and
+/* Cuts a rectangle out of the free ones from `begin` on. Of the pieces, those that are maximal and
    overlap `window` are kept; what contains one of them touches the rectangle as they do. A piece
    for which there is no memory is lost until a slot beside it is freed. */
 static void terrimpi_atlas_free_cut(terrimp_live_atlas *atlas, uint32_t begin,
                                     const terrimp_rect *taken, const terrimp_rect *window)
 {
-    terrimp_rect *holes = atlas->holes;
-    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->hole_count;
+    terrimp_rect *rects = atlas->free_rects;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, begin, taken), old = atlas->free_count;
     int side, cut = 0;
     for (i = first; i < old; i++) {
-        if (!terrimpi_atlas_overlap(&holes[i], taken))
+        if (!terrimpi_atlas_overlap(&rects[i], taken))
             continue;
         for (side = 0; side < 4; side++) {
-            terrimp_rect piece = terrimpi_atlas_beside(&holes[i], taken, side);
+            terrimp_rect piece = terrimpi_atlas_beside(&rects[i], taken, side);
             if (piece.width > 0 && piece.height > 0 && terrimpi_atlas_overlap(&piece, window) &&
-                atlas->hole_count < atlas->max_holes)
-                holes[atlas->hole_count++] = piece;
+                atlas->free_count < atlas->max_free)
+                rects[atlas->free_count++] = piece;
         }
-        holes[i].width = 0;
+        rects[i].width = 0;
         cut = 1;
     }
     if (cut) {
-        terrimpi_atlas_free_mark(atlas, old, atlas->hole_count, first);
+        terrimpi_atlas_free_mark(atlas, old, atlas->free_count, first);
         terrimpi_atlas_free_compact(atlas, first);
     }
 }
@@ -5501,8 +5530,8 @@ static void terrimpi_atlas_reset(terrimp_live_atlas *atlas)
     uint32_t i;
     for (i = 0; i < atlas->desc.max_slots; i++)
         atlas->slots[i] = terrimpi_rect(i + 1u, 0, 0, 0);
-    atlas->holes[0] = terrimpi_atlas_whole(atlas);
-    atlas->hole_count = 1;
+    atlas->free_rects[0] = terrimpi_atlas_whole(atlas);
+    atlas->free_count = 1;
     atlas->unused = atlas->slot_end = 0;
     atlas->slot_count = atlas->texels_used = atlas->failures = 0;
 }
@@ -5513,8 +5542,8 @@ static void terrimpi_atlas_init(terrimp_live_atlas *atlas, const terrimp_live_at
 {
     atlas->desc = *desc;
     atlas->slots = (terrimp_rect *)memory;
-    atlas->holes = atlas->slots + desc->max_slots;
-    atlas->max_holes = terrimpi_atlas_free_most(desc);
+    atlas->free_rects = atlas->slots + desc->max_slots;
+    atlas->max_free = terrimpi_atlas_free_most(desc);
 }
 
 TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
@@ -5530,21 +5559,21 @@ TERRIMP_API terrimp_result terrimp_live_atlas_init(terrimp_live_atlas *atlas,
     return TERRIMP_OK;
 }
 
-/* The smallest hole that a size fits into, the first of equals; hole_count for none. */
+/* The smallest free rectangle that a size fits into, the first of equals; free_count for none. */
 static uint32_t terrimpi_atlas_find(const terrimp_live_atlas *atlas, uint32_t width,
                                     uint32_t height)
 {
-    uint32_t i, best = atlas->hole_count, best_area = 0xffffffffu;
+    uint32_t i, best = atlas->free_count, best_area = 0xffffffffu;
     if (width > atlas->desc.width || height > atlas->desc.height)
         return best;
     width += atlas->desc.padding;
     height += atlas->desc.padding;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        if (hole->width >= width && hole->height >= height &&
-            hole->width * hole->height < best_area) {
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        if (spot->width >= width && spot->height >= height &&
+            spot->width * spot->height < best_area) {
             best = i;
-            best_area = hole->width * hole->height;
+            best_area = spot->width * spot->height;
         }
     }
     return best;
@@ -5576,17 +5605,18 @@ static uint32_t terrimpi_atlas_contact(const terrimp_live_atlas *atlas, const te
     return length;
 }
 
-/* The corner of a hole where a padded size touches most: what stays free is in one piece there. */
-static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *hole,
+/* The corner of a free rectangle where a padded size touches most: what stays free is in one piece
+   there. */
+static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const terrimp_rect *spot,
                                           uint32_t width, uint32_t height)
 {
-    terrimp_rect best = terrimpi_rect(hole->x, hole->y, width, height);
+    terrimp_rect best = terrimpi_rect(spot->x, spot->y, width, height);
     uint32_t corner, most = 0;
     for (corner = 0; corner < 4u; corner++) {
-        terrimp_rect place = terrimpi_rect(hole->x, hole->y, width, height);
+        terrimp_rect place = terrimpi_rect(spot->x, spot->y, width, height);
         uint32_t length;
-        place.x += corner & 1u ? hole->width - width : 0u;
-        place.y += corner & 2u ? hole->height - height : 0u;
+        place.x += corner & 1u ? spot->width - width : 0u;
+        place.y += corner & 2u ? spot->height - height : 0u;
         length = terrimpi_atlas_contact(atlas, &place);
         if (length > most) {
             most = length;
@@ -5600,15 +5630,15 @@ static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const
 static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
                                            uint32_t height, uint32_t *slot)
 {
-    uint32_t hole, handle;
+    uint32_t spot, handle;
     terrimp_rect taken, whole;
-    hole = terrimpi_atlas_find(atlas, width, height);
+    spot = terrimpi_atlas_find(atlas, width, height);
     handle = atlas->unused;
-    if (hole == atlas->hole_count || handle == atlas->desc.max_slots) {
+    if (spot == atlas->free_count || handle == atlas->desc.max_slots) {
         atlas->failures++;
         return TERRIMP_E_CAPACITY;
     }
-    taken = terrimpi_atlas_corner(atlas, &atlas->holes[hole], width + atlas->desc.padding,
+    taken = terrimpi_atlas_corner(atlas, &atlas->free_rects[spot], width + atlas->desc.padding,
                                   height + atlas->desc.padding);
     atlas->unused = atlas->slots[handle].x;
     atlas->slots[handle] = terrimpi_rect(taken.x, taken.y, width, height);
@@ -5630,14 +5660,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
     return terrimpi_atlas_alloc(atlas, width, height, slot);
 }
 
-/* Adds the holes that overlap `freed`, which is no slot any more. They replace those that they
-   contain, which touch it. */
+/* Adds the free rectangles that overlap `freed`, which is no slot any more. They replace those
+   that they contain, which touch it. */
 static void terrimpi_atlas_reclaim(terrimp_live_atlas *atlas, const terrimp_rect *freed)
 {
-    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->hole_count;
+    uint32_t i, first = terrimpi_atlas_free_part(atlas, 0, freed), old = atlas->free_count;
     int beside;
     /* There is memory for one more: what was cut last has left its place. */
-    atlas->holes[atlas->hole_count++] = terrimpi_atlas_whole(atlas);
+    atlas->free_rects[atlas->free_count++] = terrimpi_atlas_whole(atlas);
     /* What lies beside, above or below cuts most: with it first, the list stays short. */
     for (beside = 1; beside >= 0; beside--)
         for (i = 0; i < atlas->slot_end; i++) {
@@ -5674,10 +5704,10 @@ static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
                                 uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
-    for (i = 0; i < atlas->hole_count; i++) {
-        const terrimp_rect *hole = &atlas->holes[i];
-        uint32_t x = terrimpi_min_u32(hole->width, atlas->desc.padding + width);
-        uint32_t y = terrimpi_min_u32(hole->height, atlas->desc.padding + height);
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
+        uint32_t y = terrimpi_min_u32(spot->height, atlas->desc.padding + height);
         if (x <= atlas->desc.padding || y <= atlas->desc.padding)
             continue;
         x -= atlas->desc.padding;
@@ -7776,6 +7806,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
+#define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
+#define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
+#define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... the share of it after which the first are due */
 #define TERRIMPI_VIEW_JUMP 0.5f       /* of fade_start: a longer step of the eye is no motion */
 #define TERRIMPI_VIEW_SPLIT_SMEAR 0.5f /* a picture has two layers when its smears over tolerance
                                          exceed this */
@@ -7853,6 +7886,8 @@ typedef struct terrimpi_frame {
     float pixel_factor;
     float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
+    float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
+    float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
 
 #ifndef TERRIMP_NO_HORIZON
@@ -7990,13 +8025,16 @@ typedef struct terrimpi_cache_picture {
     uint32_t draw;            /* ... and its place on the list of that frame */
     uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
-    uint32_t layer_count;     /* 0: not made yet */
-    uint32_t layers_now;      /* when the impostors of the judged frame are drawn */
+    uint8_t layer_count;      /* 0: not made yet */
+    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
+    uint8_t expired;          /* the host wants it renewed, */
+    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture */
     float angle_rad, parallax_px, urgency;
     float sharpness;          /* texels per unit of size at distance 1 */
     float cost;               /* of the capture */
+    float light[3];           /* in which it was made */
     terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
     float texture_matrix[TERRIMPI_CAPTURE_LAYERS][16];
 } terrimpi_cache_picture;
@@ -8410,6 +8448,8 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
     float reach = way * closest * terrimpi_view_sine(f, node, closest);
     float life = reach / terrimpi_max(terrimpi_motion_speed(&f->motion, reach), 1e-20f);
     life = terrimpi_min(life, terrimpi_max(f->motion.since, f->motion.between));
+    if (f->light_speed > 0.0f)
+        life = terrimpi_min(life, f->light_tolerance / f->light_speed);
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
@@ -8485,6 +8525,21 @@ static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_cache_pictu
     return terrimpi_min(urgency, 1e6f);
 }
 
+/* The light's way since a picture was made over what the picture may wait for; from 1 on it is due.
+   The golden ratio spreads what nodes of following numbers wait for. */
+static float terrimpi_view_age(const terrimpi_frame *f, const terrimpi_cache_picture *p)
+{
+    float wait = 0.618034f * (float)(p->node.number & 0xffffu), way[3];
+    if (p->expired || !(f->light_tolerance > 0.0f))
+        return p->expired ? 1.0f : 0.0f;
+    wait -= (float)(uint32_t)wait;
+    terrimpi_sub(f->light, p->light, way);
+    return terrimpi_length(way) / (f->light_tolerance *
+                                   (f->desc->no_spreading
+                                        ? 1.0f
+                                        : 1.0f - (1.0f - TERRIMPI_VIEW_LIGHT_FIRST) * wait));
+}
+
 /* ---- regions, and what shows them ---- */
 
 /* An impostor that would be good to have. */
@@ -8519,8 +8574,8 @@ typedef struct terrimpi_region {
     uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
     uint32_t first_candidate, candidate_count; /* none: ground is all it can be */
     float pixels;                        /* that the candidates cover, about */
-    int fits;                            /* there are some, and a camera fits round each */
-    int kind;                            /* that shows it */
+    uint8_t fits;                        /* there are some, and a camera fits round each */
+    uint8_t kind;                        /* that shows it */
 } terrimpi_region;
 
 /* What a kind would cost a region. */
@@ -8544,7 +8599,8 @@ typedef struct terrimpi_job {
     uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
     int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
     uint32_t triangles, texels;    /* of the whole picture */
-    float sharpness, cost;
+    float sharpness, cost, light[3];
+    uint8_t expired;               /* since its first piece was made */
 } terrimpi_job;
 
 struct terrimp_view {
@@ -8553,7 +8609,7 @@ struct terrimp_view {
     uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
-    unsigned char *kind_of;        /* [node_count] that showed the region */
+    uint8_t *kind_of;              /* [node_count] that showed the region */
     terrimpi_region *regions;      /* [max_ground + 1] front to back */
     terrimpi_candidate *candidates; /* [max_impostors] by region */
     uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
@@ -8563,7 +8619,8 @@ struct terrimp_view {
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
     uint32_t open;                 /* 1 + the job of which pieces are missing */
-    int outdated;                  /* what this frame would draw has been forgotten */
+    uint8_t outdated;              /* what this frame would draw has been forgotten */
+    uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
     float ground_scale;            /* of its tolerance: 1, or more when max_ground or max_cost are
                                       short */
@@ -8682,7 +8739,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->cull.nodes = (terrimpi_cull_node *)terrimpi_take(&l, scratch, 1);
     captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
     terrimpi_view_layout_captures(v, &captures);
-    v->kind_of = (unsigned char *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
+    v->kind_of = (uint8_t *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
     v->regions = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *v->regions);
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
@@ -8887,13 +8944,52 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
     return TERRIMP_OK;
 }
 
+/* Forgets a picture, and what of it has been begun. */
+static void terrimpi_view_forget(terrimp_view *v, terrimpi_cache_picture *p)
+{
+    if (v->open && v->jobs[v->open - 1u].picture == p) {
+        terrimpi_job_cancel(&v->cache, &v->jobs[v->open - 1u]);
+        v->open = 0;
+    }
+    terrimpi_cache_drop(&v->cache, p);
+}
+
+/* The same for all that are lost. */
+static void terrimpi_view_lose(terrimp_view *v)
+{
+    terrimpi_cache_picture *p;
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+        if (p->lost)
+            terrimpi_view_forget(v, p);
+}
+
+/* Marks the picture of a node, or all, as lost, else as expired. Pieces of one that is being made
+   are older than that. */
+static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int lost)
+{
+    terrimpi_cache_picture *p;
+    TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count, TERRIMP_E_RANGE);
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
+        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE &&
+                             terrimpi_real_node(v->terrain, p->node.number) != node))
+            continue;
+        *(lost ? &p->lost : &p->expired) = 1;
+        if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
+            v->jobs[v->open - 1u].expired = 1;
+    }
+    return TERRIMP_OK;
+}
+
 TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, uint32_t z,
                                               uint32_t cols, uint32_t rows)
 {
     const terrimp_quadtree *tree;
     terrimpi_cache_picture *p;
+    uint32_t tiles, k;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     tree = &view->built->tree;
+    tiles = view->terrain->real ? view->desc.wrap_tiles : 1u;
     TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
@@ -8902,21 +8998,58 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     view->outdated = 1;
     if (view->terrain->real)
         terrimpi_tiled_fill(&view->tiled, view->built);
-    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++) {
-        uint32_t tiles = view->terrain->real ? view->desc.wrap_tiles : 1u, k;
+    for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
         for (k = 0; k < tiles * tiles; k++)
             if (terrimpi_cache_shows(p, tree->chunk_quads,
                                      x + k % tiles * (tree->field.width - 1u),
                                      z + k / tiles * (tree->field.depth - 1u), cols, rows))
-                break;
-        if (k == tiles * tiles)
-            continue;
-        if (view->open && view->jobs[0].picture == p) {
-            terrimpi_job_cancel(&view->cache, &view->jobs[0]);
-            view->open = 0;
-        }
-        terrimpi_cache_drop(&view->cache, p);
+                terrimpi_view_forget(view, p);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node)
+{
+    TERRIMPI_TRY(terrimpi_view_mark(view, node, 1));
+    view->lost = view->capturing;
+    if (view->capturing)
+        return TERRIMP_OK;
+    terrimpi_view_cancel(view);
+    view->outdated = 1;
+    terrimpi_view_lose(view);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_view_expire(terrimp_view *view, uint32_t node)
+{
+    return terrimpi_view_mark(view, node, 0);
+}
+
+TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float direction[3],
+                                              float tolerance_rad)
+{
+    float light[3] = {0.0f, 0.0f, 0.0f}, step[3];
+    terrimpi_frame *f;
+    TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
+    f = &view->frame;
+    if (direction) {
+        TERRIMPI_REFUSE(!terrimpi_finite3(direction) || !terrimpi_finite(tolerance_rad),
+                        TERRIMP_E_NOT_FINITE);
+        memcpy(light, direction, sizeof light);
+        if (tolerance_rad == 0.0f)
+            tolerance_rad = TERRIMPI_VIEW_LIGHT;
+        TERRIMPI_REFUSE(!terrimpi_within(tolerance_rad, 0.001f, 3.1f) ||
+                        !terrimpi_normalize(light), TERRIMP_E_RANGE);
     }
+    terrimpi_sub(light, f->light, step);
+    f->light_step = terrimpi_length(step);
+    if (!direction)
+        f->light_speed = f->light_step = 0.0f;
+    else if (f->light_step > tolerance_rad) { /* a jump is no motion */
+        f->light_step = 0.0f;
+        terrimpi_motion_lose(&f->motion);
+    }
+    memcpy(f->light, light, sizeof light);
+    f->light_tolerance = direction ? 2.0f * TERRIMP_SINF(0.5f * tolerance_rad) : 0.0f;
     return TERRIMP_OK;
 }
 
@@ -9032,7 +9165,9 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
     if (c->picture && c->picture->layer_count > 0) {
         c->capture_cost = c->picture->cost;
-        c->urgency = terrimpi_view_urgency(f, c->picture, c->closest);
+        c->urgency = terrimpi_max(terrimpi_view_urgency(f, c->picture, c->closest),
+                                  terrimpi_min(terrimpi_view_age(f, c->picture),
+                                               TERRIMPI_VIEW_AGED * TERRIMPI_VIEW_STALE));
         return 1;
     }
     c->urgency = 1e9f;
@@ -9058,7 +9193,7 @@ static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cach
     region->fits = region->candidate_count > 0;
     region->pixels = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++) {
-        region->fits = terrimpi_candidate_estimate(f, cache, &candidates[i]);
+        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &candidates[i]);
         region->pixels += candidates[i].pixels;
     }
 }
@@ -9342,8 +9477,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
         terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
-    region->kind = best;
-    v->kind_of[region->node] = (unsigned char)best;
+    region->kind = v->kind_of[region->node] = (uint8_t)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
@@ -9451,6 +9585,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
     job->sharpness = terrimpi_view_sharpness(f, distance);
+    memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
     for (i = 0; i < plan->layer_count; i++) {
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &job->slots[i]);
@@ -9518,7 +9653,8 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
                                                    : TERRIMPI_JOB_RANK_EARLY;
             c->weight = c->rank == TERRIMPI_JOB_RANK_MISSING
                             ? weight
-                            : weight * terrimpi_min(c->urgency, 2.0f);
+                            : weight * terrimpi_max(terrimpi_min(c->urgency, 2.0f),
+                                                    terrimpi_view_age(&v->frame, c->picture));
             v->queue[count++] = index;
         }
     terrimpi_view_sort_queue(v->candidates, v->queue, count);
@@ -9574,7 +9710,7 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     if (job->to < job->draw_count)
         return;
     p->judged = f->number;
-    p->layers_now = job->plan.layer_count;
+    p->layers_now = (uint8_t)job->plan.layer_count;
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.camera.eye, &p->angle_rad,
                                      &p->parallax_px);
 }
@@ -9761,6 +9897,8 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
     f.pixel_factor = terrimpi_camera_pixel_factor(camera);
+    f.light_speed += (f.light_step - f.light_speed) / 16.0f;
+    f.light_step = 0.0f;
     if (f.number == 1u) {
         terrimpi_motion_begin(&f.motion);
         return f;
@@ -9835,21 +9973,44 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
         if (memcmp(job->slots, p->slots, sizeof p->slots) != 0)
             terrimpi_cache_free(&v->cache, p->slots, p->layer_count);
     }
-    p->layer_count = job->plan.layer_count;
+    p->layer_count = (uint8_t)job->plan.layer_count;
     memcpy(p->slots, job->slots, sizeof p->slots);
     p->drawn_count = 0;
     p->sharpness = job->sharpness;
     p->cost = job->cost;
+    p->expired = job->expired;
+    memcpy(p->light, job->light, sizeof p->light);
     memcpy(p->eye, job->plan.camera.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
         terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
+        if (v->frame.camera.rows_from_top) {
+            camera.tan_up = job->plan.camera.tan_down;
+            camera.tan_down = job->plan.camera.tan_up;
+        }
         terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                          p->texture_matrix[i]);
         if (v->cache.places)
             terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                            v->cache.places[p - v->cache.pictures].matrix[i]);
     }
+}
+
+/* Lists the frame without the pictures that could not be made. */
+static void terrimpi_view_list_again(terrimp_view *v)
+{
+    terrimp_stats *s = &v->stats;
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+            v->cache.pictures[v->draws[i].index].listed = 0;
+    terrimpi_view_lose(v);
+    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
+    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
+    s->texels_used = 0;
+    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    terrimpi_view_list(v);
+    terrimpi_view_count_frame(v);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -9888,9 +10049,13 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
         (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
+    view->capturing = 1;
     for (i = 0; i < view->job_count; i++)
         terrimpi_view_capture(view, &view->jobs[i], callbacks);
     view->job_count = 0;
+    if (view->lost)
+        terrimpi_view_list_again(view);
+    view->capturing = view->lost = 0;
     for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
         terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
@@ -11444,8 +11609,7 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
      collapses alone, vertices at their samples             max 18.1  rms 3.62  0.31 ms
      + heights fitted by least squares                      max 16.2  rms 3.27  0.46 ms
      + the survivor of a collapse moved to its best place   max 15.4  rms 3.00  0.56 ms
-     + a sixth of the vertices put where the error is worst max 13.7  rms 2.95  0.58 ms
-     + flips and moves at the end                           max 12.7  rms 2.67  0.65 ms
+     + flips and moves at the end, a start at the extremes  max 13.7  rms 2.67  0.62 ms
 
    What makes it quick: collapses, flips and moves visit no single samples. The squared error of a
    plane over a set of samples follows from ten sums over that set, and the sums over a triangle are
@@ -11457,16 +11621,12 @@ TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
 #define TERRIMPI_SIMP_STEPS 2047
 
 /* Tenths of vertices inside the start mesh for each one inside the final mesh. More are better and
-   slower: 20 gives rms 2.83 %, 30 gives 2.70 %, 40 gives 2.64 % in 1.15 times the time. */
-#define TERRIMPI_SIMP_START_TENTHS 35
+   slower: 20 gives rms 2.83 %, 25 gives 2.73 %, 35 gives 2.64 % in 1.14 times the time. */
+#define TERRIMPI_SIMP_START_TENTHS 30
 
 /* Fans that a collapse is priced by, of those that miss the removed vertex least. All of them
    together gain nothing over 3, and 2 lose less than they save. */
 #define TERRIMPI_SIMP_FANS 2
-
-/* One inner vertex in so many is placed by insertion at the worst sample. 4 gives the same max and
-   a worse rms, 8 a worse max. */
-#define TERRIMPI_SIMP_INSERT_SHARE 6
 
 #define TERRIMPI_SIMP_ROUNDS 4             /* of flips and moves on the final mesh */
 #define TERRIMPI_SIMP_MOVE_LIMIT 8.0f      /* a move goes so many samples at most */
@@ -11846,9 +12006,8 @@ static void terrimpi_simp_fit_all(terrimpi_simplifier *s)
 static int terrimpi_simp_try_move(terrimpi_simplifier *s, int32_t v, const terrimpi_simp_ring *ring,
                                   int32_t x, int32_t z, float *error)
 {
-    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]), n =
-        ring->count;
-    int32_t i, j;
+    int32_t old_x = s->x[v], old_z = s->z[v], ref = terrimpi_simp_round(s->height[v]);
+    int32_t n = ring->count, i, j;
     terrimpi_simp_quadric p = {0.0f, 0.0f, 0.0f};
     if (x <= 0 || z <= 0 || x >= s->cols - 1 || z >= s->rows - 1)
         return 0;
@@ -11955,6 +12114,36 @@ static int terrimpi_simp_improve_vertex(terrimpi_simplifier *s, int32_t v)
     return 0;
 }
 
+/* Moves the vertices of the start mesh, each within its cell of samples, to the highest or the
+   lowest one there where that fits better: else a spike between them would be lost, which no later
+   step looks for. */
+static void terrimpi_simp_seek_extremes(terrimpi_simplifier *s)
+{
+    float area = (float)(s->cols * s->rows) / (float)(s->vertex_count - s->border_count);
+    int32_t v, x, z, k, side = (int32_t)terrimpi_ceil_u32(TERRIMP_SQRTF(area));
+    for (v = s->border_count; v < s->vertex_count; v++) {
+        int32_t from_x = s->x[v] - side / 2, from_z = s->z[v] - side / 2, at[2][2], best[2];
+        float error, dx, dz;
+        terrimpi_simp_ring ring;
+        best[0] = best[1] = -2 * TERRIMPI_SIMP_STEPS;
+        for (z = from_z < 1 ? 1 : from_z; z < from_z + side && z < s->rows - 1; z++)
+            for (x = from_x < 1 ? 1 : from_x; x < from_x + side && x < s->cols - 1; x++) {
+                const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols + x;
+                int32_t h = row[1].h - row[0].h;
+                for (k = 0; k < 2; k++, h = -h)
+                    if (h > best[k]) {
+                        best[k] = h;
+                        at[k][0] = x;
+                        at[k][1] = z;
+                    }
+            }
+        terrimpi_simp_find_ring(s, v, &ring);
+        error = TERRIMPI_SIMP_GAIN * terrimpi_simp_newton_step(s, v, &ring, &dx, &dz);
+        for (k = 0; k < 2 && error > 0.0f; k++)
+            terrimpi_simp_try_move(s, v, &ring, at[k][0], at[k][1], &error);
+    }
+}
+
 /* --- flips --- */
 
 static void terrimpi_simp_link(terrimpi_simplifier *s, int32_t e, int32_t twin, int32_t edge)
@@ -11986,8 +12175,8 @@ static int terrimpi_simp_can_flip(const terrimpi_simplifier *s, int32_t e, int32
 static void terrimpi_simp_flip(terrimpi_simplifier *s, int32_t e, const terrimpi_simp_moments *sums)
 {
     int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f);
-    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)], flipped =
-        s->edge[e];
+    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
+    int32_t flipped = s->edge[e];
     s->out_edge[s->origin[e]] = e;
     s->out_edge[s->origin[f]] = f;
     s->out_edge[c] = ad;
@@ -12253,189 +12442,7 @@ static void terrimpi_simp_collapse_to(terrimpi_simplifier *s, int32_t budget)
     }
 }
 
-/* --- insertion --- */
-
-/* Where a vertex helps most: the worst sample of the triangle of half-edge e. */
-typedef struct terrimpi_simp_candidate {
-    int32_t e, x, z;
-    float score;
-} terrimpi_simp_candidate;
-
-/* Looks for the worst sample strictly inside the tile among those of e's triangle. Not where a
-   corner lies on a last column or row that is squeezed: there a sample within the triangle on the
-   grid may lie outside of the true one. */
-static void terrimpi_simp_scan_triangle(const terrimpi_simplifier *s, int32_t e,
-                                        terrimpi_simp_candidate *best)
-{
-    const int32_t *corner = s->origin + e;
-    terrimp_mesh_vertex v[3];
-    terrimpi_simp_span span;
-    int32_t k, x, z;
-    float limit = best->score / s->square[e >> 2], h0, gx, gz;
-    terrimpi_simp_moments none;
-    terrimpi_simp_local l;
-    for (k = 0; k < 3; k++) {
-        v[k].x = (uint16_t)s->x[corner[k]];
-        v[k].z = (uint16_t)s->z[corner[k]];
-        if (s->squeeze && (v[k].x == s->cols - 1 || v[k].z == s->rows - 1))
-            return;
-    }
-    terrimpi_simp_find_span(v, &span);
-    memset(&none, 0, sizeof none);
-    terrimpi_simp_recentre(s, &none, corner[0], corner[1], corner[2], 0, &l);
-    h0 = s->height[corner[0]];
-    gx = l.gx + h0 * l.wx;
-    gz = l.gz + h0 * l.wz;
-    for (z = span.low > 0 ? span.low : 1; z < span.high; z++) {
-        const terrimpi_simp_row_prefix *row = s->row_sums + z * s->cols;
-        float base = h0 + (float)(z - v[0].z) * gz;
-        for (x = span.left[z] > 0 ? span.left[z] : 1; x < span.right[z]; x++) {
-            float r = (float)(row[x + 1].h - row[x].h) - (base + (float)(x - v[0].x) * gx);
-            for (k = 0; r * r > limit && k < 3; k++)
-                if (v[k].x == x && v[k].z == z)
-                    r = 0.0f; /* a corner */
-            if (r * r > limit) {
-                limit = r * r;
-                best->e = e;
-                best->x = x;
-                best->z = z;
-                best->score = limit * s->square[e >> 2];
-            }
-        }
-    }
-}
-
-/* The sample where the product of its own squared error and its triangle's is largest: the first
-   alone chases single samples (max better, rms worse), the second alone misses peaks. */
-static terrimpi_simp_candidate terrimpi_simp_worst_sample(terrimpi_simplifier *s)
-{
-    int32_t e, first = -1;
-    terrimpi_simp_candidate best = {-1, 0, 0, 0.0f};
-    for (e = 0; e < s->half_edge_end; e += 4)
-        if (s->origin[e] >= 0) {
-            float error = terrimpi_simp_triangle_error(s, e);
-            if (first < 0 || error > s->square[first >> 2])
-                first = e;
-        }
-    if (first >= 0 && s->square[first >> 2] > 0.0f)
-        terrimpi_simp_scan_triangle(s, first, &best);
-    /* a sample rarely has more than a quarter of its triangle's error: others need no scan */
-    for (e = 0; e < s->half_edge_end; e += 4)
-        if (e != first && s->origin[e] >= 0 &&
-            s->square[e >> 2] * s->square[e >> 2] > 4.0f * best.score)
-            terrimpi_simp_scan_triangle(s, e, &best);
-    return best;
-}
-
-static int32_t terrimpi_simp_free_triangle(const terrimpi_simplifier *s, int32_t from)
-{
-    while (from < s->half_edge_end && s->origin[from] >= 0)
-        from += 4;
-    return from;
-}
-
-/* Puts vertex v into triangle abc of half-edge e = ab, which leaves abv, bcv, cav. */
-static void terrimpi_simp_split_triangle(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                         int32_t v)
-{
-    int32_t e1 = terrimpi_simp_next(e), e2 = terrimpi_simp_prev(e), fresh = s->edge_count;
-    int32_t a = s->origin[e], b = s->origin[e1], c = s->origin[e2];
-    s->origin[t] = b;
-    s->origin[t + 1] = c;
-    s->origin[u] = c;
-    s->origin[u + 1] = a;
-    s->origin[e2] = s->origin[t + 2] = s->origin[u + 2] = v;
-    terrimpi_simp_link(s, t, s->twin[e1], s->edge[e1]);
-    terrimpi_simp_link(s, u, s->twin[e2], s->edge[e2]);
-    terrimpi_simp_link(s, e1, t + 2, fresh);
-    terrimpi_simp_link(s, t + 1, u + 2, fresh + 1);
-    terrimpi_simp_link(s, u + 1, e2, fresh + 2);
-    s->out_edge[v] = e2;
-    s->out_edge[a] = e;
-    s->out_edge[b] = t;
-    s->out_edge[c] = u;
-    terrimpi_simp_update_edge(s, e1);
-    terrimpi_simp_update_edge(s, t + 1);
-    terrimpi_simp_update_edge(s, u + 1);
-    s->square[e >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
-}
-
-/* Puts vertex v on the edge ab of triangles abc (half-edge e) and bad, which leaves avc, vbc, bvd
-   and vad. */
-static void terrimpi_simp_split_edge(terrimpi_simplifier *s, int32_t e, int32_t t, int32_t u,
-                                     int32_t v)
-{
-    int32_t f = s->twin[e], bc = terrimpi_simp_next(e), ad = terrimpi_simp_next(f), fresh =
-        s->edge_count;
-    int32_t a = s->origin[e], b = s->origin[f];
-    int32_t c = s->origin[terrimpi_simp_prev(e)], d = s->origin[terrimpi_simp_prev(f)];
-    s->origin[t] = s->origin[u] = v;
-    s->origin[t + 1] = b;
-    s->origin[t + 2] = c;
-    s->origin[u + 1] = a;
-    s->origin[u + 2] = d;
-    terrimpi_simp_link(s, t + 1, s->twin[bc], s->edge[bc]);
-    terrimpi_simp_link(s, u + 1, s->twin[ad], s->edge[ad]);
-    s->origin[bc] = s->origin[ad] = v; /* vc and vd now */
-    terrimpi_simp_link(s, e, u, s->edge[e]);
-    terrimpi_simp_link(s, f, t, fresh);
-    terrimpi_simp_link(s, bc, t + 2, fresh + 1);
-    terrimpi_simp_link(s, ad, u + 2, fresh + 2);
-    s->out_edge[v] = bc;
-    s->out_edge[a] = e;
-    s->out_edge[b] = f;
-    s->out_edge[c] = t + 2;
-    s->out_edge[d] = u + 2;
-    terrimpi_simp_update_edge(s, e);
-    terrimpi_simp_update_edge(s, f);
-    terrimpi_simp_update_edge(s, bc);
-    terrimpi_simp_update_edge(s, ad);
-    s->square[e >> 2] = s->square[f >> 2] = s->square[t >> 2] = s->square[u >> 2] = -1.0f;
-}
-
-/* Inserts a vertex; takes the places of one that was collapsed. Returns it. */
-static int32_t terrimpi_simp_insert(terrimpi_simplifier *s, const terrimpi_simp_candidate *spot)
-{
-    int32_t v = s->border_count, e = spot->e, k;
-    int32_t t = terrimpi_simp_free_triangle(s, 0), u = terrimpi_simp_free_triangle(s, t + 4);
-    const terrimpi_simp_row_prefix *at = s->row_sums + spot->z * s->cols + spot->x;
-    while (s->out_edge[v] >= 0)
-        v++;
-    s->x[v] = spot->x;
-    s->z[v] = spot->z;
-    s->height[v] = (float)(at[1].h - at[0].h);
-    for (k = 0; k < 3; k++, e = terrimpi_simp_next(e))
-        if (terrimpi_simp_area(s, s->origin[e], s->origin[terrimpi_simp_next(e)], v) == 0)
-            break;
-    if (k < 3)
-        terrimpi_simp_split_edge(s, e, t, u, v);
-    else
-        terrimpi_simp_split_triangle(s, e, t, u, v);
-    s->edge_count += 3;
-    s->triangle_count += 2;
-    return v;
-}
-
-/* Inserts vertices at the worst samples while the budget lasts. */
-static void terrimpi_simp_insert_all(terrimpi_simplifier *s, int32_t budget)
-{
-    while (s->triangle_count + 2 <= budget) {
-        terrimpi_simp_candidate spot = terrimpi_simp_worst_sample(s);
-        terrimpi_simp_ring ring;
-        int32_t v, i;
-        if (spot.e < 0)
-            return;
-        v = terrimpi_simp_insert(s, &spot);
-        terrimpi_simp_find_ring(s, v, &ring);
-        for (i = 0; i < ring.count; i++)
-            terrimpi_simp_try_flip(s, terrimpi_simp_next(ring.spoke[i]));
-        terrimpi_simp_fit_height(s, v);
-        terrimpi_simp_find_ring(s, v, &ring);
-        for (i = 0; i < ring.count; i++)
-            if (ring.vertex[i] >= s->border_count)
-                terrimpi_simp_fit_height(s, ring.vertex[i]);
-    }
-}
+/* --- moves at the end --- */
 
 /* Flips and moves on the mesh of the final size, then the last fit of the heights. */
 static void terrimpi_simp_polish(terrimpi_simplifier *s)
@@ -12500,8 +12507,8 @@ static int32_t terrimpi_simp_middle_along(const terrimpi_simplifier *s,
 static void terrimpi_simp_zip(terrimpi_simplifier *s, const terrimpi_simp_chain *outer,
                               const terrimpi_simp_chain *inner)
 {
-    int32_t first = terrimpi_simp_chain_at(outer, 0), last =
-        terrimpi_simp_chain_at(outer, outer->count - 1);
+    int32_t first = terrimpi_simp_chain_at(outer, 0);
+    int32_t last = terrimpi_simp_chain_at(outer, outer->count - 1);
     int32_t dx = s->x[last] - s->x[first], dz = s->z[last] - s->z[first], i = 0, j = 0;
     while (i + 1 < outer->count || j + 1 < inner->count) {
         int32_t o = terrimpi_simp_chain_at(outer, i), n = terrimpi_simp_chain_at(inner, j);
@@ -12819,7 +12826,7 @@ static size_t terrimpi_simp_layout(terrimpi_simplifier *s, const terrimpi_simp_p
     terrimpi_arena b = terrimpi_arena_at(base);
     size_t vertices = plan->lattice + plan->border, samples = (size_t)plan->cols * plan->rows;
     size_t triangles = 2 * plan->lattice + plan->border, spare = TERRIMPI_SIMP_MAX_DEGREE;
-    size_t edges = 3 * plan->lattice + 2 * plan->border + 3 * plan->inner;
+    size_t edges = 3 * plan->lattice + 2 * plan->border;
     s->sums = (terrimpi_simp_moments *)terrimpi_take(&b, edges, sizeof *s->sums);
     s->spare = (terrimpi_simp_moments *)terrimpi_take(&b, spare * spare, sizeof *s->spare);
     s->row_sums = (terrimpi_simp_row_prefix *)terrimpi_take(&b, samples, sizeof *s->row_sums);
@@ -12941,20 +12948,20 @@ static void terrimpi_simp_emit(const terrimpi_simplifier *s, const float *exact_
     mesh->index_count = mesh->surface_index_count = (uint32_t)indices;
 }
 
-/* Makes the mesh between its borders: collapses, insertions, moves. On a squeezed tile a collapse
-   can be barred on every side: then the start mesh is made anew, so coarse that it needs none. */
+/* Makes the mesh between its borders: collapses, then flips and moves. On a squeezed tile a
+   collapse can be barred on every side: then the start mesh is made anew, so coarse that it
+   needs none. */
 static void terrimpi_simp_reduce(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
                                  const terrimpi_simp_plan *plan, terrimp_mesh_vertex *loop)
 {
     int32_t budget = (int32_t)plan->budget;
-    int32_t inserted = (int32_t)plan->inner / TERRIMPI_SIMP_INSERT_SHARE;
     terrimpi_simp_fit_all(s);
-    terrimpi_simp_collapse_to(s, budget - 2 * inserted);
+    terrimpi_simp_seek_extremes(s);
+    terrimpi_simp_collapse_to(s, budget);
     if (s->triangle_count > budget) {
         terrimpi_simp_start(s, desc, (int32_t)plan->inner, loop);
         terrimpi_simp_fit_all(s);
     }
-    terrimpi_simp_insert_all(s, budget);
     terrimpi_simp_polish(s);
 }
 

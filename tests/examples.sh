@@ -214,6 +214,8 @@ fi
 if [ -x build/costs ]; then
     check "costs measures five costs above 0, and views take them" costs_are_above_0
 fi
+check "conventions: every one draws what plain OpenGL draws" build/conventions
+
 if [ -x build/cpp_host ]; then
     check "cpp_host draws its frames, close to the full mesh" host_runs cpp_host
 else

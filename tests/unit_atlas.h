@@ -531,8 +531,8 @@ static void live_holes_are_maximal(void)
         for (step = 0; step < 150; step++) {
             uint32_t i, k, side;
             live_churn(&m, 2, 60);
-            for (i = 0; i < m.atlas.hole_count; i++) {
-                const terrimp_rect *hole = &m.atlas.holes[i];
+            for (i = 0; i < m.atlas.free_count; i++) {
+                const terrimp_rect *hole = &m.atlas.free_rects[i];
                 CHECK(hole->width > 0 && hole->height > 0 && live_is_free(&m, hole));
                 for (side = 0; side < 4; side++) {
                     terrimp_rect larger = *hole;
@@ -544,7 +544,7 @@ static void live_holes_are_maximal(void)
                           !live_is_free(&m, &larger));
                 }
                 for (k = 0; k < i; k++)
-                    CHECK(memcmp(hole, &m.atlas.holes[k], sizeof *hole) != 0);
+                    CHECK(memcmp(hole, &m.atlas.free_rects[k], sizeof *hole) != 0);
             }
         }
         live_close(&m);
@@ -580,8 +580,8 @@ static void live_slots_go_where_they_fit_best(void)
             live_churn(&m, 2, 40);
             if (m.count == LIVE_SLOTS)
                 live_free(&m, 0);
-            for (k = 0; k < m.atlas.hole_count; k++) {
-                const terrimp_rect *h = &m.atlas.holes[k];
+            for (k = 0; k < m.atlas.free_count; k++) {
+                const terrimp_rect *h = &m.atlas.free_rects[k];
                 if (h->width >= width + padding && h->height >= height + padding &&
                     h->width * h->height < smallest) {
                     smallest = h->width * h->height;
@@ -672,12 +672,12 @@ static void live_atlas_survives_a_full_list_of_holes(void)
     for (run = 0; run < 30; run++) {
         live_model m;
         live_open(&m, 150, 100, 1, LIVE_SLOTS);
-        m.atlas.max_holes = random_range(1, 12);
-        memset(&m.atlas.holes[m.atlas.max_holes], UNTOUCHED, sizeof(terrimp_rect));
+        m.atlas.max_free = random_range(1, 12);
+        memset(&m.atlas.free_rects[m.atlas.max_free], UNTOUCHED, sizeof(terrimp_rect));
         for (step = 0; step < 300; step++) {
             live_churn(&m, 2, 40);
-            CHECK(m.atlas.hole_count <= m.atlas.max_holes);
-            CHECK(is_untouched(&m.atlas.holes[m.atlas.max_holes], sizeof(terrimp_rect)));
+            CHECK(m.atlas.free_count <= m.atlas.max_free);
+            CHECK(is_untouched(&m.atlas.free_rects[m.atlas.max_free], sizeof(terrimp_rect)));
         }
         live_free_all(&m);
         CHECK(live_alloc(&m, 150, 100) == TERRIMP_OK);

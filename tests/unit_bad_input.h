@@ -1052,6 +1052,25 @@ static void check_missing_callbacks(terrimp_view *view, const terrimp_callbacks 
     CHECK(*(int *)all->user == 0);
 }
 
+/* No light is taken from a view that is given a wrong one. */
+static void bad_light(terrimp_view *view)
+{
+    const float up[3] = {0.0f, 1.0f, 0.0f}, zero[3] = {0.0f, 0.0f, 0.0f};
+    float wrong[3] = {0.0f, 1.0f, 0.0f};
+    int i;
+    GIVES(TERRIMP_E_NULL, terrimp_view_light(NULL, up, 0.0f));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_light(view, zero, 0.0f));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_light(view, up, 0.0009f));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_light(view, up, 3.2f));
+    for (i = 0; i < 3; i++) {
+        wrong[2] = not_finite(i);
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_view_light(view, wrong, 0.0f));
+        GIVES(TERRIMP_E_NOT_FINITE, terrimp_view_light(view, up, not_finite(i)));
+    }
+    GIVES(TERRIMP_OK, terrimp_view_light(view, up, 3.1f));
+    GIVES(TERRIMP_OK, terrimp_view_light(view, NULL, 0.0f));
+}
+
 /* Cameras at the ends of what is allowed, and beyond. */
 static void check_huge_cameras(terrimp_view *view, const terrimp_callbacks *all,
                                const terrimp_camera *camera)
@@ -1107,6 +1126,11 @@ static void check_view_refuses(const land *l, terrimp_view *view, int mode)
     GIVES(TERRIMP_E_NULL, terrimp_view_get_stats(view, NULL));
     GIVES(TERRIMP_E_NULL, terrimp_view_invalidate(NULL));
     GIVES(TERRIMP_E_NULL, terrimp_view_touch(NULL, 0, 0, 1, 1));
+    GIVES(TERRIMP_E_NULL, terrimp_view_drop(NULL, 0));
+    GIVES(TERRIMP_E_NULL, terrimp_view_expire(NULL, 0));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_drop(view, l->info.node_count));
+    GIVES(TERRIMP_E_RANGE, terrimp_view_expire(view, l->info.node_count));
+    bad_light(view);
     GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 97, 0, 1, 1));
     GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 0, 81, 1, 1));
     GIVES(TERRIMP_E_RANGE, terrimp_view_touch(view, 0xffffffffu, 0xffffffffu, 2, 2));

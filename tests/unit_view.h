@@ -65,6 +65,7 @@ typedef struct flight_picture {
     int complete;
     uint32_t begun;      /* frame */
     uint32_t made;       /* frame of the last piece */
+    float light[3];      /* when its first piece was made */
     terrimp_capture_command capture; /* its first piece */
     double area;         /* of ground drawn into it so far [wu^2] */
     uint32_t cells[FLIGHT_CELLS], cell_count;
@@ -91,6 +92,8 @@ typedef struct flight {
     flight_picture *latest, *opened;     /* [node_count][part] complete, and those in pieces */
     uint32_t frame;
     int dropped;            /* the frame before was not rendered */
+    uint32_t fails;         /* of so many captures one fails; 0: none */
+    float light[3];
     uint32_t hash;
     /* This frame: */
     unsigned char *cover;                /* [chunks] */
@@ -106,7 +109,7 @@ typedef struct flight {
     terrimp_stats stats;
     /* All frames: */
     uint32_t total_captures, total_impostors, total_ground, total_waiting, total_pieces;
-    uint32_t total_fading, total_high, total_splits, most_captures;
+    uint32_t total_fading, total_high, total_splits, most_captures, total_lost;
 } flight;
 
 static void *flight_array(size_t count, size_t bytes)
@@ -207,9 +210,34 @@ static void begin_picture(flight *f, flight_picture *picture,
     memset(picture, 0, sizeof *picture);
     picture->alive = 1;
     picture->begun = f->frame;
+    memcpy(picture->light, f->light, sizeof picture->light);
     f->begun_count += command->part == 0;
     CHECK(!f->desc.no_lookahead || f->dropped ||
           memcmp(command->eye, f->camera.eye, sizeof command->eye) == 0);
+}
+
+/* What a node or all nodes had is gone. */
+static void flight_lose(flight *f, uint32_t node)
+{
+    uint32_t i, first = node == TERRIMP_EVERY_NODE ? 0 : node * FLIGHT_PARTS;
+    uint32_t end = node == TERRIMP_EVERY_NODE ? f->l->info.node_count * FLIGHT_PARTS
+                                              : first + FLIGHT_PARTS;
+    CHECK(terrimp_view_drop(f->view, node) == TERRIMP_OK);
+    for (i = first; i < end; i++)
+        f->latest[i].alive = f->latest[i].complete = f->opened[i].alive = 0;
+    f->total_lost++;
+}
+
+/* A host whose captures fail now and then, and sometimes others with them. */
+static void flight_fail(flight *f, uint32_t node)
+{
+    if (f->fails == 0 || random_range(0, f->fails - 1u) > 0)
+        return;
+    flight_lose(f, node);
+    if (random_range(0, 9) == 0)
+        flight_lose(f, random_range(0, f->l->info.node_count - 1u));
+    if (random_range(0, 29) == 0)
+        flight_lose(f, TERRIMP_EVERY_NODE);
 }
 
 static void flight_begin_capture(void *user, const terrimp_capture_command *command)
@@ -240,6 +268,7 @@ static void flight_begin_capture(void *user, const terrimp_capture_command *comm
     f->capturing = picture;
     picture->capture = *command;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
+    flight_fail(f, command->node);
 }
 
 static void flight_end_capture(void *user, const terrimp_capture_command *command)
@@ -250,7 +279,8 @@ static void flight_end_capture(void *user, const terrimp_capture_command *comman
     CHECK(f->in_capture && memcmp(command, &picture->capture, sizeof *command) == 0);
     f->in_capture = 0;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
-    if (!command->complete)
+    flight_fail(f, command->node);
+    if (!command->complete || !picture->alive)
         return;
     picture->complete = 1;
     picture->made = f->frame;
@@ -495,6 +525,8 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         rim_y = rim + texture_rounding(command->texture_matrix, p, 1, size);
         rim += texture_rounding(command->texture_matrix, p, 0, size);
         CHECK(fabs(x - (clip[0] / clip[3] * 0.5 + 0.5) * (double)capture->slot.width) < rim);
+        if (f->camera.rows_from_top)
+            clip[1] = -clip[1];
         CHECK(fabs(y - (clip[1] / clip[3] * 0.5 + 0.5) * (double)capture->slot.height) < rim_y);
         if (f->desc.exact_depth) { /* and back */
             double in_atlas[3], place[4];
@@ -732,15 +764,22 @@ static double picture_error(const flight *f, uint32_t node, double *angle, doubl
                 *parallax / (double)f->desc.tolerance_px);
 }
 
+/* How many pictures are being made in pieces. */
+static uint32_t count_opened(const flight *f)
+{
+    uint32_t node, opened = 0;
+    for (node = 0; node < f->l->info.node_count; node++)
+        opened += f->opened[node * FLIGHT_PARTS].alive ? 1u : 0u;
+    return opened;
+}
+
 /* Pictures that are drawn keep to the limits; if some had to be put off, to twice the limits; and
    if they are drawn in place of others that do not exist yet, to four times. */
 static void check_pictures_are_good(const flight *f)
 {
     double worst_angle = 0.0, worst_parallax = 0.0, most = 1.0;
-    uint32_t i, node, in_pieces = 0;
-    for (node = 0; node < f->l->info.node_count; node++)
-        in_pieces += f->opened[node * FLIGHT_PARTS].alive ? 1u : 0u;
-    if (f->stats.shortfall > 0.0f || in_pieces)
+    uint32_t i;
+    if (f->stats.shortfall > 0.0f || count_opened(f) > 0)
         most = 2.0;
     if (f->stats.waiting > 0)
         most = 4.0;
@@ -837,8 +876,8 @@ static void flight_render(flight *f)
     terrimp_callbacks callbacks = flight_callbacks(f);
     flight_clear(f);
     memset(&f->stats, 0, sizeof f->stats);
-    CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
     CHECK(terrimp_view_render(f->view, &callbacks) == TERRIMP_OK);
+    CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_OK);
     CHECK(!f->in_capture);
     check_captures(f);
     check_stats(f);
@@ -963,7 +1002,8 @@ static void flight_touch(flight *f, uint32_t x, uint32_t z, uint32_t cols, uint3
 
 /* Flies over a land and checks every law in every frame; returns the hash of all commands. The
    flight is closed, but its counts may be read. */
-static uint32_t fly_and_check(const land *l, const terrimp_view_desc *desc, int frames, flight *f)
+static uint32_t fly_with_failures(const land *l, const terrimp_view_desc *desc, int frames,
+                                  uint32_t fails, flight *f)
 {
     pilot p;
     size_t allocations;
@@ -971,9 +1011,13 @@ static uint32_t fly_and_check(const land *l, const terrimp_view_desc *desc, int 
     if (!flight_open(f, l, desc))
         return 0;
     p.camera.depth_zero_to_one = frames & 1;
+    p.camera.rows_from_top = frames >> 1 & 1;
+    f->fails = fails;
     allocations = unit_allocations;
     while (p.frame < frames) {
         const terrimp_camera *camera = pilot_next(&p, l);
+        if (fails && random_range(0, 30) == 0)
+            flight_lose(f, random_range(0, l->info.node_count - 1u));
         if (random_range(0, 40) == 0) {
             CHECK(terrimp_view_invalidate(f->view) == TERRIMP_OK);
             flight_forget(f);
@@ -992,6 +1036,11 @@ static uint32_t fly_and_check(const land *l, const terrimp_view_desc *desc, int 
     CHECK(unit_allocations == allocations); /* update and render allocate nothing */
     flight_close(f);
     return f->hash;
+}
+
+static uint32_t fly_and_check(const land *l, const terrimp_view_desc *desc, int frames, flight *f)
+{
+    return fly_with_failures(l, desc, frames, 0, f);
 }
 
 /* ---- lands and settings to fly with ---- */
@@ -1606,6 +1655,204 @@ static void what_was_forgotten_since_the_update_is_not_drawn(void)
     land_free(&l);
 }
 
+/* ---- captures that fail ---- */
+
+/* Captures fail at random, alone or with others: what they should have shown is drawn from others
+   or as ground in the same frame, and no picture is worn that was not made; every law holds. */
+static void flights_with_failing_captures_keep_every_law(void)
+{
+    uint32_t lost = 0, drawn = 0, run;
+    for (run = 0; run < check_rounds(24, 72); run++) {
+        terrimp_view_desc d;
+        land l;
+        random_land(&l);
+        d = run % 3u ? random_settings((int)(run % 2u) + TERRIMP_MODE_IMPOSTOR) : eager_settings();
+        if (land_build(&l))
+            (void)fly_with_failures(&l, &d, 40, 1u << run % 4u, &flight_room);
+        lost += flight_room.total_lost;
+        drawn += flight_room.total_impostors;
+        land_free(&l);
+    }
+    CHECK(lost > 200 && drawn > 200);
+}
+
+/* A host whose captures all fail draws ground, and when they succeed again, the same as one whose
+   captures never failed: even if what failed was a device that took all pictures along. */
+static void a_lost_capture_is_made_again(void)
+{
+    flight *f = &flight_room;
+    terrimp_view_desc d = eager_settings();
+    terrimp_camera camera;
+    uint32_t impostors, i;
+    land l;
+    make_hills(&l);
+    if (land_build(&l) && flight_open(f, &l, &d)) {
+        camera = camera_beside(&l);
+        CHECK(rest(f, &camera) < REST_FRAMES);
+        impostors = f->impostor_count;
+        flight_lose(f, TERRIMP_EVERY_NODE);
+        f->fails = 1;
+        for (i = 0; i < 5u; i++) {
+            flight_update(f, &camera);
+            flight_render(f);
+            CHECK(f->impostor_count == 0 && f->ground_count > 0 && f->capture_count > 0);
+        }
+        f->fails = 0;
+        CHECK(rest(f, &camera) < REST_FRAMES);
+        CHECK(impostors > 3 && f->impostor_count == impostors && f->stats.waiting == 0);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
+/* ---- light that changes ---- */
+
+/* The angle between the light of a picture and that of the frame. */
+static double light_angle(const flight *f, uint32_t node)
+{
+    double a[3], b[3];
+    oracle_widen(f->latest[node * FLIGHT_PARTS].light, a);
+    oracle_widen(f->light, b);
+    return acos(fmin(oracle_dot(a, b) / (oracle_length(a) * oracle_length(b)), 1.0));
+}
+
+/* The largest such angle among what is drawn. */
+static double worst_light(const flight *f)
+{
+    double worst = 0.0;
+    uint32_t i;
+    for (i = 0; i < f->item_count; i++)
+        if (f->items[i].is_impostor)
+            worst = fmax(worst, light_angle(f, f->items[i].node));
+    return worst;
+}
+
+/* The sun of a day of so many frames. */
+static void set_sun(flight *f, uint32_t frames_a_day, float tolerance)
+{
+    float turn = 6.2831853f * (float)(f->frame + 1u) / (float)frames_a_day;
+    f->light[0] = 3.0f * cosf(turn);
+    f->light[1] = 3.0f * sinf(turn);
+    f->light[2] = 1.0f;
+    CHECK(terrimp_view_light(f->view, f->light, tolerance) == TERRIMP_OK);
+}
+
+/* Whatever the sun does, where the schedule has room for it no picture is drawn whose light came
+   from farther round than the tolerance. */
+static void no_picture_is_older_than_the_light_allows(void)
+{
+    flight *f = &flight_room;
+    uint32_t run, drawn = 0, renewed = 0;
+    for (run = 0; run < check_rounds(32, 96); run++) {
+        terrimp_view_desc d = eager_settings();
+        float tolerance = random_magnitude(0.003f, 0.3f);
+        uint32_t day = random_range(100, 5000);
+        pilot p;
+        land l;
+        random_land(&l);
+        d.no_spreading = run % 2u;
+        d.max_captures = 1024; /* and no other limits */
+        d.costs.capture = 0.01f;
+        memset(&p, 0, sizeof p);
+        if (!land_build(&l) || !flight_open(f, &l, &d))
+            break;
+        while (p.frame < 80) {
+            if (p.frame % 8 == 0)
+                (void)pilot_next(&p, &l);
+            else
+                p.frame++;
+            set_sun(f, day, tolerance);
+            flight_update(f, &p.camera);
+            flight_render(f);
+            if (f->stats.shortfall > 0.0f || f->stats.waiting > 0 || count_opened(f) > 0)
+                continue;
+            CHECK(worst_light(f) <= (double)tolerance * 1.001 + 1e-4);
+            drawn += f->impostor_count;
+            renewed += f->begun_count;
+        }
+        flight_close(f);
+        land_free(&l);
+    }
+    CHECK(run == check_rounds(32, 96) && drawn > 500 && renewed > 100);
+}
+
+/* A day of 24 minutes at 60 frames a second, eye at rest: few captures, none of them in a crowd,
+   and what is worn keeps to the tolerance. */
+static void a_day_costs_less_than_half_a_capture_a_frame(void)
+{
+    flight *f = &flight_room;
+    terrimp_view_desc d = eager_settings();
+    terrimp_camera camera;
+    uint32_t before, frames = 2000, most = 0;
+    double worst = 0.0;
+    land l;
+    make_hills(&l);
+    d.fade_start = 8.0f;
+    d.impostor_px = 60.0f;
+    if (land_build(&l) && flight_open(f, &l, &d)) {
+        camera = camera_beside(&l);
+        set_sun(f, 86400, 0.0f);
+        CHECK(rest(f, &camera) < REST_FRAMES);
+        before = f->total_captures;
+        while (f->frame < frames) {
+            set_sun(f, 86400, 0.0f);
+            flight_update(f, &camera);
+            flight_render(f);
+            worst = fmax(worst, worst_light(f));
+            most = f->begun_count > most ? f->begun_count : most;
+        }
+        printf("  a day of 24 minutes: %u pictures, %.3f captures a frame, at most %u; %.4f of "
+               "0.0157 radians\n", (unsigned)f->impostor_count,
+               (double)(f->total_captures - before) / frames, (unsigned)most, worst);
+        CHECK(f->impostor_count > 20 && f->total_captures - before > frames / 50u);
+        CHECK((f->total_captures - before) * 2u < frames && worst < 0.0157 * 1.03);
+        CHECK(most * 3u < f->impostor_count);
+        flight_close(f);
+    }
+    land_free(&l);
+}
+
+/* Expired pictures are worn until they have been renewed, a few a frame; then none is old. */
+static void expired_pictures_are_worn_until_they_are_renewed(void)
+{
+    flight *f = &flight_room;
+    terrimp_view_desc d = eager_settings();
+    terrimp_camera camera;
+    uint32_t run, i, impostors, since, node;
+    land l;
+    make_hills(&l);
+    d.max_captures = 2;
+    d.max_capture_triangles = 700;
+    for (run = 0; run < 3u && (l.terrain || land_build(&l)); run++) {
+        if (!flight_open(f, &l, &d))
+            break;
+        camera = camera_beside(&l);
+        CHECK(rest(f, &camera) < REST_FRAMES);
+        impostors = f->impostor_count;
+        for (i = 0; i < run; i++) { /* also while pictures are being made in pieces */
+            CHECK(terrimp_view_expire(f->view, TERRIMP_EVERY_NODE) == TERRIMP_OK);
+            flight_update(f, &camera);
+            flight_render(f);
+        }
+        since = f->frame;
+        node = f->items[f->item_count - 1u].node;
+        CHECK(terrimp_view_expire(f->view, run ? TERRIMP_EVERY_NODE : node) == TERRIMP_OK);
+        CHECK(terrimp_view_render(f->view, NULL) == TERRIMP_E_NULL); /* but not E_STATE */
+        for (i = 0; i < REST_FRAMES; i++) {
+            flight_update(f, &camera);
+            flight_render(f);
+            CHECK(f->impostor_count == impostors && f->stats.waiting == 0);
+        }
+        for (i = 0; i < f->item_count; i++)
+            if (f->items[i].is_impostor)
+                CHECK((f->latest[f->items[i].node * FLIGHT_PARTS].begun > since) ==
+                      (run > 0 || f->items[i].node == node));
+        flight_close(f);
+    }
+    CHECK(run == 3);
+    land_free(&l);
+}
+
 /* ---- the cost model ---- */
 
 static void cheap_impostors_are_drawn_wherever_they_may_be(void)
@@ -2188,6 +2435,11 @@ static void view_tests(void)
     RUN(settings_change_without_a_loss);
     RUN(invalidate_forgets_every_picture);
     RUN(what_was_forgotten_since_the_update_is_not_drawn);
+    RUN(flights_with_failing_captures_keep_every_law);
+    RUN(a_lost_capture_is_made_again);
+    RUN(no_picture_is_older_than_the_light_allows);
+    RUN(a_day_costs_less_than_half_a_capture_a_frame);
+    RUN(expired_pictures_are_worn_until_they_are_renewed);
     RUN(cheap_impostors_are_drawn_wherever_they_may_be);
     RUN(dear_captures_leave_only_ground);
     RUN(auto_is_not_dearer_than_ground_or_impostors_alone);

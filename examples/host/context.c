@@ -28,6 +28,11 @@ static void system_close(void *system)
     free(s);
 }
 
+context_function context_find(const char *name)
+{
+    return (context_function)OSMesaGetProcAddress(name);
+}
+
 static const char *system_open(void **system, int width, int height, int old)
 {
     static const int attributes[] = { OSMESA_FORMAT, OSMESA_RGBA,
@@ -80,6 +85,11 @@ static void system_close(void *system)
         eglDestroySurface(s->display, s->surface);
     eglTerminate(s->display);
     free(s);
+}
+
+context_function context_find(const char *name)
+{
+    return (context_function)eglGetProcAddress(name);
 }
 
 /* Mesa's surfaceless platform needs neither a display server nor a graphics card. */

@@ -35,6 +35,11 @@ void context_read(const context *c, uint8_t *rgb);
 /* The renderer's own name, and the system under it, e.g. "OSMesa: llvmpipe (...)". */
 const char *context_renderer(void);
 
+/* A function of OpenGL that came after 3.3; cast it to its type. It may be null, or of no use where
+   the version or extension is missing. */
+typedef void (*context_function)(void);
+context_function context_find(const char *name);
+
 /* Frees everything; fine after a failed open, and twice. */
 void context_close(context *c);
 
