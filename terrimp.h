@@ -8969,7 +8969,8 @@ static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int los
 {
     terrimpi_cache_picture *p;
     TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count,
+                    TERRIMP_E_RANGE);
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
         if (p->seen == 0 || (node != TERRIMP_EVERY_NODE &&
                              terrimpi_real_node(v->terrain, p->node.number) != node))
