@@ -8628,7 +8628,7 @@ struct terrimp_view {
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
     terrimp_stats stats;
-    terrimp_terrain tiled;         /* repetitions of one that wraps: then `terrain` is this */
+    terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
@@ -8641,13 +8641,15 @@ struct terrimp_view {
    of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
    whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
    tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
-static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain)
+static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                 terrimp_terrain *t)
 {
-    terrimp_terrain *t = &v->tiled;
     terrimp_heightfield field = terrain->desc.field;
-    v->terrain = terrain;
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
     if (!field.wrap)
         return;
+    v->terrain = v->tiled = t;
     *t = *terrain;
     t->tiles = v->desc.wrap_tiles;
     field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
@@ -8656,7 +8658,6 @@ static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain
     field.depth = (field.depth - 1u) * t->tiles + 1u;
     field.row_bytes = 0; /* no sample is read through it */
     (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
-    v->terrain = t;
 }
 
 static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
@@ -8745,13 +8746,19 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
     v->draws = (terrimpi_view_draw *)terrimpi_take(
-        &l, ground + impostors + (v->terrain == &v->tiled ?
-                                  v->desc.wrap_tiles * v->desc.wrap_tiles : 1u), sizeof *v->draws);
-    if (v->terrain == &v->tiled) {
-        terrimp_terrain *t = &v->tiled;
-        t->real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *t->real);
-        t->meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *t->meshes);
-        t->tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *t->tree.nodes);
+        &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
+        sizeof *v->draws);
+    if (v->tiled) {
+        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
+        terrimp_terrain made = *v->tiled;
+        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
+        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
+        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
+        if (t) {
+            *t = made;
+            terrimpi_tiled_fill(t, v->built);
+            v->terrain = v->tiled = t;
+        }
     }
     v->cull.horizon = NULL;
     if (v->desc.walls)
@@ -8762,9 +8769,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
 {
     terrimp_view v;
+    terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    terrimpi_tiled_begin(&v, terrain);
+    terrimpi_tiled_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -8781,11 +8789,12 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              size_t bytes, terrimp_view **view)
 {
     terrimp_view v, *made = (terrimp_view *)memory;
+    terrimp_terrain tiled;
     size_t needed;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    terrimpi_tiled_begin(&v, terrain);
+    terrimpi_tiled_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -8795,11 +8804,6 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
     v.frame.desc = &made->desc;
-    v.built = terrain;
-    if (terrain->desc.field.wrap) {
-        terrimpi_tiled_fill(&v.tiled, terrain);
-        v.terrain = &made->tiled;
-    }
     v.frame.terrain = v.terrain;
     *made = v;
     *view = made;
@@ -8998,7 +9002,7 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     terrimpi_view_cancel(view);
     view->outdated = 1;
     if (view->terrain->real)
-        terrimpi_tiled_fill(&view->tiled, view->built);
+        terrimpi_tiled_fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
         for (k = 0; k < tiles * tiles; k++)
             if (terrimpi_cache_shows(p, tree->chunk_quads,
