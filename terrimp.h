@@ -9921,6 +9921,7 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    float first = 0.0f;
     uint32_t tries, i;
     if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
         v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
@@ -9931,9 +9932,14 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         for (i = 0; i < v->region_count; i++)
             terrimpi_view_decide(v, &v->regions[i], spread, drawn);
         v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+        if (tries == 0)
+            first = v->cost;
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
-            tries == TERRIMPI_VIEW_TRIES)
+            tries == TERRIMPI_VIEW_TRIES) {
+            if (v->cost > max_cost && !(v->cost < first))
+                v->ground_scale = scale; /* it was of no use */
             return TERRIMP_OK;
+        }
         v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
     }
 }
