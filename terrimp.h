@@ -49,6 +49,7 @@
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
        >>visibility   the horizon: which nodes are hidden behind others
+       >>residency    terrain larger than memory: which pages are here
        >>capture      a picture to be made, and the ground that is drawn for it
        >>view         the per-frame decision, the schedule, the draw commands
        >>sorted       terrain in exact painter's order, for machines without a depth buffer
@@ -56,6 +57,7 @@
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
        >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>page-builder pages of a terrain from samples that are larger than memory
        >>visible-sets what a horizon is made of
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest;
                         depth meshes
@@ -66,7 +68,8 @@
    DOES NOT
        call a graphics API, load files, print, read a clock, start threads, allocate after create;
        keep textures or vertex buffers (it fills the host's); light the terrain (the host's shader
-       does, in captures as on the screen); stream terrain that is larger than memory.
+       does, in captures as on the screen); read files: of a terrain that is larger than memory it
+       says which pages it wants.
 
    CONVENTIONS
        y is up, axes are right-handed, samples lie row by row: columns along +x, rows along +z.
@@ -114,10 +117,11 @@
        node: 690 for each 64 x 64 quads, 0.17 bytes a sample. A view takes about 470 bytes for each
        picture it may keep, 120 for each ground node it may draw and 23 for each node of the
        terrain. Samples are used where they lie; what is built can lie in read-only memory, as a
-       bake: then a terrain takes 1 KiB. Building takes 200 KiB and 4 bytes a column for each
-       thread. Outside of it, a host that keeps the ground of all nodes as floats needs 16 bytes a
-       sample, much less if it makes that as it is drawn, and for coarse meshes 103 vertices and
-       543 indices a node.
+       bake: then a terrain takes 1 KiB. Of a terrain in pages there are as many slots of 9 KiB in
+       memory as the host likes, and 2 bytes a node. Building takes 200 KiB and 4 bytes a column for
+       each thread. Outside of it, a host that keeps the ground of all nodes as floats needs 16
+       bytes a sample, much less if it makes that as it is drawn, and for coarse meshes 103 vertices
+       and 543 indices a node.
 
    ERRORS
        Functions that can fail return a terrimp_result, 0 when all is well, and leave their outputs
@@ -230,7 +234,8 @@ extern "C" {
     X(TERRIMP_E_STATE, 11, "called too early: build or update first")                             \
     X(TERRIMP_E_MISS, 12, "the ray or the point does not meet the terrain")                       \
     X(TERRIMP_E_BAKE, 13, "the block is damaged, or no bake of this version and heightfield")     \
-    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: write it swapped")
+    X(TERRIMP_E_ORDER, 14, "the bake has the other byte order: write it swapped")                 \
+    X(TERRIMP_E_PAGE, 15, "a page of the terrain that this needs is not here: fetch it first")
 
 typedef enum terrimp_result {
 #define TERRIMPI_X(name, value, text) name = value,
@@ -503,6 +508,7 @@ typedef struct terrimp_quadtree {
     uint32_t level_first[TERRIMP_QUADTREE_LEVELS + 1u]; /* number of a level's first node */
     uint32_t level_x[TERRIMP_QUADTREE_LEVELS], level_z[TERRIMP_QUADTREE_LEVELS]; /* its nodes */
     struct terrimp_geomip_node *nodes; /* (required before build) [node_count] the caller's */
+    struct terrimp_pages *pages; /* of a terrain in pages, which has no nodes: else NULL */
 } terrimp_quadtree;
 
 /* Lays the quadtree out; nodes is left NULL for the caller to set.
@@ -1183,6 +1189,126 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
                                                 const terrimp_quadtree *tree, const void *walls,
                                                 const terrimp_camera *camera,
                                                 terrimp_geomip_view *view);
+/* ==== Residency ========================================================== >>residency */
+
+/* A terrain that is larger than memory lies in pages: a header, and for each node its ground, 65 x
+   65 samples at its own step, its coarse mesh, and heights and errors of its four children. Pages
+   are of one size and stand in a file, a cartridge or behind a network, children side by side; this
+   header computes where, and never reads: a view lists what it wants, best first, and the host
+   reads when and how it likes. What is not here is drawn by its parent. In memory are some slots
+   for pages, and 2 bytes a node.
+
+   How to use it: read the header, open the terrain, and read the root's page. Then in each frame
+
+        terrimp_pages_next_frame(terrain);
+        terrimp_view_update(view, &camera);
+        terrimp_view_wants(view, wants, 64, &count);   // begin these, on any thread fill what
+                                                       // begin has given; put, or fail
+        terrimp_view_render(view, &draw);
+
+   Begin, put and fail belong to the thread of the views, between update and render or after it. The
+   pages that a frame uses stay where they are until the next frame's update. A page lies in its
+   slot until another needs it, and what the host has made of it is good as long: a mesh has its
+   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Views of modes AUTO and
+   GEOMIP draw pages, without morph_ratio and walls. */
+
+#define TERRIMP_PAGES_VERSION 1u
+#define TERRIMP_PAGES_HEADER_BYTES 8192u
+
+/* What a header says. */
+typedef struct terrimp_pages_info {
+    uint64_t bytes;          /* of the whole file: the header, then all pages */
+    uint32_t page_bytes;
+    uint32_t width, depth;   /* samples */
+    uint32_t chunk_quads, level_count, node_count;
+    uint32_t block_level;    /* see terrimp_pages_desc */
+    uint32_t stamp;          /* that all its pages bear: pages of another file are refused */
+    float height_scale, height_offset;
+} terrimp_pages_info;
+
+/* Looks at a header. Errors: E_BAKE when it is damaged or cut short; E_ORDER. */
+TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
+                                               terrimp_pages_info *info);
+
+/* Bytes of the block that a terrain in pages lives in. 0 for a header or slots that are no good.
+
+   slot_count  pages in memory at most [Limits: 8..65534] */
+TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count);
+
+/* Makes a terrain of a header. Nothing of it is here yet: until the root's page is, a view's update
+   returns E_PAGE.
+
+   field       NULL, or where it lies: spacing and origin; the rest is that of the header
+   memory      [memory_bytes] aligned to 8 bytes, at least terrimp_pages_bytes
+   terrain     out: lies in memory, as a copy of all that it needs of the header */
+TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
+                                              size_t bytes, uint32_t slot_count, void *memory,
+                                              size_t memory_bytes, terrimp_terrain **terrain);
+
+typedef enum terrimp_page_state {
+    TERRIMP_PAGE_ABSENT = 0,
+    TERRIMP_PAGE_COMING, /* begun, and neither put nor failed */
+    TERRIMP_PAGE_HERE,
+    TERRIMP_PAGE_STATE_COUNT
+} terrimp_page_state;
+
+/* Where a node's page stands. */
+typedef struct terrimp_page_info {
+    uint64_t offset; /* in the file */
+    uint32_t bytes;
+    uint32_t level;  /* of the node */
+    int state;       /* terrimp_page_state */
+    uint32_t slot;   /* unless it is absent */
+} terrimp_page_info;
+TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain, uint32_t node,
+                                                 terrimp_page_info *info);
+
+/* Finds a slot for a node's page, in the place of the one that was of no use for longest.
+
+   page        out: [bytes of the info] aligned to 8 bytes, to be filled, by any thread
+   Errors      E_STATE when it is here or coming, or its parent is not here: a page comes after its
+               parent's; E_CAPACITY when the frame uses all slots */
+TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page);
+
+/* Looks at a page that has been filled, and takes it if it is good. Else its slot is free again.
+
+   Errors      E_STATE when it has not been begun; E_BAKE when it is damaged, or another node's, or
+               another file's
+   Cost        O(samples), about 10 us */
+TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node);
+
+/* Gives the slot of a page back that has been begun: it could not be read, or is not wanted any
+   more. Nobody may fill it any longer. Errors: E_STATE when it has not been begun. */
+TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node);
+
+/* Begins a frame of all views of a terrain: what the frame before did not use may be given up. */
+TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain);
+
+/* Lists the pages that have been begun and that no view wanted in this frame and the one before.
+
+   nodes       [capacity] out, by slot; count: how many there are, also when they are more */
+TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
+                                                   uint32_t capacity, uint32_t *count);
+
+/* The height of a terrain, in pages or not, as terrimp_heightfield_height; the normal too.
+
+   height      out [wu]
+   normal      [3] out; NULL: not wanted
+   level       out: of the finest ground that is here, which has answered; 0 is the exact one. NULL:
+               only that will do, else E_PAGE */
+TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
+                                                  float *height, float normal[3], uint32_t *level);
+
+/* The first meeting of a ray and a terrain, in pages or not, as terrimp_heightfield_raycast.
+
+   hit         out; x and z count in samples of the terrain. NULL: not wanted
+   level       out: of the ground that was met, or when nothing was, the coarsest that was asked.
+               NULL: only level 0 will do, else E_PAGE */
+TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
+                                                   const float origin[3], const float direction[3],
+                                                   float max_distance, terrimp_ray_hit *hit,
+                                                   uint32_t *level);
+
 /* ==== Capture ============================================================ >>capture */
 
 /* Draw a ground node. */
@@ -1374,6 +1500,7 @@ typedef struct terrimp_stats {
     uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
+    uint32_t late;               /* nodes and pictures that pages were missing for */
     float ground_tolerance_px;   /* what max_ground and max_cost made of it */
     float cost;                  /* of the frame, predicted: all but what is shaded either way */
     float worst_angle_rad;       /* of the impostors on the screen */
@@ -1414,9 +1541,33 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
 /* Decides the frame: what is visible, what is drawn how, which pictures are made.
 
    Errors     E_CAPACITY when more than max_ground chunks are in sight in mode FULL or IMPOSTOR, or
-              more nodes in GEOMIP and AUTO even at 1000 px. The frame before stays
+              more nodes in GEOMIP and AUTO even at 1000 px; E_PAGE when the page of the root is not
+              here. The frame before stays
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
+
+/* Why a page is wanted. */
+typedef enum terrimp_want_reason {
+    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
+    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
+    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
+    TERRIMP_WANT_REASON_COUNT
+} terrimp_want_reason;
+
+typedef struct terrimp_want {
+    uint32_t node, level, bytes;
+    int reason;     /* terrimp_want_reason */
+    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
+} terrimp_want;
+
+/* The pages that the last update would have liked to have, best first, and no more than there are
+   slots for. None of them is here or coming, and the parents of all are here. Several views share a
+   terrain's pages: ask them all, and begin refuses what another has asked for.
+
+   wants      [capacity] out
+   count      out: how many */
+TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
+                                              uint32_t capacity, uint32_t *count);
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
@@ -2060,6 +2211,64 @@ TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain);
    Cost       O(nodes + samples): a checksum of all samples is taken */
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes, int swapped);
+
+/* ==== Page builder ======================================================= >>page-builder */
+
+/* Makes the pages of the room Residency from samples that are larger than memory. The terrain is
+   built block by block, each in memory of its own, in any order, by any number of threads or
+   processes, to the same bytes; and the levels above the blocks, and the header, at last. What has
+   been written once need not be done again. Blocks stand one behind the other: those of a range
+   are one piece of the file.
+
+   In a block, and in a terrain of one block, all is what building in memory makes of it. Above the
+   blocks, ground and meshes are made of every 2^block_level-th sample, and their errors are those
+   against these, and what the blocks miss added. */
+typedef struct terrimp_pages_desc {
+    terrimp_terrain_desc terrain; /* (required) but its samples; U8, U16 or S16, without voids;
+                                     height_low and height_high have to be given */
+    uint32_t block_level;         /* blocks are the nodes of this level
+                                     [Default 0 -> 4; all for up to 4097 x 4097 samples] */
+    uint32_t stamp;               /* any number: it and the settings make the stamp of the pages */
+    void *user;                   /* the first argument of each of these; they return 0 for "no" */
+    int (*read)(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows, void *samples,
+                size_t row_bytes); /* (required) fills [rows][cols] samples from (x, z) on */
+    int (*load)(void *user, uint64_t offset, void *bytes, size_t count);        /* (required) ... */
+    int (*store)(void *user, uint64_t offset, const void *bytes, size_t count); /* of the file */
+} terrimp_pages_desc;
+
+/* Writes the effective descriptor, and how many blocks it makes. */
+TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *desc,
+                                                      terrimp_pages_desc *out,
+                                                      uint32_t *block_count);
+
+/* The part of the file that some blocks are: [offset, offset + bytes). Errors: E_RANGE when they
+   are not all there. */
+TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, uint32_t first_block,
+                                               uint32_t block_count, uint64_t *offset,
+                                               uint64_t *bytes);
+
+/* Bytes of scratch for one block, or for the end. 0 when the descriptor is wrong. 13 MiB for blocks
+   of level 4 in chunks of 64; for the end 520 bytes a block, and 2 for each of its samples. */
+TERRIMP_API size_t terrimp_pages_scratch_bytes(const terrimp_pages_desc *desc);
+
+/* Builds one block: reads it and 2^block_level samples round it, stores its pages, the topmost as
+   the last one.
+
+   scratch    [bytes] at least terrimp_pages_scratch_bytes, aligned to 8 bytes; not shared
+   Errors     E_PAGE when read or store says no; E_VOID; E_RANGE for a height outside of the range
+   Cost       that of terrimp_terrain_build_node for each of its nodes */
+TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *desc, uint32_t block,
+                                                     void *scratch, size_t bytes);
+
+/* Whether a block has been built: looks at its topmost page. Errors: E_PAGE when load says no;
+   E_BAKE when it is damaged, or of other settings. */
+TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
+                                                     uint32_t block, void *scratch, size_t bytes);
+
+/* Builds the levels above the blocks, then the header, from the blocks. Errors: E_PAGE when a
+   callback says no; E_BAKE for a damaged page. */
+TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,
+                                                   size_t bytes);
 
 /* ==== Visible sets ======================================================= >>visible-sets */
 
@@ -3911,6 +4120,75 @@ static void terrimpi_tree_box(const terrimp_quadtree *t, const terrimp_node *n, 
     box->max[2] = terrimpi_tree_z(t, n->level, j + t->chunk_quads);
 }
 
+/* ---- what is kept of it ---- */
+
+/* A place for a page, see the room Residency. */
+typedef struct terrimpi_page_slot {
+    uint32_t node;      /* whose page it has or waits for; node_count: none */
+    uint32_t used;      /* the last frame that had a use for it */
+    uint8_t is_here;    /* the page has come and is good */
+    uint8_t children;   /* nodes below that have a slot */
+} terrimpi_page_slot;
+
+struct terrimp_pages {
+    terrimpi_page_slot *slots; /* [slot_count] */
+    unsigned char *pages;      /* [slot_count][page_bytes] */
+    const unsigned char *root; /* the record of the root */
+    const float *lows;         /* heights of the floor's vertices */
+    uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
+    uint32_t slot_count, page_bytes, node_count;
+    uint32_t frame, block_level, stamp;
+};
+
+#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
+#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
+
+/* The page of a node, NULL when it is not here. */
+static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint32_t node)
+{
+    uint32_t slot = p->slot_of[node];
+    return slot && p->slots[slot - 1u].is_here ? p->pages + (size_t)(slot - 1u) * p->page_bytes
+                                               : NULL;
+}
+
+/* The record of a node: its parent's page has it. NULL when that is not here. */
+static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
+{
+    terrimp_node n;
+    const unsigned char *page;
+    if (number + 1u == t->node_count)
+        return t->pages->root;
+    n = terrimpi_tree_node(t, number);
+    page = terrimpi_page_of(t->pages, terrimpi_tree_parent(t, &n).number);
+    return page ? page + TERRIMPI_PAGE_CHILDREN +
+                      (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
+}
+
+/* What PICTURE asks of a node for those below it: the last number of its record. */
+static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
+{
+    return *(const float *)(const void *)(terrimpi_page_record(t, number) +
+                                          TERRIMPI_PAGE_RECORD - sizeof(float));
+}
+
+/* Heights and errors of a node. */
+static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtree *t,
+                                                            uint32_t number)
+{
+    return t->nodes ? t->nodes + number
+                    : (const struct terrimp_geomip_node *)(const void *)
+                          terrimpi_page_record(t, number);
+}
+
+/* Whether there is anything to be known of a tree's nodes. */
+static int terrimpi_tree_is_built(const terrimp_quadtree *t) { return t->nodes || t->pages; }
+
+/* Whether anything is known of a node's children. */
+static int terrimpi_tree_opens(const terrimp_quadtree *t, uint32_t number)
+{
+    return !t->pages || terrimpi_page_of(t->pages, number);
+}
+
 /* ---- its children, closest first ---- */
 
 /* The children of a node above level 0, in the order in which an eye comes upon them: none hides
@@ -3968,7 +4246,7 @@ static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_vi
 {
     terrimp_node children[4];
     uint32_t count;
-    if (visit->node.level == 0)
+    if (visit->node.level == 0 || !terrimpi_tree_opens(walk->tree, visit->node.number))
         return;
     count = terrimpi_tree_children(walk->tree, &visit->node, walk->eye, children);
     while (count > 0) {
@@ -4169,7 +4447,8 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 
 static void terrimpi_mip_box(const terrimp_quadtree *t, const terrimp_node *n, terrimp_box *box)
 {
-    terrimpi_tree_box(t, n, t->nodes[n->number].low, t->nodes[n->number].high, box);
+    const terrimp_geomip_node *kept = terrimpi_tree_kept(t, n->number);
+    terrimpi_tree_box(t, n, kept->low, kept->high, box);
 }
 
 /* The box within which a node's error holds: half a quad larger all round, for what finer
@@ -4189,8 +4468,9 @@ TERRIMP_API terrimp_result terrimp_geomip_box(const terrimp_quadtree *tree, uint
                                               terrimp_box *box)
 {
     terrimp_node n;
-    TERRIMPI_REFUSE(!tree || !box || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!tree || !box || !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_tree_kept(tree, node), TERRIMP_E_PAGE);
     n = terrimpi_tree_node(tree, node);
     terrimpi_mip_box(tree, &n, box);
     return TERRIMP_OK;
@@ -4236,8 +4516,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
 static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, uint32_t node,
                                    int rule, float tolerance_px, float pixel_factor)
 {
-    const terrimp_geomip_node *n = &t->nodes[node];
-    float d;
+    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
+    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
     if (level == 0)
         return 0.0f;
     if (rule == TERRIMP_GEOMIP_BOUND || rule == TERRIMP_GEOMIP_DISTANCE) {
@@ -4251,7 +4531,7 @@ static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, ui
            same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
            is equal over all nodes where rms * quad / d^2 is. */
         float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
-        d = n->rms * pixel_factor * (quad * pixel_factor) /
+        d = rms * pixel_factor * (quad * pixel_factor) /
             (tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
     }
     return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
@@ -4266,7 +4546,7 @@ static int terrimpi_mip_rule_fits(int rule)
 static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, float tolerance_px,
                                          float morph_ratio)
 {
-    TERRIMPI_REFUSE(!t || !t->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!t || !terrimpi_tree_is_built(t), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(rule) ||
                     !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
@@ -4308,6 +4588,7 @@ typedef struct terrimpi_mip_frame {
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
     float relief;              /* what measures are multiplied with */
+    float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
@@ -4405,8 +4686,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp_node *node,
                                       int *planes)
 {
-    float d2, measure, split2 = f->view->distances[node->number];
+    float d2, measure, split2;
     terrimp_box box;
+    split2 = !f->tree->pages ? f->view->distances[node->number]
+                             : terrimpi_mip_distance(f->tree, node->level, node->number,
+                                                     f->view->rule, f->view->tolerance_px,
+                                                     f->factor);
     if (!(split2 > 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
@@ -4581,6 +4866,9 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     wanted[2] = v->morph_ratio;
     wanted[3] = v->rule == TERRIMP_GEOMIP_DISTANCE ? pixel_factor / f->cos2 : pixel_factor;
     wanted[4] = 1.0f;
+    f->factor = wanted[3];
+    if (f->tree->pages) /* they say what those below ask of them */
+        return;
     if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
@@ -4644,6 +4932,7 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
     terrimp_camera c;
     terrimp_result result;
     TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(tree->pages, TERRIMP_E_PAGE);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     v = *view;
     TERRIMPI_TRY(terrimpi_mip_view_resolve(tree, &v));
@@ -4704,6 +4993,7 @@ TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *
     terrimp_node n;
     uint32_t i, j, i0, j0;
     TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(tree->pages, TERRIMP_E_PAGE);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
     n = terrimpi_tree_node(tree, node);
     i0 = n.x * tree->chunk_quads;
@@ -5771,6 +6061,14 @@ typedef struct terrimpi_mesh_point_steps {
     float height;
 } terrimpi_mesh_point_steps;
 
+/* What a page's record has beside heights and errors of the ground, which it begins with. */
+typedef struct terrimpi_record {
+    terrimp_geomip_node ground;
+    terrimpi_mesh mesh;
+    float held; /* the largest of its rms and of half of what its children hold: what PICTURE asks
+                   of a node for those below it */
+} terrimpi_record;
+
 struct terrimp_terrain {
     uint32_t border_limit, vertex_limit, index_limit; /* of one surface; the last ones are kept */
     uint32_t vertex_stride, index_stride;  /* of the host's buffers */
@@ -5939,6 +6237,34 @@ static float terrimpi_terrain_z(const terrimp_terrain *t, uint32_t row)
     return terrimpi_tree_z(&t->tree, 0, row);
 }
 
+static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t node)
+{
+    if (t->meshes)
+        return &t->meshes[node];
+    return &((const terrimpi_record *)(const void *)terrimpi_page_record(&t->tree, node))->mesh;
+}
+
+/* The node of the built terrain that a node is, or repeats. */
+static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
+{
+    return t->real ? t->real[node] : node;
+}
+
+/* The stored vertices of a node's mesh, and behind them the words with its indices. */
+static const uint32_t *terrimpi_points_of(const terrimp_terrain *t, uint32_t node)
+{
+    if (t->points)
+        return t->points + (size_t)terrimpi_real_node(t, node) * t->vertex_limit;
+    return (const uint32_t *)(const void *)(terrimpi_page_of(t->tree.pages, node) +
+                                            TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD);
+}
+
+static const uint32_t *terrimpi_corners_of(const terrimp_terrain *t, uint32_t node)
+{
+    return t->corners ? t->corners + (size_t)terrimpi_real_node(t, node) * (t->index_limit / 4u)
+                      : terrimpi_points_of(t, node) + t->vertex_limit;
+}
+
 static uint32_t terrimpi_mesh_triangles(const terrimpi_mesh *mesh)
 {
     return mesh->counts & 0x1ffu;
@@ -5969,12 +6295,6 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
     return t->range_low + t->range_step * (float)steps;
 }
 
-/* The node of the built terrain that a node is, or repeats. */
-static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
-{
-    return t->real ? t->real[node] : node;
-}
-
 static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
 {
     terrimp_node n = *node;
@@ -5991,8 +6311,8 @@ static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
                                                      const terrimpi_terrain_tile *p,
                                                      uint32_t node, uint32_t i)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node];
-    uint32_t word = t->points[(size_t)terrimpi_real_node(t, node) * t->vertex_limit + i];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
+    uint32_t word = terrimpi_points_of(t, node)[i];
     terrimpi_mesh_point_steps point;
     point.x = word & 0xffu;
     point.z = word >> 8 & 0xffu;
@@ -6010,8 +6330,7 @@ static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
 /* Index i of a node's mesh. */
 static uint32_t terrimpi_mesh_corner(const terrimp_terrain *t, uint32_t node, uint32_t i)
 {
-    node = terrimpi_real_node(t, node);
-    return t->corners[(size_t)node * (t->index_limit / 4u) + i / 4u] >> i % 4u * 8u & 0xffu;
+    return terrimpi_corners_of(t, node)[i / 4u] >> i % 4u * 8u & 0xffu;
 }
 
 /* Whether a range of heights does not overflow, nor squared errors that are summed up over all
@@ -6031,14 +6350,23 @@ static terrimp_result terrimpi_terrain_check_node(const terrimp_terrain *terrain
 {
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
-    return node < terrain->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
+    TERRIMPI_REFUSE(node >= terrain->tree.node_count, TERRIMP_E_RANGE);
+    return terrimpi_tree_kept(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
+}
+
+/* The same for what only a node's page has. */
+static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32_t node,
+                                          const void *out)
+{
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, out));
+    return terrimpi_tree_opens(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
 /* The box of a node: of everything drawn of it and of those below it. */
 static void terrimpi_terrain_node_box(const terrimp_terrain *t, const terrimp_node *node,
                                       terrimp_box *box)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node->number];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node->number);
     terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
 }
 
@@ -6052,15 +6380,25 @@ TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrai
     return TERRIMP_OK;
 }
 
+/* How many meshes the host's buffers have room for, and which place is a node's. */
+static uint32_t terrimpi_mesh_places(const terrimp_terrain *t)
+{
+    return t->tree.pages ? t->tree.pages->slot_count : t->tree.node_count;
+}
+
+static uint32_t terrimpi_mesh_at(const terrimp_terrain *t, uint32_t node)
+{
+    return t->tree.pages ? t->tree.pages->slot_of[node] - 1u : terrimpi_real_node(t, node);
+}
+
 /* Where a node's mesh stands in the host's buffers, and how good it is. */
 static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp_mesh_info *info)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
     uint32_t rim = t->desc.no_lower_skirts ? 0u : terrimpi_mesh_border(mesh);
-    node = terrimpi_real_node(t, node);
-    info->base_vertex = node * t->vertex_stride;
+    info->base_vertex = terrimpi_mesh_at(t, node) * t->vertex_stride;
     info->vertex_count = terrimpi_mesh_vertices(mesh) + rim;
-    info->first_index = node * t->index_stride;
+    info->first_index = terrimpi_mesh_at(t, node) * t->index_stride;
     info->triangle_count = terrimpi_mesh_triangles(mesh);
     info->index_count = 3u * info->triangle_count + 6u * rim;
     info->error = mesh->error;
@@ -6070,7 +6408,7 @@ static void terrimpi_mesh_place(const terrimp_terrain *t, uint32_t node, terrimp
 TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terrain, uint32_t node,
                                                     terrimp_mesh_info *mesh)
 {
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, mesh));
+    TERRIMPI_TRY(terrimpi_check_page(terrain, node, mesh));
     terrimpi_mesh_place(terrain, node, mesh);
     return TERRIMP_OK;
 }
@@ -6266,8 +6604,10 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->mesh_index_stride = terrain->index_stride;
     info->floor_vertex_count = terrimpi_floor_vertices(terrain);
     info->floor_index_count = terrimpi_floor_indices(terrain);
-    info->mesh_vertex_count = tree->node_count * terrain->vertex_stride + info->floor_vertex_count;
-    info->mesh_index_count = tree->node_count * terrain->index_stride + info->floor_index_count;
+    info->mesh_vertex_count =
+        terrimpi_mesh_places(terrain) * terrain->vertex_stride + info->floor_vertex_count;
+    info->mesh_index_count =
+        terrimpi_mesh_places(terrain) * terrain->index_stride + info->floor_index_count;
     info->mesh_triangle_count = terrain->mesh_triangle_count;
     root = terrimpi_tree_root(tree);
     terrimpi_terrain_node_box(terrain, &root, &info->box);
@@ -6297,12 +6637,52 @@ static size_t terrimpi_terrain_ground_vertices(const terrimp_terrain *t)
     return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
+/* The samples of a page, [chunk_quads + 1]^2 in 16 bits. */
+static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node)
+{
+    return terrimpi_corners_of(t, node) + t->index_limit / 4u;
+}
+
+/* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
+   is taken for a whole one. */
+static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_t node)
+{
+    terrimp_heightfield f = t->desc.field;
+    terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
+    f.samples = terrimpi_page_samples(t, node);
+    f.format = f.format == TERRIMP_FORMAT_S16 ? f.format : TERRIMP_FORMAT_U16;
+    f.row_bytes = 2u * (t->desc.chunk_quads + 1u);
+    f.origin_x = terrimpi_terrain_x(t, p.x);
+    f.origin_z = terrimpi_terrain_z(t, p.z);
+    f.spacing_x *= (float)(1u << p.level);
+    f.spacing_z *= (float)(1u << p.level);
+    f.width = p.cols;
+    f.depth = p.rows;
+    return f;
+}
+
+static void terrimpi_fill_page_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
+{
+    terrimp_heightfield f = terrimpi_page_field(t, node);
+    terrimp_node n = terrimpi_tree_node(&t->tree, node);
+    uint32_t quads = t->desc.chunk_quads, i, j;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++) {
+            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
+            *xyz++ = terrimpi_field_sample(&f, i, j);
+            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
+        }
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, xyz));
+    TERRIMPI_TRY(terrimpi_check_page(terrain, node, xyz));
     TERRIMPI_REFUSE(capacity < 3u * terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
-    return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
+    if (!terrain->tree.pages)
+        return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
+    terrimpi_fill_page_ground(terrain, node, xyz);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
@@ -6311,6 +6691,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       size_t capacity)
 {
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, vertices));
+    TERRIMPI_REFUSE(terrain->tree.pages, TERRIMP_E_PAGE);
     TERRIMPI_REFUSE(capacity < terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
 }
@@ -6322,14 +6703,16 @@ static void terrimpi_floor_write_ground(const terrimp_terrain *t, float *xyz, ui
 {
     uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
     uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level], x, z, i, k;
-    const terrimp_geomip_node *nodes = t->tree.nodes + t->tree.level_first[level];
+    const terrimp_geomip_node *nodes = t->tree.nodes;
     terrimpi_terrain_pattern all;
     for (z = 0; z <= deep; z++)
         for (x = 0; x <= wide; x++) {
             float low = TERRIMPI_FLOAT_MAX;
-            for (k = z ? z - 1u : 0; k <= terrimpi_min_u32(z, deep - 1u); k++)
+            for (k = z ? z - 1u : 0; nodes && k <= terrimpi_min_u32(z, deep - 1u); k++)
                 for (i = x ? x - 1u : 0; i <= terrimpi_min_u32(x, wide - 1u); i++)
-                    low = terrimpi_min(low, nodes[k * wide + i].low);
+                    low = terrimpi_min(low, nodes[t->tree.level_first[level] + k * wide + i].low);
+            if (!nodes)
+                low = t->tree.pages->lows[z * (wide + 1u) + x];
             *xyz++ = terrimpi_terrain_x(t, x * quads);
             *xyz++ = low;
             *xyz++ = terrimpi_terrain_z(t, z * quads);
@@ -6391,10 +6774,11 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
         terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
-        xyz[3u * k + 1u] = t->meshes[root.number].low;
+        xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
-        top[1] = terrimpi_min(terrimpi_terrain_lowest(t, before, at),
-                              terrimpi_terrain_lowest(t, at, after));
+        top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
+                               : terrimpi_min(terrimpi_terrain_lowest(t, before, at),
+                                              terrimpi_terrain_lowest(t, at, after));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
     for (i = first; i < terrimpi_floor_indices(t); i++)
@@ -6413,12 +6797,13 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
 static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
                                       uint32_t i)
 {
-    const terrimp_geomip_node *range = &t->tree.nodes[node];
-    uint32_t n = terrimpi_mesh_border(&t->meshes[node]);
+    const terrimp_geomip_node *range = terrimpi_tree_kept(&t->tree, node);
+    uint32_t n = terrimpi_mesh_border(terrimpi_mesh_of(t, node));
     float height = border[i * 3u + 1u];
     float lowest = terrimpi_min(border[(i + 1u) % n * 3u + 1u],
                                 border[(i + n - 1u) % n * 3u + 1u]);
-    float depth = terrimpi_max(2.0f * t->meshes[node].error, 0.25f * (range->high - range->low));
+    float depth = terrimpi_max(2.0f * terrimpi_mesh_of(t, node)->error,
+                               0.25f * (range->high - range->low));
     if (terrimpi_min(lowest, height) - depth <= range->low)
         return terrimpi_min(height, range->low);
     return height - depth;
@@ -6429,9 +6814,9 @@ static void terrimpi_mesh_write(const terrimp_terrain *t, uint32_t node, float *
                                 uint16_t *indices)
 {
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
-    uint32_t border = terrimpi_mesh_border(&t->meshes[node]), i;
-    uint32_t vertices = terrimpi_mesh_vertices(&t->meshes[node]);
-    uint32_t index_count = 3u * terrimpi_mesh_triangles(&t->meshes[node]);
+    uint32_t border = terrimpi_mesh_border(terrimpi_mesh_of(t, node)), i;
+    uint32_t vertices = terrimpi_mesh_vertices(terrimpi_mesh_of(t, node));
+    uint32_t index_count = 3u * terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     float *rim = xyz + (size_t)vertices * 3u;
     memset(xyz, 0, (size_t)t->vertex_stride * 3u * sizeof *xyz);
     memset(indices, 0, t->index_stride * sizeof *indices);
@@ -6462,6 +6847,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
     TERRIMPI_REFUSE(node > terrain->tree.node_count, TERRIMP_E_RANGE);
     is_floor = node == terrain->tree.node_count;
+    TERRIMPI_REFUSE(!is_floor && !terrimpi_tree_opens(&terrain->tree, node), TERRIMP_E_PAGE);
     vertices = is_floor ? terrimpi_floor_vertices(terrain) : terrain->vertex_stride;
     index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
     TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
@@ -6479,7 +6865,9 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
 {
     size_t node, vertex_stride, index_stride;
     TERRIMPI_REFUSE(!indices, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, 0, xyz));
+    TERRIMPI_REFUSE(!terrain || !xyz, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(terrain->tree.pages, TERRIMP_E_PAGE);
     vertex_stride = terrain->vertex_stride;
     index_stride = terrain->index_stride;
     node = terrain->tree.node_count;
@@ -6598,15 +6986,14 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
 /* ---- validation: nothing of a block is used before it has been looked at ---- */
 
 /* Fills in a terrain from a header in this machine's byte order: all but the arrays and the field's
-   samples. Returns 0 when the header is wrong or speaks of more bytes than there are. */
-static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp_terrain *t)
+   samples. Returns 0 when the header is wrong. */
+static int terrimpi_bake_header(const terrimpi_bake *bake, uint32_t version, terrimp_terrain *t)
 {
     static const float any = 0.0f; /* stands for the samples: they are not looked at */
     terrimp_terrain_desc desc;
-    size_t arrays;
     memset(t, 0, sizeof *t);
     memset(&desc, 0, sizeof desc);
-    if (bake->version != TERRIMP_BAKE_VERSION || bake->format == 0 ||
+    if (bake->version != version || bake->format == 0 ||
         bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
         bake->triangle_budget == 0 || bake->flags > 3u)
         return 0;
@@ -6623,11 +7010,7 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
     desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
     desc.height_low = bake->height_low;
     desc.height_high = bake->height_high;
-    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK)
-        return 0;
-    arrays = terrimpi_terrain_layout(t, NULL);
-    if (arrays == 0 || bytes < sizeof *bake || arrays != (size_t)bake->bytes - sizeof *bake ||
-        bake->bytes < sizeof *bake || bake->bytes > bytes)
+    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK || !terrimpi_terrain_count(t))
         return 0;
     t->mesh_triangle_count = bake->mesh_triangle_count;
     t->sample_low = bake->sample_low;
@@ -6640,6 +7023,14 @@ static int terrimpi_bake_header(const terrimpi_bake *bake, size_t bytes, terrimp
            terrimpi_terrain_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
+/* Whether a header speaks of no more bytes than there are. */
+static int terrimpi_bake_bytes_fit(const terrimpi_bake *bake, size_t bytes, terrimp_terrain *t)
+{
+    size_t arrays = terrimpi_terrain_layout(t, NULL);
+    return arrays && bake->bytes >= sizeof *bake && bake->bytes <= bytes &&
+           arrays == (size_t)bake->bytes - sizeof *bake;
+}
+
 /* Sets the arrays of a terrain to those of a bake. Only reading functions touch them then. */
 static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
 {
@@ -6650,7 +7041,7 @@ static void terrimpi_bake_arrays_at(terrimp_terrain *t, const void *block)
 static int terrimpi_bake_loop_ok(const terrimp_terrain *t, const terrimpi_terrain_tile *tile,
                                  uint32_t node)
 {
-    uint32_t i, count = terrimpi_mesh_border(&t->meshes[node]);
+    uint32_t i, count = terrimpi_mesh_border(terrimpi_mesh_of(t, node));
     uint32_t last_x = tile->cols - 1u, last_z = tile->rows - 1u;
     terrimpi_mesh_point_steps p = terrimpi_mesh_point(t, tile, node, 0), q;
     if (p.x != 0 || p.z != 0)
@@ -6687,7 +7078,7 @@ static uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
 static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                     uint32_t node)
 {
-    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
     int64_t all = 0;
     uint32_t i, k, edges = 0, border = terrimpi_mesh_border(mesh);
     for (i = 0; i < border; i++)
@@ -6717,8 +7108,8 @@ static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_ter
 /* Whether all numbers of one node are what building could have made. */
 static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
 {
-    const terrimp_geomip_node *ground = &t->tree.nodes[node];
-    const terrimpi_mesh *mesh = &t->meshes[node];
+    const terrimp_geomip_node *ground = terrimpi_tree_kept(&t->tree, node);
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
     const float most = TERRIMPI_FLOAT_MAX;
     float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
     uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
@@ -6748,10 +7139,11 @@ static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
     uint32_t parent =
         node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
-    const terrimp_geomip_node *c = &t->tree.nodes[node], *p = &t->tree.nodes[parent];
+    const terrimp_geomip_node *c = terrimpi_tree_kept(&t->tree, node);
+    const terrimp_geomip_node *p = terrimpi_tree_kept(&t->tree, parent);
     return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
-           t->meshes[node].low >= t->meshes[parent].low &&
-           t->meshes[node].high <= t->meshes[parent].high;
+           terrimpi_mesh_of(t, node)->low >= terrimpi_mesh_of(t, parent)->low &&
+           terrimpi_mesh_of(t, node)->high <= terrimpi_mesh_of(t, parent)->high;
 }
 
 /* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
@@ -6767,7 +7159,9 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
     TERRIMPI_REFUSE(bytes < sizeof bake, TERRIMP_E_BAKE);
     memcpy(&bake, block, sizeof bake);
     TERRIMPI_REFUSE(bake.magic == TERRIMPI_BAKE_MAGIC_SWAPPED, TERRIMP_E_ORDER);
-    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, t) ||
+    TERRIMPI_REFUSE(bake.magic != TERRIMPI_BAKE_MAGIC ||
+                    !terrimpi_bake_header(&bake, TERRIMP_BAKE_VERSION, t) ||
+                    !terrimpi_bake_bytes_fit(&bake, bytes, t) ||
                     terrimpi_bake_hash(block) != bake.checksum, TERRIMP_E_BAKE);
     TERRIMPI_REFUSE(field && (field->width != f->width || field->depth != f->depth ||
                               field->format != f->format ||
@@ -6777,7 +7171,7 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
     for (node = 0; node < t->tree.node_count; node++) {
         if (!terrimpi_bake_node_ok(t, node) || !terrimpi_bake_parent_ok(t, node))
             return TERRIMP_E_BAKE;
-        triangles += terrimpi_mesh_triangles(&t->meshes[node]);
+        triangles += terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     }
     return triangles == t->mesh_triangle_count ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
@@ -7448,6 +7842,599 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
     return TERRIMP_OK;
 }
 
+/* ==== Residency ========================================================== >>impl-residency */
+/* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
+   terrain only while it is made).
+
+   The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
+   is known of a node hangs on its parent's page alone. */
+
+#define TERRIMPI_PAGES_MAGIC 0x54494d51u
+#define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
+
+/* What a page begins with; then come the records of the children, vertices and indices of the mesh
+   and the samples. */
+typedef struct terrimpi_page_head {
+    uint32_t checksum; /* of all behind it */
+    uint32_t stamp, node;
+    terrimpi_record record;
+} terrimpi_page_head;
+
+/* What a file begins with; then come the heights of the floor. */
+typedef struct terrimpi_pages_head {
+    terrimpi_bake bake; /* of no arrays: bytes are those of the header */
+    uint32_t block_level, stamp;
+    terrimpi_record root;
+} terrimpi_pages_head;
+
+static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
+{
+    uint32_t side = t->desc.chunk_quads + 1u;
+    uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
+                     t->index_limit + 2u * side * side;
+    return (bytes + 15u) / 16u * 16u;
+}
+
+/* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
+   its top down, and on each level four children side by side ---- */
+
+/* Nodes of so many levels of a full tree, from the root down. */
+static uint32_t terrimpi_page_full(uint32_t levels) { return ((1u << 2u * levels) - 1u) / 3u; }
+
+/* Interleaves the bits of a column and a row. */
+static uint32_t terrimpi_page_interleave(uint32_t x, uint32_t z)
+{
+    uint32_t bit, out = 0;
+    for (bit = 0; bit < 16u; bit++)
+        out |= (x >> bit & 1u) << 2u * bit | (z >> bit & 1u) << (2u * bit + 1u);
+    return out;
+}
+
+/* Pages above the blocks. */
+static uint32_t terrimpi_page_upper(const terrimp_quadtree *t, uint32_t block_level)
+{
+    return t->node_count - t->level_first[block_level + 1u];
+}
+
+static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_level,
+                                     const terrimp_node *n)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t index = n->number - tree->level_first[block_level + 1u];
+    if (n->level <= block_level) {
+        uint32_t up = block_level - n->level, mask = (1u << up) - 1u;
+        index = terrimpi_page_upper(tree, block_level) +
+                ((n->z >> up) * tree->level_x[block_level] + (n->x >> up)) *
+                    terrimpi_page_full(block_level + 1u) +
+                terrimpi_page_full(up) + terrimpi_page_interleave(n->x & mask, n->z & mask);
+    }
+    return TERRIMP_PAGES_HEADER_BYTES + (uint64_t)index * terrimpi_page_bytes(t);
+}
+
+/* ---- the header ---- */
+
+static int terrimpi_record_ok(const terrimpi_record *r)
+{
+    const float most = TERRIMPI_FLOAT_MAX;
+    return terrimpi_within(r->ground.error, 0.0f, most) &&
+           terrimpi_within(r->ground.rms, 0.0f, most) &&
+           terrimpi_within(r->held, r->ground.rms, most) &&
+           terrimpi_within(r->mesh.error, 0.0f, most) &&
+           terrimpi_within(r->mesh.error_rms, 0.0f, most) &&
+           terrimpi_within(r->mesh.low, -most, most) &&
+           terrimpi_within(r->mesh.high, r->mesh.low, most) &&
+           terrimpi_within(r->ground.low, r->mesh.low, r->mesh.high) &&
+           terrimpi_within(r->ground.high, r->ground.low, r->mesh.high);
+}
+
+/* Reads a header into a terrain, all but its memory. */
+static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terrimp_terrain *t,
+                                          terrimpi_pages_head *head)
+{
+    const unsigned char *lows = (const unsigned char *)header + sizeof *head;
+    uint32_t i;
+    TERRIMPI_REFUSE(!header, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(bytes < TERRIMP_PAGES_HEADER_BYTES, TERRIMP_E_BAKE);
+    memcpy(head, header, sizeof *head);
+    TERRIMPI_REFUSE(head->bake.magic == TERRIMPI_PAGES_MAGIC_SWAPPED, TERRIMP_E_ORDER);
+    TERRIMPI_REFUSE(head->bake.magic != TERRIMPI_PAGES_MAGIC ||
+                    head->bake.bytes != TERRIMP_PAGES_HEADER_BYTES ||
+                    terrimpi_bake_hash(header) != head->bake.checksum ||
+                    !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
+                    t->desc.field.format == TERRIMP_FORMAT_F32 ||
+                    head->block_level >= t->tree.level_count ||
+                    terrimpi_page_upper(&t->tree, head->block_level) +
+                        (uint64_t)t->tree.level_x[head->block_level] *
+                            t->tree.level_z[head->block_level] *
+                            terrimpi_page_full(head->block_level + 1u) > 0xffffffffu ||
+                    !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
+    for (i = 0; i < terrimpi_floor_ground_vertices(t) + terrimpi_floor_wall_points(t); i++) {
+        float height;
+        memcpy(&height, lows + i * sizeof height, sizeof height);
+        TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_BAKE);
+    }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
+                                               terrimp_pages_info *info)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    terrimp_node last;
+    uint32_t edge;
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    if (!info)
+        return TERRIMP_OK;
+    edge = (1u << head.block_level) - 1u;
+    last = terrimpi_tree_at(&t.tree, head.block_level, t.tree.level_x[head.block_level] - 1u,
+                            t.tree.level_z[head.block_level] - 1u);
+    last.level = 0; /* the last node of a block, whether there is one or not */
+    last.x = (last.x << head.block_level) + edge;
+    last.z = (last.z << head.block_level) + edge;
+    memset(info, 0, sizeof *info);
+    info->page_bytes = terrimpi_page_bytes(&t);
+    info->bytes = terrimpi_page_offset(&t, head.block_level, &last) + info->page_bytes;
+    info->width = t.desc.field.width;
+    info->depth = t.desc.field.depth;
+    info->chunk_quads = t.desc.chunk_quads;
+    info->level_count = t.tree.level_count;
+    info->node_count = t.tree.node_count;
+    info->block_level = head.block_level;
+    info->stamp = head.stamp;
+    info->height_scale = t.desc.field.height_scale;
+    info->height_offset = t.desc.field.height_offset;
+    return TERRIMP_OK;
+}
+
+/* The one description of the block: sets the arrays when there is a base. */
+static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pages *p,
+                                    unsigned char *base, unsigned char **head)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    terrimpi_take(&b, 1, sizeof *t);
+    terrimpi_take(&b, 1, sizeof *p);
+    *head = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
+    p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
+    p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
+    p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
+    return b.ok ? b.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *none;
+    if (!terrimpi_within_u32(slot_count, 8u, 65534u) ||
+        terrimpi_pages_read(header, bytes, &t, &head) != TERRIMP_OK)
+        return 0;
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    return terrimpi_pages_layout(&t, &p, NULL, &none);
+}
+
+TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
+                                              size_t bytes, uint32_t slot_count, void *memory,
+                                              size_t memory_bytes, terrimp_terrain **terrain)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *copy;
+    uint32_t i;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    TERRIMPI_REFUSE(!terrimpi_within_u32(slot_count, 8u, 65534u), TERRIMP_E_RANGE);
+    memset(&p, 0, sizeof p);
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    p.node_count = t.tree.node_count;
+    p.block_level = head.block_level;
+    p.stamp = head.stamp;
+    p.frame = 2;
+    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
+                                      terrimpi_pages_layout(&t, &p, NULL, &copy)));
+    if (field) {
+        terrimp_heightfield place = *field;
+        place.samples = header;
+        place.width = t.desc.field.width;
+        place.depth = t.desc.field.depth;
+        place.format = t.desc.field.format;
+        place.row_bytes = 0;
+        place.height_scale = t.desc.field.height_scale;
+        place.height_offset = t.desc.field.height_offset;
+        TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
+    }
+    t.desc.field.samples = NULL; /* there are none but those of pages */
+    t.desc.field.has_no_data = t.desc.field.wrap = 0;
+    t.tree.field = t.desc.field;
+    t.begun = t.built = t.baked = 1;
+    terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
+    memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
+    memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
+    p.root = copy + offsetof(terrimpi_pages_head, root);
+    p.lows = (const float *)(const void *)(copy + sizeof head);
+    for (i = 0; i < slot_count; i++)
+        p.slots[i].node = p.node_count;
+    t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
+    *t.tree.pages = p;
+    *(terrimp_terrain *)memory = t;
+    *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+/* ---- pages come and go ---- */
+
+static terrimp_result terrimpi_page_check(const terrimp_terrain *t, uint32_t node, const void *out)
+{
+    TERRIMPI_REFUSE(!t || !out, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!t->tree.pages, TERRIMP_E_STATE);
+    return node < t->tree.node_count ? TERRIMP_OK : TERRIMP_E_RANGE;
+}
+
+/* The slot of a node, NULL when it has none. */
+static terrimpi_page_slot *terrimpi_page_slot_of(const struct terrimp_pages *p, uint32_t node)
+{
+    return p->slot_of[node] ? p->slots + p->slot_of[node] - 1u : NULL;
+}
+
+/* The slot of a node's parent; NULL for the root. */
+static terrimpi_page_slot *terrimpi_page_above(const terrimp_quadtree *t, uint32_t node)
+{
+    return node + 1u < t->node_count
+               ? terrimpi_page_slot_of(t->pages, terrimpi_tree_parent_number(t, node)) : NULL;
+}
+
+TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain, uint32_t node,
+                                                 terrimp_page_info *info)
+{
+    const terrimpi_page_slot *slot;
+    terrimp_node n;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, info));
+    slot = terrimpi_page_slot_of(terrain->tree.pages, node);
+    n = terrimpi_tree_node(&terrain->tree, node);
+    info->offset = terrimpi_page_offset(terrain, terrain->tree.pages->block_level, &n);
+    info->bytes = terrain->tree.pages->page_bytes;
+    info->level = n.level;
+    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->is_here ? TERRIMP_PAGE_HERE
+                                                              : TERRIMP_PAGE_COMING;
+    info->slot = slot ? (uint32_t)(slot - terrain->tree.pages->slots) : 0u;
+    return TERRIMP_OK;
+}
+
+/* Whether a slot may be given up: it has a page that this frame does not use, nor has the one
+   before, and no page below it. The root stays. */
+static int terrimpi_page_is_spare(const struct terrimp_pages *p, const terrimpi_page_slot *slot)
+{
+    return slot->is_here && slot->children == 0 && slot->used + 1u < p->frame &&
+           slot->node + 1u < p->node_count;
+}
+
+static void terrimpi_page_clear(const terrimp_quadtree *t, terrimpi_page_slot *slot)
+{
+    terrimpi_page_slot *above = terrimpi_page_above(t, slot->node);
+    if (above)
+        above->children--;
+    t->pages->slot_of[slot->node] = 0;
+    slot->node = t->node_count;
+    slot->is_here = 0;
+}
+
+TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page)
+{
+    struct terrimp_pages *p;
+    terrimpi_page_slot *above, *found = NULL, *slot;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, page));
+    p = terrain->tree.pages;
+    above = terrimpi_page_above(&terrain->tree, node);
+    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && (!above || !above->is_here)),
+                    TERRIMP_E_STATE);
+    for (slot = p->slots; slot < p->slots + p->slot_count; slot++) {
+        if (slot->node == p->node_count) {
+            found = slot;
+            break;
+        }
+        if (slot != above && terrimpi_page_is_spare(p, slot) &&
+            (!found || slot->used < found->used))
+            found = slot;
+    }
+    TERRIMPI_REFUSE(!found, TERRIMP_E_CAPACITY);
+    if (found->node < p->node_count)
+        terrimpi_page_clear(&terrain->tree, found);
+    if (above)
+        above->children++;
+    found->node = node;
+    found->used = p->frame;
+    found->is_here = found->children = 0;
+    p->slot_of[node] = (uint16_t)(found - p->slots + 1);
+    *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
+    return TERRIMP_OK;
+}
+
+/* The slot of a page that has been begun; NULL: it has not. */
+static terrimpi_page_slot *terrimpi_page_begun(const terrimp_terrain *t, uint32_t node)
+{
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(t->tree.pages, node);
+    return slot && !slot->is_here ? slot : NULL;
+}
+
+/* Whether the records of a node's children are held by its own. */
+static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
+                                     const terrimpi_record *own)
+{
+    uint32_t i;
+    for (i = 0; i < 4u && n->level > 0; i++) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimpi_record r;
+        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
+                       i * TERRIMPI_PAGE_RECORD, sizeof r);
+        if (!terrimpi_record_ok(&r) || r.ground.low < own->ground.low ||
+            r.ground.high > own->ground.high || r.ground.error > own->ground.error ||
+            r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
+            0.5f * r.held > own->held)
+            return 0;
+    }
+    return 1;
+}
+
+/* Whether a page that has just come is that of its node, and all numbers of it are what building
+   could have made. */
+static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
+{
+    const struct terrimp_pages *p = t->tree.pages;
+    const unsigned char *page = terrimpi_page_of(p, node);
+    terrimpi_page_head head;
+    terrimpi_field_scan scan;
+    terrimp_heightfield f = terrimpi_page_field(t, node);
+    terrimp_node n = terrimpi_tree_node(&t->tree, node);
+    uint32_t at, hash = 2166136261u, word;
+    memcpy(&head, page, sizeof head);
+    for (at = 4u; at < p->page_bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    if (head.checksum != hash || head.stamp != p->stamp || head.node != node ||
+        memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
+        !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
+        return 0;
+    scan.skip_voids = 0;
+    return terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan) == TERRIMP_OK &&
+           terrimpi_field_world_height(&f, scan.low) >= head.record.ground.low &&
+           terrimpi_field_world_height(&f, scan.high) <= head.record.ground.high;
+}
+
+TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
+{
+    terrimpi_page_slot *slot;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
+    slot = terrimpi_page_begun(terrain, node);
+    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    slot->is_here = 1; /* to be looked at */
+    slot->used = terrain->tree.pages->frame;
+    if (terrimpi_page_ok(terrain, node))
+        return TERRIMP_OK;
+    terrimpi_page_clear(&terrain->tree, slot);
+    return TERRIMP_E_BAKE;
+}
+
+TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
+{
+    terrimpi_page_slot *slot;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
+    slot = terrimpi_page_begun(terrain, node);
+    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    terrimpi_page_clear(&terrain->tree, slot);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain)
+{
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, terrain));
+    terrain->tree.pages->frame++;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
+                                                   uint32_t capacity, uint32_t *count)
+{
+    const struct terrimp_pages *p;
+    uint32_t i;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
+    TERRIMPI_REFUSE(!nodes && capacity > 0, TERRIMP_E_NULL);
+    p = terrain->tree.pages;
+    *count = 0;
+    for (i = 0; i < p->slot_count; i++) {
+        const terrimpi_page_slot *slot = &p->slots[i];
+        if (slot->node == p->node_count || slot->is_here || slot->used + 1u >= p->frame)
+            continue;
+        if (*count < capacity)
+            nodes[*count] = slot->node;
+        ++*count;
+    }
+    return TERRIMP_OK;
+}
+
+/* ---- what a frame uses ---- */
+
+static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
+{
+    terrimpi_page_slot *slot = t->pages ? terrimpi_page_slot_of(t->pages, node) : NULL;
+    if (slot)
+        slot->used = t->pages->frame;
+}
+
+/* Whether a node may be left for its children: its page is here, and of these each in sight. */
+static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
+                                 const terrimp_frustum *frustum)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t i;
+    int all = 1;
+    if (!tree->pages)
+        return 1;
+    if (!terrimpi_page_of(tree->pages, node->number))
+        return 0;
+    terrimpi_page_use(tree, node->number);
+    for (i = 0; i < 4u && node->level > 0; i++) {
+        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
+        terrimp_node child;
+        terrimp_box box;
+        if (!terrimpi_tree_has(tree, node->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(tree, node->level - 1u, x, z);
+        terrimpi_terrain_node_box(t, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        terrimpi_page_use(tree, child.number);
+        all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+    }
+    return all;
+}
+
+/* ---- heights and rays ---- */
+
+/* The finest page that is here at a position. */
+static terrimp_node terrimpi_page_at(const terrimp_terrain *t, float x, float z)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    terrimp_node n = terrimpi_tree_root(tree);
+    while (n.level > 0) {
+        uint32_t level = n.level - 1u, quads = tree->chunk_quads, i, j;
+        terrimp_node child;
+        i = 2u * n.x + (x >= terrimpi_tree_x(tree, level, (2u * n.x + 1u) * quads) ? 1u : 0u);
+        j = 2u * n.z + (z >= terrimpi_tree_z(tree, level, (2u * n.z + 1u) * quads) ? 1u : 0u);
+        child = terrimpi_tree_at(tree, level, terrimpi_min_u32(i, tree->level_x[level] - 1u),
+                                 terrimpi_min_u32(j, tree->level_z[level] - 1u));
+        if (!terrimpi_page_of(tree->pages, child.number))
+            break;
+        n = child;
+    }
+    return n;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
+                                                  float *height, float normal[3], uint32_t *level)
+{
+    terrimp_heightfield f;
+    terrimp_node n;
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
+                                             height));
+    f = terrain->desc.field;
+    memset(&n, 0, sizeof n);
+    if (terrain->tree.pages) {
+        const terrimp_quadtree *tree = &terrain->tree;
+        TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
+        TERRIMPI_REFUSE(!terrimpi_within(x, f.origin_x, terrimpi_tree_x(tree, 0, f.width - 1u)) ||
+                        !terrimpi_within(z, f.origin_z, terrimpi_tree_z(tree, 0, f.depth - 1u)),
+                        TERRIMP_E_MISS);
+        n = terrimpi_page_at(terrain, x, z);
+        TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, n.number) || (n.level > 0 && !level),
+                        TERRIMP_E_PAGE);
+        f = terrimpi_page_field(terrain, n.number);
+    }
+    TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
+    if (normal)
+        TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
+    if (level)
+        *level = n.level;
+    return TERRIMP_OK;
+}
+
+/* Whether a ray comes into the columns and rows of a box before a distance. The direction's length
+   is 1. */
+static int terrimpi_page_on_way(const terrimp_box *box, const float origin[3],
+                                const float direction[3], float distance)
+{
+    float from = 0.0f, to = distance;
+    int i;
+    for (i = 0; i < 3; i++) {
+        float slack = 1e-5f * (terrimpi_abs(box->min[i]) + terrimpi_abs(box->max[i]) +
+                               terrimpi_abs(origin[i]));
+        float low = box->min[i] - origin[i] - slack, high = box->max[i] - origin[i] + slack;
+        if (direction[i] > -1e-12f && direction[i] < 1e-12f) {
+            if (low > 0.0f || high < 0.0f)
+                return 0;
+            continue;
+        }
+        from = terrimpi_max(from, (direction[i] > 0.0f ? low : high) / direction[i]);
+        to = terrimpi_min(to, (direction[i] > 0.0f ? high : low) / direction[i]);
+    }
+    return from <= to;
+}
+
+TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
+                                                   const float origin[3], const float direction[3],
+                                                   float max_distance, terrimp_ray_hit *hit,
+                                                   uint32_t *level)
+{
+    const terrimp_quadtree *tree;
+    terrimp_ray_hit best, found;
+    terrimpi_tree_walk walk;
+    terrimpi_tree_visit v;
+    float way[3], reach = max_distance;
+    uint32_t of = 0, coarsest = 0;
+    int is_met = 0;
+    TERRIMPI_REFUSE(!terrain || !origin || !direction, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    tree = &terrain->tree;
+    if (!tree->pages) {
+        if (level)
+            *level = 0;
+        return terrimp_heightfield_raycast(&terrain->desc.field, origin, direction, max_distance,
+                                           hit);
+    }
+    TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, tree->node_count - 1u), TERRIMP_E_PAGE);
+    memcpy(way, direction, sizeof way);
+    TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
+                    !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_normalize(way), TERRIMP_E_RANGE);
+    memset(&best, 0, sizeof best);
+    terrimpi_tree_begin(&walk, tree, origin, 0);
+    while (terrimpi_tree_next(&walk, &v)) {
+        terrimp_node children[4];
+        terrimp_heightfield f;
+        terrimp_box box;
+        uint32_t i, count = 0;
+        terrimpi_mip_box(tree, &v.node, &box);
+        if (!terrimpi_page_of(tree->pages, v.node.number) ||
+            !terrimpi_page_on_way(&box, origin, way, reach))
+            continue;
+        if (v.node.level > 0) /* those on the ray's way must all be here to answer for it */
+            count = terrimpi_tree_children(tree, &v.node, origin, children);
+        for (i = 0; i < count; i++) {
+            terrimpi_mip_box(tree, &children[i], &box);
+            if (!terrimpi_page_of(tree->pages, children[i].number) &&
+                terrimpi_page_on_way(&box, origin, way, reach))
+                break;
+        }
+        if (count > 0 && i == count) {
+            terrimpi_tree_enter(&walk, &v);
+            continue;
+        }
+        TERRIMPI_REFUSE(v.node.level > 0 && !level, TERRIMP_E_PAGE);
+        coarsest = terrimpi_max_u32(coarsest, v.node.level);
+        f = terrimpi_page_field(terrain, v.node.number);
+        if (terrimp_heightfield_raycast(&f, origin, direction, max_distance, &found) !=
+                TERRIMP_OK || (is_met && found.distance >= best.distance))
+            continue;
+        is_met = 1;
+        best = found;
+        of = v.node.level;
+        reach = found.distance;
+        best.x = (v.node.x * tree->chunk_quads + found.x) << of;
+        best.z = (v.node.z * tree->chunk_quads + found.z) << of;
+    }
+    if (level)
+        *level = is_met ? of : coarsest;
+    if (hit && is_met)
+        *hit = best;
+    return is_met ? TERRIMP_OK : TERRIMP_E_MISS;
+}
+
 /* ==== Capture ============================================================ >>impl-capture */
 /* Based on: Hess 2010, sections 3.3, 3.4, 6.2 and 6.5.
 
@@ -7502,7 +8489,8 @@ static int terrimpi_capture_aim(const terrimp_box *box, const float eye[3], cons
     return 1;
 }
 
-/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. */
+/* The largest rms error of a node's ground when it is drawn with nodes of a finer level. Negative
+   when a page is missing that would tell it. */
 static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const terrimp_node *node,
                                            uint32_t level)
 {
@@ -7511,21 +8499,31 @@ static float terrimpi_capture_source_error(const terrimp_quadtree *tree, const t
     uint32_t z1 = terrimpi_min_u32((node->z + 1u) << shift, tree->level_z[level]);
     float worst = 0.0f;
     for (z = node->z << shift; z < z1; z++)
-        for (x = node->x << shift; x < x1; x++)
-            worst = terrimpi_max(worst, tree->nodes[tree->level_first[level] +
-                                                    z * tree->level_x[level] + x].rms);
+        for (x = node->x << shift; x < x1; x++) {
+            const terrimp_geomip_node *kept = terrimpi_tree_kept(
+                tree, tree->level_first[level] + z * tree->level_x[level] + x);
+            if (!kept)
+                return -1.0f;
+            worst = terrimpi_max(worst, kept->rms);
+        }
     return worst;
 }
 
 /* The level of the ground that a picture is made of: the coarsest whose rms error [wu] keeps to a
-   limit. */
+   limit; or that of which this is not known yet, when *is_known becomes 0: pages of that level are
+   missing, and it needs them in any case. */
 static uint32_t terrimpi_capture_source(const terrimp_quadtree *tree, const terrimp_node *node,
-                                        float limit)
+                                        float limit, int *is_known)
 {
     uint32_t level = node->level;
-    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES &&
-           terrimpi_capture_source_error(tree, node, level) > limit)
+    float error = 0.0f;
+    while (level > 0 && node->level - level < TERRIMPI_CAPTURE_SOURCES) {
+        error = terrimpi_capture_source_error(tree, node, level);
+        if (!(error > limit))
+            break;
         level--;
+    }
+    *is_known = error >= 0.0f;
     return level;
 }
 
@@ -7581,7 +8579,8 @@ static float terrimpi_capture_overlap(const terrimp_terrain *t, const terrimpi_c
 {
     const terrimp_capture *c = &plan->camera;
     float drop = terrimpi_abs(c->eye[1] - 0.5f * (plan->box.min[1] + plan->box.max[1]));
-    return terrimpi_min(TERRIMPI_CAPTURE_OVERLAP * t->meshes[plan->node.number].error * c->z_far /
+    return terrimpi_min(TERRIMPI_CAPTURE_OVERLAP *
+                            terrimpi_mesh_of(t, plan->node.number)->error * c->z_far /
                             terrimpi_max(drop, 1e-20f),
                         c->z_far);
 }
@@ -7806,6 +8805,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
+#define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
+#define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
 #define TERRIMPI_VIEW_LIGHT_FIRST 0.7f /* ... the share of it after which the first are due */
@@ -8001,11 +9002,14 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     TERRIMP_E_RANGE);
     if (terrain->desc.field.wrap) {
         const terrimp_heightfield *f = &terrain->desc.field;
-        TERRIMPI_REFUSE(d.walls || (f->width - 1u) % terrain->desc.chunk_quads ||
+        TERRIMPI_REFUSE(d.walls || terrain->tree.pages ||
+                        (f->width - 1u) % terrain->desc.chunk_quads ||
                         (f->depth - 1u) % terrain->desc.chunk_quads ||
                         (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
                         (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
     }
+    TERRIMPI_REFUSE(terrain->tree.pages &&
+                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.walls), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -8206,7 +9210,8 @@ static int terrimpi_cache_shows(const terrimpi_cache_picture *picture, uint32_t 
 
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
-    TERRIMPI_CULL_IMPOSTOR = 2  /* the impostor cut does */
+    TERRIMPI_CULL_IMPOSTOR = 2, /* the impostor cut does, */
+    TERRIMPI_CULL_SHORT = 4     /* ... only because pages of its children are missing */
 };
 
 /* A node in sight. */
@@ -8245,7 +9250,8 @@ static int terrimpi_cull_hides(terrimpi_cull *cull, int behind, const terrimpi_f
 }
 
 /* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
-   that has a picture keeps its place for a little longer. */
+   that has a picture keeps its place for a little longer. Where pages of its children are missing
+   it has to, with TERRIMPI_CULL_SHORT. */
 static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *node, float closest,
                                   int has_picture)
 {
@@ -8257,11 +9263,14 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     if (node->level == 0)
         return 1;
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
-        terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0) /* of no repetition */
+        (f->terrain->real && /* and it is no repetition of a whole node */
+         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0))
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    return closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side);
+    if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
+        return 1;
+    return terrimpi_page_divides(f->terrain, node, &f->frustum) ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -8299,7 +9308,7 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
                               const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
                               float closest, int *done)
 {
-    int cuts = 0;
+    int cuts = 0, impostor;
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
@@ -8307,10 +9316,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
             terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
-    if (!(*done & TERRIMPI_CULL_IMPOSTOR) &&
-        terrimpi_cull_impostor(f, node, closest,
-                               cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE)) {
-        cuts |= TERRIMPI_CULL_IMPOSTOR;
+    if (*done & TERRIMPI_CULL_IMPOSTOR)
+        return cuts;
+    impostor = terrimpi_cull_impostor(f, node, closest, cache->of_node[node->number] !=
+                                                            TERRIMPI_CACHE_NO_PICTURE);
+    if (impostor) {
+        cuts |= TERRIMPI_CULL_IMPOSTOR | (impostor & TERRIMPI_CULL_SHORT);
         *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     return cuts;
@@ -8427,7 +9438,7 @@ static float terrimpi_cost_capture(const terrimp_costs *c, float texels, float t
    of the mean square, which 95 of 100 samples keep to. */
 static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
 {
-    const terrimpi_mesh *mesh = &f->terrain->meshes[node];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(f->terrain, node);
     return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
                ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
                : mesh->error;
@@ -8461,13 +9472,14 @@ static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
 static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node *node,
-                                     float closest)
+                                     float closest, int *is_known)
 {
+    *is_known = 1;
     if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
-                                       (f->pixel_factor * f->desc->texels_per_px));
+                                       (f->pixel_factor * f->desc->texels_per_px), is_known);
 }
 
 /* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
@@ -8550,7 +9562,9 @@ typedef struct terrimpi_candidate {
     float urgency;              /* error of its picture over the tolerance */
     float life;                 /* [frames] that a new picture would last */
     float draw_cost, capture_cost;
-    int rank;                   /* among the captures of this frame, */
+    uint8_t is_short;           /* it stands for those below, whose pages are missing */
+    uint8_t is_known;           /* what of the ground it would show */
+    uint16_t rank;              /* among the captures of this frame, */
     float weight;               /* ... and within its rank */
     terrimpi_cache_picture *picture;  /* or NULL */
 } terrimpi_candidate;
@@ -8618,6 +9632,8 @@ struct terrimp_view {
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
+    terrimp_want *wants;           /* [want_limit] of a terrain in pages */
+    uint32_t want_count, want_limit, late;
     uint32_t open;                 /* 1 + the job of which pieces are missing */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
@@ -8730,7 +9746,10 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     if (v->desc.exact_depth)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
-    v->ground.distances = (float *)terrimpi_take(&l, nodes, sizeof *v->ground.distances);
+    v->want_limit = v->terrain->tree.pages ? TERRIMPI_VIEW_WANTS : 0u;
+    v->wants = (terrimp_want *)terrimpi_take(&l, v->want_limit, sizeof *v->wants);
+    v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
+                                                 sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
     v->cull.capacity = (uint32_t)terrimpi_cull_capacity(&v->terrain->tree, ground + impostors);
     captures = terrimpi_arena_at(NULL);
@@ -9058,6 +10077,193 @@ TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float di
     return TERRIMP_OK;
 }
 
+/* ---- the pages that are missing ---- */
+
+/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
+static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
+{
+    if (a->urgency > b->urgency || a->urgency < b->urgency)
+        return a->urgency > b->urgency;
+    return a->level != b->level ? a->level > b->level : a->node < b->node;
+}
+
+/* Notes that a page is of use in this frame. If it is missing it is wanted; or the one above it
+   that has to come first. */
+static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int reason,
+                               float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    terrimp_node n = *node, above;
+    terrimp_want want, *worst = v->wants;
+    uint32_t i;
+    while (n.level + 1u < t->level_count && !t->pages->slot_of[n.number]) {
+        above = terrimpi_tree_parent(t, &n);
+        terrimpi_page_use(t, above.number); /* or it might be given up for this */
+        if (terrimpi_page_of(t->pages, above.number))
+            break;
+        n = above;
+    }
+    terrimpi_page_use(t, n.number);
+    if (t->pages->slot_of[n.number])
+        return;
+    want.node = n.number;
+    want.level = n.level;
+    want.bytes = t->pages->page_bytes;
+    want.reason = reason;
+    want.urgency = urgency;
+    for (i = 0; i < v->want_count; i++) {
+        if (v->wants[i].node == n.number) {
+            if (terrimpi_want_before(&want, &v->wants[i]))
+                v->wants[i] = want;
+            return;
+        }
+        if (terrimpi_want_before(worst, &v->wants[i]))
+            worst = &v->wants[i];
+    }
+    if (v->want_count < v->want_limit)
+        v->wants[v->want_count++] = want;
+    else if (terrimpi_want_before(&want, worst))
+        *worst = want;
+}
+
+/* The same for the children of a node that are in sight, and the node itself. */
+static void terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
+                                        const terrimp_node *node, int reason, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    uint32_t i;
+    if (!t->pages)
+        return;
+    terrimpi_view_want(v, node, reason, urgency);
+    if (!terrimpi_page_of(t->pages, node->number))
+        return;
+    for (i = 0; i < 4u && node->level > 0; i++) {
+        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
+        terrimp_node child;
+        terrimp_box box;
+        if (!terrimpi_tree_has(t, node->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(t, node->level - 1u, x, z);
+        terrimpi_terrain_node_box(v->terrain, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+            terrimpi_view_want(v, &child, reason, urgency);
+    }
+}
+
+/* Whether the nodes exist that have to beside and above one that is split. */
+static int terrimpi_view_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
+{
+    terrimp_node beyond;
+    int side;
+    if (node->level + 1u == mip->tree->level_count)
+        return 1;
+    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
+        return 0;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
+            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
+            return 0;
+    return 1;
+}
+
+/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
+   neighbours still differ by one level at most. All that the split would need is wanted. */
+static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
+                                 const terrimpi_mip_frame *mip)
+{
+    const terrimp_quadtree *t = mip->tree;
+    uint32_t level, number;
+    v->want_count = v->late = 0;
+    if (!t->pages)
+        return;
+    terrimpi_page_use(t, t->node_count - 1u);
+    for (level = t->level_count; level-- > 1u;)
+        for (number = mip->first[level]; number != t->node_count;
+             number = v->ground.marks[number].next) {
+            terrimp_geomip_mark *mark = &v->ground.marks[number];
+            terrimp_node node = terrimpi_tree_node(t, number);
+            if (mark->measure < 1.0f)
+                continue;
+            terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
+                                        TERRIMP_SQRTF(mark->measure));
+            if (terrimpi_view_has_around(mip, &node) &&
+                terrimpi_page_divides(v->terrain, &node, &f->frustum))
+                continue;
+            mark->measure = 0.0f;
+            v->late++;
+        }
+}
+
+/* Asks for the pages that ground will need soon, as the eye goes on. */
+static void terrimpi_view_look_ahead(terrimp_view *v, const terrimpi_frame *f,
+                                     const terrimpi_mip_frame *mip)
+{
+    const float *away = f->motion.away[0];
+    float frames = f->motion.frames[0] > 0.0f ? TERRIMPI_VIEW_SOON / f->motion.frames[0] : 0.0f;
+    uint32_t i, k;
+    if (!mip->tree->pages || f->desc->no_lookahead || !(terrimpi_length(away) > 0.0f))
+        return;
+    for (i = 0; i < v->ground.draw_count; i++) {
+        const terrimp_node *node = &v->ground.draws[i].node;
+        int planes = 0;
+        float measure, now, soon, eye[3];
+        terrimp_box box;
+        if (node->level == 0)
+            continue;
+        measure = terrimpi_mip_split_ratio(mip, node, &planes);
+        terrimpi_terrain_node_box(v->terrain, node, &box);
+        for (k = 0; k < 3u; k++)
+            eye[k] = f->camera.eye[k] + away[k] * frames;
+        now = terrimp_box_distance(&box, f->camera.eye);
+        soon = terrimp_box_distance(&box, eye);
+        if (measure * now * now >= soon * soon)
+            terrimpi_view_want_children(v, &f->frustum, node, TERRIMP_WANT_AHEAD,
+                                        0.99f * terrimpi_min(measure, 1.0f));
+    }
+}
+
+/* Whether all pages are here that a capture draws; those that are not are wanted. */
+static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
+                                   uint32_t count, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    uint32_t i;
+    int all = 1;
+    for (i = 0; i < count && t->pages; i++) {
+        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
+        terrimpi_view_want(v, &node, urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE,
+                           terrimpi_min(urgency, 2.0f));
+        all &= terrimpi_page_of(t->pages, node.number) != NULL;
+    }
+    v->late += all ? 0u : 1u;
+    return all;
+}
+
+TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
+                                              uint32_t capacity, uint32_t *count)
+{
+    uint32_t i, k, gap, room = 0;
+    const struct terrimp_pages *p;
+    TERRIMPI_REFUSE(!view || !count || (!wants && capacity > 0), TERRIMP_E_NULL);
+    *count = 0;
+    p = view->terrain->tree.pages;
+    if (!p)
+        return TERRIMP_OK;
+    for (gap = view->want_count / 2u; gap > 0; gap /= 2u)
+        for (i = gap; i < view->want_count; i++) {
+            terrimp_want moved = view->wants[i];
+            for (k = i; k >= gap && terrimpi_want_before(&moved, &view->wants[k - gap]); k -= gap)
+                view->wants[k] = view->wants[k - gap];
+            view->wants[k] = moved;
+        }
+    for (i = 0; i < p->slot_count; i++)
+        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
+    *count = terrimpi_min_u32(terrimpi_min_u32(view->want_count, room), capacity);
+    for (i = 0; i < *count; i++)
+        wants[i] = view->wants[i];
+    return TERRIMP_OK;
+}
+
 /* ---- the regions ---- */
 
 /* Makes the ground draw of a node in the ground cut. */
@@ -9098,6 +10304,7 @@ static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_
             memset(c, 0, sizeof *c);
             c->node = node;
             c->closest = nodes[i].closest;
+            c->is_short = (nodes[i].cuts & TERRIMPI_CULL_SHORT) != 0;
         }
         v->candidate_count++;
     }
@@ -9138,6 +10345,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
+        terrimpi_view_settle(v, f, &mip);
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most)
@@ -9145,6 +10353,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
     terrimpi_view_make_regions(v, &mip);
+    terrimpi_view_look_ahead(v, f, &mip);
     return TERRIMP_OK;
 }
 
@@ -9159,12 +10368,14 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
-    uint32_t quads;
+    uint32_t quads, source;
+    int is_known;
     terrimpi_terrain_node_box(f->terrain, &c->node, &box);
     if (terrimpi_camera_fit(&box, f->camera.eye, &camera) != TERRIMP_OK)
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
+    c->is_known = 1;
     c->pixels = k * k * (camera.tan_right - camera.tan_left) * (camera.tan_up - camera.tan_down);
     c->draw_cost = terrimpi_cost_draw(costs, (float)(mesh.index_count / 3u));
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
@@ -9176,8 +10387,9 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 1;
     }
     c->urgency = 1e9f;
-    quads = f->terrain->desc.chunk_quads
-            << (c->node.level - terrimpi_view_source(f, &c->node, c->closest));
+    source = terrimpi_view_source(f, &c->node, c->closest, &is_known);
+    c->is_known = (uint8_t)is_known;
+    quads = f->terrain->desc.chunk_quads << (c->node.level - source);
     c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
     return 1;
@@ -9268,8 +10480,9 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    if (!p)
+    if (!p || !terrimpi_tree_opens(&v->terrain->tree, node->number))
         return 0;
+    terrimpi_page_use(&v->terrain->tree, node->number);
     if (p->listed == v->frame.number) {
         v->draws[p->draw].alpha = 1.0f;
         return 1;
@@ -9293,7 +10506,8 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
     count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.camera.eye, children);
     for (i = 0; i < count; i++) {
         const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
-        if (!p || p->layer_count == 0)
+        if (!p || p->layer_count == 0 ||
+            !terrimpi_tree_opens(&v->terrain->tree, children[i].number))
             return 0;
     }
     for (i = 0; i < count; i++)
@@ -9426,8 +10640,8 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
     if (!callbacks->draw_floor)
         return;
     memset(&command, 0, sizeof command);
-    command.base_vertex = v->built->tree.node_count * v->terrain->vertex_stride;
-    command.first_index = v->built->tree.node_count * v->terrain->index_stride;
+    command.base_vertex = terrimpi_mesh_places(v->built) * v->terrain->vertex_stride;
+    command.first_index = terrimpi_mesh_places(v->built) * v->terrain->index_stride;
     command.index_count = terrimpi_floor_indices(v->built);
     if (v->terrain->real) { /* its first chunk says of which repetition */
         uint32_t tiles = v->terrain->tiles;
@@ -9470,6 +10684,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     int before = v->kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
+    int is_known = 1;
     terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
@@ -9482,7 +10697,12 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
     if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
         terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
-    region->kind = v->kind_of[region->node] = (uint8_t)best;
+    region->kind = (uint8_t)best;
+    for (i = 0; i < region->candidate_count; i++)
+        is_known &= v->candidates[region->first_candidate + i].is_known &&
+                    !v->candidates[region->first_candidate + i].is_short;
+    if (is_known) /* else a page that comes later must not find it settled */
+        v->kind_of[region->node] = (uint8_t)best;
     *spread += offers[best].upkeep;
     *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
@@ -9502,7 +10722,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
                                float *distance)
 {
 #ifndef TERRIMP_NO_SPLIT
-    const terrimpi_mesh *mesh = &f->terrain->meshes[plan->node.number];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(f->terrain, plan->node.number);
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
@@ -9548,7 +10768,13 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     uint32_t size[2], i, largest = terrimpi_max_u32(
         TERRIMPI_CAPTURE_SMALLEST, f->desc->atlas_size / 2u - 2u * TERRIMPI_CAPTURE_MARGIN);
     terrimp_mesh_info mesh;
+    int is_known;
     memset(job, 0, sizeof *job);
+    if (c->is_short) {
+        terrimpi_view_want_children(v, &f->frustum, &c->node, TERRIMP_WANT_PICTURE, 2.0f);
+        v->late++;
+        return 0;
+    }
     job->picture = terrimpi_cache_find(&v->cache, c->node.number);
     if (job->picture && terrimpi_cache_refuses(&v->cache, f->still, job->picture))
         return 0;
@@ -9562,14 +10788,16 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
                               f->pixel_factor * f->desc->texels_per_px, largest, &plan->camera,
                               size))
         return 0;
+    distance = terrimp_box_distance(&plan->box, eye);
+    plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
+    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
+    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+        return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    distance = terrimp_box_distance(&plan->box, eye);
-    plan->source = terrimpi_view_source(f, &c->node, distance);
-    plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
     job->in_pieces = f->desc->max_capture_triangles ||
                      ((job->triangles > room ||
@@ -9755,7 +10983,12 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
     terrimpi_job *job = &v->jobs[0];
     float angle, parallax;
-    if (terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
+    int has_pages;
+    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
+                terrimpi_view_has_pages(v, v->capture_draws, job->draw_count, 2.0f);
+    if (!has_pages ||
+        terrimpi_view_error(&v->frame, &job->plan.node, job->plan.camera.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
         v->open = 0;
@@ -9763,7 +10996,6 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
     terrimpi_job_cut(v->capture_draws,
                      terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job),
                      job);
@@ -9814,7 +11046,8 @@ static int terrimpi_view_over(const terrimpi_frame *f)
 {
     const float *eye = f->camera.eye;
     float ground;
-    return terrimp_heightfield_height(&f->terrain->desc.field, eye[0], eye[2], &ground) ==
+    uint32_t level; /* of the finest ground that is here */
+    return terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level) ==
                TERRIMP_OK &&
            eye[1] >= ground;
 }
@@ -9871,6 +11104,7 @@ static void terrimpi_view_count_frame(terrimp_view *v)
     for (i = 0; i < v->draw_count; i++)
         terrimpi_view_count_draw(v, &v->draws[i], s);
     s->visible = v->region_count;
+    s->late = v->late;
     s->evictions = v->cache.evictions;
     s->atlas_failures = v->cache.failures;
     for (i = 0; i < v->region_count; i++) {
@@ -9921,7 +11155,6 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
-    float first = 0.0f;
     uint32_t tries, i;
     if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
         v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
@@ -9932,14 +11165,9 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         for (i = 0; i < v->region_count; i++)
             terrimpi_view_decide(v, &v->regions[i], spread, drawn);
         v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
-        if (tries == 0)
-            first = v->cost;
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
-            tries == TERRIMPI_VIEW_TRIES) {
-            if (v->cost > max_cost && !(v->cost < first))
-                v->ground_scale = scale; /* it was of no use */
+            tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
-        }
         v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
     }
 }
@@ -9957,6 +11185,13 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
+    if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
+                                                          view->terrain->tree.node_count - 1u)) {
+        terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
+        view->want_count = 0;
+        terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
+        return TERRIMP_E_PAGE;
+    }
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
     view->cache.frame = frame.number;
     view->outdated = 0;
@@ -14357,6 +15592,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_begin(terrimp_terrain *terrain)
 {
     float low, high, room, step;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->meshes, TERRIMP_E_STATE);
     low = terrain->desc.height_low;
     high = terrain->desc.height_high;
     if (low == 0.0f && high == 0.0f) {
@@ -14404,6 +15640,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     const terrimp_quadtree *tree;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrain->meshes, TERRIMP_E_STATE);
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
         TERRIMPI_REFUSE(terrimpi_mesh_vertices(&terrain->meshes[node]) == 0, TERRIMP_E_STATE);
@@ -14511,7 +15748,8 @@ static size_t terrimpi_bake_array_bytes(const terrimp_terrain *t)
 
 TERRIMP_API size_t terrimp_bake_bytes(const terrimp_terrain *terrain)
 {
-    size_t arrays = terrain && terrain->built ? terrimpi_bake_array_bytes(terrain) : 0;
+    int any = terrain && terrain->built && terrain->meshes;
+    size_t arrays = any ? terrimpi_bake_array_bytes(terrain) : 0;
     return arrays ? sizeof(terrimpi_bake) + arrays : 0;
 }
 
@@ -14527,44 +15765,49 @@ static void terrimpi_bake_swap_words(unsigned char *words, size_t bytes)
     }
 }
 
+/* Fills in what a header says of a terrain. */
+static void terrimpi_bake_describe(const terrimp_terrain *t, terrimpi_bake *bake)
+{
+    const terrimp_terrain_desc *desc = &t->desc;
+    memset(bake, 0, sizeof *bake);
+    bake->width = desc->field.width;
+    bake->depth = desc->field.depth;
+    bake->format = (uint32_t)desc->field.format;
+    bake->chunk_quads = desc->chunk_quads;
+    bake->triangle_budget = desc->triangle_budget;
+    bake->flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
+                  (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
+    bake->node_count = t->tree.node_count;
+    bake->vertex_limit = t->vertex_limit;
+    bake->index_limit = t->index_limit;
+    bake->mesh_triangle_count = t->mesh_triangle_count;
+    bake->height_scale = desc->field.height_scale;
+    bake->height_offset = desc->field.height_offset;
+    bake->height_low = desc->height_low;
+    bake->height_high = desc->height_high;
+    bake->sample_low = t->sample_low;
+    bake->sample_high = t->sample_high;
+    bake->range_low = t->range_low;
+    bake->range_step = t->range_step;
+    bake->proud = desc->proud;
+}
+
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
                                               size_t bytes, int swapped)
 {
-    const terrimp_terrain_desc *desc;
     terrimpi_bake bake;
     size_t arrays;
     TERRIMPI_REFUSE(!terrain || !out, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrain->built || !terrain->meshes, TERRIMP_E_STATE);
     arrays = terrimpi_bake_array_bytes(terrain);
     TERRIMPI_REFUSE(arrays == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_REFUSE(bytes < sizeof bake + arrays, TERRIMP_E_CAPACITY);
     TERRIMPI_REFUSE((uintptr_t)out % TERRIMPI_ALIGN != 0, TERRIMP_E_ALIGN);
-    desc = &terrain->desc;
-    memset(&bake, 0, sizeof bake);
+    terrimpi_bake_describe(terrain, &bake);
     bake.magic = TERRIMPI_BAKE_MAGIC;
     bake.version = TERRIMP_BAKE_VERSION;
     bake.bytes = (uint32_t)(sizeof bake + arrays);
-    bake.width = desc->field.width;
-    bake.depth = desc->field.depth;
-    bake.format = (uint32_t)desc->field.format;
-    bake.chunk_quads = desc->chunk_quads;
-    bake.triangle_budget = desc->triangle_budget;
-    bake.flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
-                 (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
-    bake.node_count = terrain->tree.node_count;
-    bake.vertex_limit = terrain->vertex_limit;
-    bake.index_limit = terrain->index_limit;
-    bake.mesh_triangle_count = terrain->mesh_triangle_count;
-    bake.samples = terrimpi_bake_hash_samples(&desc->field);
-    bake.height_scale = desc->field.height_scale;
-    bake.height_offset = desc->field.height_offset;
-    bake.height_low = desc->height_low;
-    bake.height_high = desc->height_high;
-    bake.sample_low = terrain->sample_low;
-    bake.sample_high = terrain->sample_high;
-    bake.range_low = terrain->range_low;
-    bake.range_step = terrain->range_step;
-    bake.proud = desc->proud;
+    bake.samples = terrimpi_bake_hash_samples(&terrain->desc.field);
     memcpy(out, &bake, sizeof bake);
     memcpy((unsigned char *)out + sizeof bake, terrain->tree.nodes, arrays); /* all four */
     bake.checksum = terrimpi_bake_hash(out);
@@ -14572,6 +15815,532 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
     if (swapped)
         terrimpi_bake_swap_words((unsigned char *)out, bake.bytes);
     return TERRIMP_OK;
+}
+
+/* ==== Page builder ======================================================= >>impl-page-builder */
+/* A block is built as a terrain of its own, over a window of the field: of the block, of what its
+   nodes look at beyond it, and of the block before it along either axis, so that numbers of nodes
+   and places of the lattice differ from those of the whole field by a constant. What lies above the
+   blocks is built the same way over a field of every 2^block_level-th sample. */
+
+typedef struct terrimpi_paging {
+    const terrimp_pages_desc *desc; /* resolved */
+    terrimp_terrain whole;          /* nothing but its numbers */
+    uint32_t stamp;
+    uint32_t level;                 /* of the whole: of the part's level 0 */
+    uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
+    terrimp_terrain *part;
+    size_t part_bytes, scratch_bytes;
+    unsigned char *samples;         /* of the part */
+    float *held;                    /* [nodes of the part] see terrimpi_record */
+    float *missed, *squares;        /* [the same] what the ground of the blocks below misses */
+    unsigned char *page, *header;
+    void *scratch;                  /* of the Builder */
+} terrimpi_paging;
+
+TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *desc,
+                                                      terrimp_pages_desc *out,
+                                                      uint32_t *block_count)
+{
+    static const float any = 0.0f; /* stands for the samples */
+    terrimp_pages_desc d;
+    terrimp_terrain t;
+    uint32_t top;
+    TERRIMPI_REFUSE(!desc || !out || !block_count || !desc->read || !desc->load || !desc->store,
+                    TERRIMP_E_NULL);
+    d = *desc;
+    d.terrain.field.samples = &any;
+    d.terrain.field.row_bytes = 0;
+    memset(&t, 0, sizeof t);
+    TERRIMPI_TRY(terrimp_terrain_desc_resolve(&d.terrain, &t.desc));
+    TERRIMPI_REFUSE(!terrimpi_terrain_count(&t), TERRIMP_E_OVERFLOW);
+    TERRIMPI_REFUSE(t.desc.field.format == TERRIMP_FORMAT_F32 ||
+                    !(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
+    top = t.tree.level_count - 1u;
+    TERRIMPI_DEFAULT(d.block_level, t.desc.field.width <= 4097u && t.desc.field.depth <= 4097u
+                                        ? top : 4u);
+    d.block_level = terrimpi_min_u32(d.block_level, top);
+    d.terrain = t.desc;
+    *block_count = t.tree.level_x[d.block_level] * t.tree.level_z[d.block_level];
+    *out = d;
+    return TERRIMP_OK;
+}
+
+/* The number that all pages of a file bear. */
+static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
+{
+    const terrimp_terrain_desc *t = &d->terrain;
+    uint32_t words[13], i, hash = 2166136261u;
+    words[0] = d->stamp;
+    words[1] = t->field.width;
+    words[2] = t->field.depth;
+    words[3] = (uint32_t)t->field.format;
+    words[4] = t->chunk_quads;
+    words[5] = t->triangle_budget;
+    words[6] = d->block_level;
+    words[7] = (t->no_lower_skirts ? 1u : 0u) | TERRIMP_PAGES_VERSION << 1;
+    words[8] = terrimpi_bake_float_bits(t->field.height_scale);
+    words[9] = terrimpi_bake_float_bits(t->field.height_offset);
+    words[10] = terrimpi_bake_float_bits(t->height_low);
+    words[11] = terrimpi_bake_float_bits(t->height_high);
+    words[12] = terrimpi_bake_float_bits(t->proud);
+    for (i = 0; i < 13u; i++)
+        hash = terrimpi_bake_hash_word(hash, words[i]);
+    return hash;
+}
+
+/* Begins a window of columns [x, x + width) and rows of the field at a level's steps; w has its
+   descriptor. Sets the arrays when there is a base. */
+static size_t terrimpi_paging_layout(terrimpi_paging *w, uint32_t level, const terrimp_rect *r,
+                                     unsigned char *base, terrimp_terrain_desc *part)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    terrimp_terrain counted;
+    *part = w->desc->terrain;
+    part->field.width = r->width;
+    part->field.depth = r->height;
+    part->field.row_bytes = r->width * terrimpi_field_sample_bytes(part->field.format);
+    memset(&counted, 0, sizeof counted);
+    counted.desc = *part;
+    terrimpi_terrain_count(&counted);
+    w->level = level;
+    w->x = r->x;
+    w->z = r->y;
+    w->part_bytes = terrimp_terrain_bytes(part);
+    w->scratch_bytes = terrimp_terrain_scratch_bytes(part);
+    w->samples = (unsigned char *)terrimpi_take(&b, r->height, part->field.row_bytes);
+    w->part = (terrimp_terrain *)terrimpi_take(&b, w->part_bytes, 1);
+    w->held = (float *)terrimpi_take(&b, counted.tree.node_count, sizeof *w->held);
+    w->missed = (float *)terrimpi_take(&b, counted.tree.node_count, sizeof *w->missed);
+    w->squares = (float *)terrimpi_take(&b, counted.tree.node_count, sizeof *w->squares);
+    w->page = (unsigned char *)terrimpi_take(&b, terrimpi_page_bytes(&w->whole), 1);
+    w->header = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
+    w->scratch = terrimpi_take(&b, w->scratch_bytes, 1);
+    part->field.samples = w->samples;
+    return b.ok && w->part_bytes && w->scratch_bytes ? b.bytes : 0;
+}
+
+/* Along one axis of `last` quads: the window of block k, and what of it is read. */
+static void terrimpi_paging_along(uint32_t k, uint32_t quads, uint32_t margin, uint32_t last,
+                                  uint32_t *first, uint32_t *count, uint32_t *from)
+{
+    uint32_t end = terrimpi_min_u32((k + 1u) * quads, last);
+    *first = k > 0 ? (k - 1u) * quads : 0u;
+    *from = k > 0 ? k * quads - margin : 0u;
+    *count = terrimpi_min_u32(margin, last - end) + end - *first + 1u;
+}
+
+/* The window of a block; *read gets what of it is to be read. */
+static terrimp_rect terrimpi_paging_of(const terrimpi_paging *w, uint32_t block, terrimp_rect *read)
+{
+    const terrimp_quadtree *t = &w->whole.tree;
+    uint32_t level = w->desc->block_level, quads = t->chunk_quads << level;
+    terrimp_rect r;
+    terrimpi_paging_along(block % t->level_x[level], quads, 1u << level, t->field.width - 1u, &r.x,
+                          &r.width, &read->x);
+    terrimpi_paging_along(block / t->level_x[level], quads, 1u << level, t->field.depth - 1u, &r.y,
+                          &r.height, &read->y);
+    read->width = r.x + r.width - read->x;
+    read->height = r.y + r.height - read->y;
+    return r;
+}
+
+/* The field of every 2^block_level-th sample. */
+static terrimp_rect terrimpi_paging_end(const terrimpi_paging *w)
+{
+    uint32_t level = w->desc->block_level;
+    return terrimpi_rect(0, 0, ((w->whole.desc.field.width - 2u) >> level) + 2u,
+                         ((w->whole.desc.field.depth - 2u) >> level) + 2u);
+}
+
+/* Whether there is anything above the blocks. */
+static int terrimpi_paging_has_end(const terrimpi_paging *w)
+{
+    return w->desc->block_level + 1u < w->whole.tree.level_count;
+}
+
+static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terrimp_pages_desc *d,
+                                            terrimpi_paging *w)
+{
+    uint32_t count;
+    TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
+    memset(w, 0, sizeof *w);
+    w->desc = d;
+    w->stamp = terrimpi_paging_stamp(d);
+    w->whole.desc = d->terrain;
+    terrimpi_terrain_count(&w->whole);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, uint32_t first_block,
+                                               uint32_t block_count, uint64_t *offset,
+                                               uint64_t *bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    const terrimp_quadtree *t = &w.whole.tree;
+    uint32_t all;
+    uint64_t block_bytes;
+    TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    all = t->level_x[d.block_level] * t->level_z[d.block_level];
+    TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
+    block_bytes = (uint64_t)terrimpi_page_full(d.block_level + 1u) * terrimpi_page_bytes(&w.whole);
+    *offset = TERRIMP_PAGES_HEADER_BYTES + block_bytes * first_block +
+              (uint64_t)terrimpi_page_upper(t, d.block_level) * terrimpi_page_bytes(&w.whole);
+    *bytes = block_bytes * block_count;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API size_t terrimp_pages_scratch_bytes(const terrimp_pages_desc *desc)
+{
+    terrimp_pages_desc d;
+    terrimp_terrain_desc part;
+    terrimpi_paging w;
+    terrimp_rect r, read;
+    size_t block, end = 1;
+    if (terrimpi_paging_begin(desc, &d, &w) != TERRIMP_OK)
+        return 0;
+    r = terrimpi_paging_of(&w, 0, &read); /* the last of two blocks has the larger window */
+    r.width = terrimpi_min_u32(w.whole.desc.field.width, 2u * r.width);
+    r.height = terrimpi_min_u32(w.whole.desc.field.depth, 2u * r.height);
+    block = terrimpi_paging_layout(&w, 0, &r, NULL, &part);
+    if (terrimpi_paging_has_end(&w)) {
+        r = terrimpi_paging_end(&w);
+        end = terrimpi_paging_layout(&w, d.block_level, &r, NULL, &part);
+    }
+    return block == 0 || end == 0 ? 0 : block > end ? block : end;
+}
+
+/* Lays a window's terrain out in the scratch. */
+static terrimp_result terrimpi_paging_open(terrimpi_paging *w, uint32_t level,
+                                           const terrimp_rect *r, void *scratch, size_t bytes)
+{
+    terrimp_terrain_desc part;
+    terrimp_terrain *made;
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
+                                      terrimpi_paging_layout(w, level, r, NULL, &part)));
+    terrimpi_paging_layout(w, level, r, (unsigned char *)scratch, &part);
+    TERRIMPI_TRY(terrimp_terrain_init(&part, w->part, w->part_bytes, &made));
+    return terrimp_terrain_build_begin(made);
+}
+
+/* Builds a node of the part and makes it hold those below it. */
+static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terrimp_node *n)
+{
+    terrimp_terrain *t = w->part;
+    terrimp_geomip_node *ground = &t->tree.nodes[n->number];
+    terrimpi_mesh *mesh = &t->meshes[n->number];
+    float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
+    uint32_t i;
+    TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
+    w->held[n->number] = *missed = *squares = 0.0f;
+    for (i = 0; i < 4u && n->level > 0; i++) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
+        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
+        *missed = terrimpi_max(*missed, w->missed[child]);
+        *squares += w->squares[child];
+        count += 1.0f;
+    }
+    if (w->level > 0) {
+        *squares /= count;
+        ground->error += *missed;
+        ground->rms = TERRIMP_SQRTF(ground->rms * ground->rms + *squares);
+        mesh->error += *missed;
+        mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
+    }
+    w->held[n->number] = ground->rms;
+    for (i = 0; i < 4u && n->level > 0; i++) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
+        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
+        ground->low = terrimpi_min(ground->low, t->tree.nodes[child].low);
+        ground->high = terrimpi_max(ground->high, t->tree.nodes[child].high);
+        ground->error = terrimpi_max(ground->error, t->tree.nodes[child].error);
+        terrimpi_build_hold(mesh, t->meshes[child].low, t->meshes[child].high);
+        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child]);
+    }
+    terrimpi_build_hold(mesh, ground->low, ground->high);
+    return TERRIMP_OK;
+}
+
+static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t node)
+{
+    terrimpi_record r;
+    r.ground = w->part->tree.nodes[node];
+    r.mesh = w->part->meshes[node];
+    r.held = w->held[node];
+    return r;
+}
+
+/* Copies the samples of a node of the part into its page. */
+static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n, uint16_t *out)
+{
+    const terrimp_quadtree *t = &w->part->tree;
+    uint32_t i, j, quads = t->chunk_quads;
+    for (j = 0; j <= quads; j++) {
+        const void *row = terrimpi_field_row(&t->field, terrimpi_tree_row(t, n->level,
+                                                                          n->z * quads + j));
+        for (i = 0; i <= quads; i++) {
+            uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
+            *out++ = t->field.format == TERRIMP_FORMAT_U8 ? ((const uint8_t *)row)[x]
+                                                          : ((const uint16_t *)row)[x];
+        }
+    }
+}
+
+/* The node of the whole that a node of the part is. */
+static terrimp_node terrimpi_paging_whole(const terrimpi_paging *w, const terrimp_node *n)
+{
+    uint32_t side = w->part->tree.chunk_quads << n->level;
+    return terrimpi_tree_at(&w->whole.tree, w->level + n->level, n->x + w->x / side,
+                            n->z + w->z / side);
+}
+
+/* Makes and stores the page of a node of the part. */
+static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terrimp_node *n)
+{
+    const terrimp_terrain *t = w->part;
+    terrimp_node whole = terrimpi_paging_whole(w, n);
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN, word;
+    terrimpi_page_head head;
+    memset(w->page, 0, bytes);
+    head.stamp = w->stamp;
+    head.node = whole.number;
+    head.record = terrimpi_paging_record(w, n->number);
+    for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
+        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimpi_record r;
+        if (n->level == 0 || !terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+            continue;
+        r = terrimpi_paging_record(w, terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number);
+        memcpy(w->page + at, &r, sizeof r);
+    }
+    memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
+    at += 4u * t->vertex_limit;
+    memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
+    terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
+    memcpy(w->page, &head, sizeof head);
+    head.checksum = 2166136261u;
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, w->page + at, sizeof word);
+        head.checksum = terrimpi_bake_hash_word(head.checksum, word);
+    }
+    memcpy(w->page, &head.checksum, sizeof head.checksum);
+    return w->desc->store(w->desc->user,
+                          terrimpi_page_offset(&w->whole, w->desc->block_level, &whole), w->page,
+                          bytes) ? TERRIMP_OK : TERRIMP_E_PAGE;
+}
+
+/* The nodes of a level of a rectangle of blocks: from the top down to the finest, or up again. */
+static terrimp_result terrimpi_paging_each(const terrimpi_paging *w, uint32_t level, uint32_t top,
+                                           uint32_t x, uint32_t z,
+                                           terrimp_result (*act)(const terrimpi_paging *w,
+                                                                 const terrimp_node *n))
+{
+    const terrimp_quadtree *t = &w->part->tree;
+    uint32_t side = 1u << (top - level), i, j;
+    for (j = z * side; j < (z + 1u) * side; j++)
+        for (i = x * side; i < (x + 1u) * side; i++)
+            if (terrimpi_tree_has(t, level, i, j)) {
+                terrimp_node n = terrimpi_tree_at(t, level, i, j);
+                TERRIMPI_TRY(act(w, &n));
+            }
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *desc, uint32_t block,
+                                                     void *scratch, size_t bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    terrimp_rect r, read;
+    uint32_t level, x, z, size;
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    x = block % w.whole.tree.level_x[d.block_level];
+    z = block / w.whole.tree.level_x[d.block_level];
+    TERRIMPI_REFUSE(z >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
+    r = terrimpi_paging_of(&w, block, &read);
+    TERRIMPI_TRY(terrimpi_paging_open(&w, 0, &r, scratch, bytes));
+    size = (uint32_t)terrimpi_field_sample_bytes(d.terrain.field.format);
+    TERRIMPI_REFUSE(!d.read(d.user, read.x, read.y, read.width, read.height,
+                            w.samples + ((size_t)(read.y - r.y) * r.width + (read.x - r.x)) * size,
+                            (size_t)r.width * size), TERRIMP_E_PAGE);
+    x = x > 0;
+    z = z > 0;
+    for (level = 0; level <= d.block_level; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, d.block_level, x, z, terrimpi_paging_build));
+    for (level = 0; level <= d.block_level; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, d.block_level, x, z, terrimpi_paging_store));
+    return TERRIMP_OK;
+}
+
+/* Loads the page of a node and looks at what is told by it alone. */
+static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terrimp_node *n,
+                                           unsigned char *page, terrimpi_page_head *head)
+{
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), at, word, hash = 2166136261u;
+    TERRIMPI_REFUSE(!w->desc->load(w->desc->user,
+                                   terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
+                                   bytes), TERRIMP_E_PAGE);
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    memcpy(head, page, sizeof *head);
+    return head->checksum == hash && head->stamp == w->stamp && head->node == n->number
+               ? TERRIMP_OK : TERRIMP_E_BAKE;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
+                                                     uint32_t block, void *scratch, size_t bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    terrimpi_page_head head;
+    terrimp_node n;
+    uint32_t across;
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    across = w.whole.tree.level_x[d.block_level];
+    TERRIMPI_REFUSE(block / across >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, terrimpi_page_bytes(&w.whole)));
+    n = terrimpi_tree_at(&w.whole.tree, d.block_level, block % across, block / across);
+    return terrimpi_paging_load(&w, &n, (unsigned char *)scratch, &head);
+}
+
+/* Takes over what a block's topmost page says: the part's level 0. */
+static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terrimp_node *n)
+{
+    const terrimp_quadtree *t = &w->part->tree;
+    terrimp_node whole = terrimpi_paging_whole(w, n);
+    uint32_t quads = t->chunk_quads, i, j, x, z;
+    terrimpi_page_head head;
+    const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
+                                4u * w->whole.vertex_limit + w->whole.index_limit;
+    TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++, from += 2) {
+            uint16_t sample;
+            x = terrimpi_tree_col(t, 0, n->x * quads + i);
+            z = terrimpi_tree_row(t, 0, n->z * quads + j);
+            memcpy(&sample, from, sizeof sample);
+            if (t->field.format == TERRIMP_FORMAT_U8)
+                w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
+            else
+                memcpy(w->samples + ((size_t)z * t->field.width + x) * 2u, &sample, sizeof sample);
+        }
+    t->nodes[n->number] = head.record.ground;
+    w->part->meshes[n->number] = head.record.mesh;
+    w->held[n->number] = head.record.held;
+    w->missed[n->number] = head.record.ground.error;
+    w->squares[n->number] = head.record.ground.rms * head.record.ground.rms;
+    return TERRIMP_OK;
+}
+
+/* The lowest sample of a rectangle that two of its corners span, through `read`. */
+static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uint32_t a[2],
+                                             const uint32_t b[2], float *lowest)
+{
+    terrimp_heightfield f = w->desc->terrain.field;
+    terrimpi_field_scan scan;
+    uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
+    uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
+    uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
+    uint16_t line[256]; /* either is 1 */
+    for (k = 0; k < cols * rows; k += 256u) {
+        f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
+        f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
+        f.row_bytes = f.width * terrimpi_field_sample_bytes(f.format);
+        f.samples = line;
+        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, cols > 1u ? x + k : x, rows > 1u ? z + k : z,
+                                       f.width, f.depth, line, f.row_bytes), TERRIMP_E_PAGE);
+        scan.skip_voids = 0;
+        TERRIMPI_TRY(terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
+        *lowest = terrimpi_min(*lowest, terrimpi_field_world_height(&f, scan.low));
+    }
+    return TERRIMP_OK;
+}
+
+/* The heights of the floor's corners and walls: see terrimpi_floor_write. */
+static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *lows)
+{
+    const terrimp_terrain *t = &w->whole;
+    uint32_t level = t->floor_level, wide = t->tree.level_x[level], deep = t->tree.level_z[level];
+    uint32_t i, k, x, z, points = terrimpi_floor_wall_points(t);
+    terrimpi_page_head head;
+    for (i = 0; i < terrimpi_floor_ground_vertices(t) + points; i++)
+        lows[i] = TERRIMPI_FLOAT_MAX;
+    for (z = 0; z < deep; z++)
+        for (x = 0; x < wide; x++) {
+            terrimp_node n = terrimpi_tree_at(&t->tree, level, x, z);
+            TERRIMPI_TRY(terrimpi_paging_load(w, &n, w->page, &head));
+            for (k = 0; k < 4u; k++) {
+                float *corner = lows + (z + k / 2u) * (wide + 1u) + x + k % 2u;
+                *corner = terrimpi_min(*corner, head.record.ground.low);
+            }
+        }
+    lows += terrimpi_floor_ground_vertices(t);
+    for (k = 0; k < points; k++) {
+        uint32_t before[2], at[2], after[2];
+        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
+        terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
+        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &lows[k]));
+    }
+    return TERRIMP_OK;
+}
+
+/* Makes and stores the header. */
+static terrimp_result terrimpi_paging_header(const terrimpi_paging *w)
+{
+    unsigned char *room = w->header;
+    const terrimp_terrain *t = &w->whole;
+    terrimp_node root = terrimpi_tree_root(&t->tree);
+    terrimpi_pages_head head;
+    terrimpi_page_head top;
+    memset(&head, 0, sizeof head);
+    memset(room, 0, TERRIMP_PAGES_HEADER_BYTES);
+    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(room + sizeof head)));
+    TERRIMPI_TRY(terrimpi_paging_load(w, &root, w->page, &top));
+    terrimpi_bake_describe(t, &head.bake);
+    head.bake.magic = TERRIMPI_PAGES_MAGIC;
+    head.bake.version = TERRIMP_PAGES_VERSION;
+    head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
+    head.bake.sample_low = w->part->sample_low;
+    head.bake.sample_high = w->part->sample_high;
+    head.bake.range_low = w->part->range_low;
+    head.bake.range_step = w->part->range_step;
+    head.block_level = w->desc->block_level;
+    head.stamp = w->stamp;
+    head.root = top.record;
+    memcpy(room, &head, sizeof head);
+    head.bake.checksum = terrimpi_bake_hash(room);
+    memcpy(room, &head, sizeof head);
+    return w->desc->store(w->desc->user, 0, room, TERRIMP_PAGES_HEADER_BYTES) ? TERRIMP_OK
+                                                                              : TERRIMP_E_PAGE;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,
+                                                   size_t bytes)
+{
+    terrimp_pages_desc d;
+    terrimpi_paging w;
+    terrimp_rect r;
+    uint32_t level, top;
+    TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    r = terrimpi_paging_end(&w);
+    top = w.whole.tree.level_count - 1u - d.block_level;
+    TERRIMPI_TRY(terrimpi_paging_open(&w, d.block_level, &r, scratch, bytes));
+    TERRIMPI_TRY(terrimpi_paging_each(&w, 0, top, 0, 0, terrimpi_paging_take));
+    for (level = 1; level <= top; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, top, 0, 0, terrimpi_paging_build));
+    for (level = 1; level <= top; level++)
+        TERRIMPI_TRY(terrimpi_paging_each(&w, level, top, 0, 0, terrimpi_paging_store));
+    return terrimpi_paging_header(&w);
 }
 
 /* ==== Visible sets ======================================================= >>impl-visible-sets */
@@ -17369,6 +19138,7 @@ static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *d
     int k;
     TERRIMPI_REFUSE(!desc || !desc->terrain, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_terrain_get_info(desc->terrain, &info));
+    TERRIMPI_REFUSE(desc->terrain->tree.pages, TERRIMP_E_PAGE);
     *d = *desc;
     TERRIMPI_DEFAULT(d->directions, 8u);
     TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||

@@ -24,7 +24,9 @@ static void mend_checksum(unsigned char *block, size_t bytes)
     if (bytes < sizeof bake)
         return;
     memcpy(&bake, block, sizeof bake);
-    if (bake.magic != TERRIMPI_BAKE_MAGIC || !terrimpi_bake_header(&bake, bytes, &t))
+    if (bake.magic != TERRIMPI_BAKE_MAGIC ||
+        !terrimpi_bake_header(&bake, TERRIMP_BAKE_VERSION, &t) ||
+        !terrimpi_bake_bytes_fit(&bake, bytes, &t))
         return;
     bake.checksum = terrimpi_bake_hash(block);
     memcpy(block, &bake, sizeof bake);

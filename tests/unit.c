@@ -32,6 +32,7 @@ static void *unit_malloc(size_t bytes)
 #include "unit_sorted.h"
 #include "unit_bake.h"
 #include "unit_bad_input.h"
+#include "unit_pages.h"
 #include "unit_layers.h"
 #include "unit_placement.h"
 #include "unit_golden.h"
@@ -56,6 +57,7 @@ int main(int argc, char **argv)
     visibility_tests();
     view_tests();
     sorted_tests();
+    pages_tests();
     bad_input_tests();
     layers_tests();
     placement_tests();

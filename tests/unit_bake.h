@@ -281,7 +281,8 @@ static void forge_checksum(unsigned char *block)
     terrimpi_bake bake;
     terrimp_terrain t;
     memcpy(&bake, block, sizeof bake);
-    if (!terrimpi_bake_header(&bake, bake.bytes, &t))
+    if (!terrimpi_bake_header(&bake, TERRIMP_BAKE_VERSION, &t) ||
+        !terrimpi_bake_bytes_fit(&bake, bake.bytes, &t))
         return;
     bake.checksum = terrimpi_bake_hash(block);
     memcpy(block, &bake, sizeof bake);
@@ -354,7 +355,7 @@ static void every_false_number_of_a_bake_is_refused(void)
         const uint32_t nan_bits = 0x7fc00000u;
         float nan;
         memcpy(&nan, &nan_bits, sizeof nan);
-        CHECK(terrimpi_bake_header(bake, b.bytes, &t));
+        CHECK(terrimpi_bake_header(bake, TERRIMP_BAKE_VERSION, &t));
         terrimpi_bake_arrays_at(&t, b.block);
         ground = &t.tree.nodes[node];
         mesh = &t.meshes[node];
@@ -410,7 +411,8 @@ static void surfaces_with_holes_are_refused(void)
     baked_land b;
     if (bake_sized(&b, 0)) {
         terrimp_terrain t;
-        CHECK(terrimpi_bake_header((terrimpi_bake *)(void *)b.block, b.bytes, &t));
+        CHECK(terrimpi_bake_header((terrimpi_bake *)(void *)b.block, TERRIMP_BAKE_VERSION,
+                                   &t));
         terrimpi_bake_arrays_at(&t, b.block);
         CHECK(terrimpi_mesh_triangles(&t.meshes[0]) == 2);
         t.corners[0] = t.corners[0] >> 24 | t.corners[1] << 8;

@@ -1,0 +1,848 @@
+/* Laws of terrain in pages: they say what a terrain in memory says, in whatever order they are made
+   and come; and nothing that is damaged, late or another's is taken. */
+#ifndef UNIT_PAGES_H
+#define UNIT_PAGES_H
+
+#include "unit_bad_input.h"
+
+/* A land, its pages as a file in memory, and the terrain that is opened from them. */
+typedef struct paged_land {
+    land l;
+    terrimp_pages_desc desc;
+    terrimp_pages_info info;
+    uint32_t block_count;
+    unsigned char *file;
+    size_t bytes;
+    uint64_t from, to;     /* what stores may touch */
+    uint32_t stores, last; /* stores so far; the last one that is carried out */
+    void *scratch;
+    size_t scratch_bytes;
+    void *memory;
+    terrimp_terrain *opened;
+} paged_land;
+
+static int paged_read(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows,
+                      void *samples, size_t row_bytes)
+{
+    const terrimp_heightfield *f = &((const paged_land *)user)->l.desc.field;
+    size_t size = f->format == TERRIMP_FORMAT_U8 ? 1u : 2u;
+    uint32_t r;
+    if (x + cols > f->width || z + rows > f->depth) {
+        CHECK(!"a block reads beyond the terrain");
+        return 0;
+    }
+    for (r = 0; r < rows; r++)
+        memcpy((char *)samples + r * row_bytes,
+               (const char *)f->samples + ((size_t)(z + r) * f->width + x) * size, cols * size);
+    return 1;
+}
+
+static int paged_load(void *user, uint64_t offset, void *bytes, size_t count)
+{
+    const paged_land *p = (const paged_land *)user;
+    if (offset + count > p->bytes)
+        return 0;
+    memcpy(bytes, p->file + offset, count);
+    return 1;
+}
+
+static int paged_store(void *user, uint64_t offset, const void *bytes, size_t count)
+{
+    paged_land *p = (paged_land *)user;
+    CHECK(offset >= p->from && offset + count <= p->to);
+    if (offset + count > p->bytes || p->stores++ >= p->last)
+        return 0;
+    memcpy(p->file + offset, bytes, count);
+    return 1;
+}
+
+/* Builds a block; what it stores has to lie in its part of the file. */
+static terrimp_result paged_build_block(paged_land *p, uint32_t block)
+{
+    uint64_t bytes;
+    CHECK(terrimp_pages_place(&p->desc, block, 1, &p->from, &bytes) == TERRIMP_OK);
+    p->to = p->from + bytes;
+    p->stores = 0;
+    return terrimp_pages_build_block(&p->desc, block, p->scratch, p->scratch_bytes);
+}
+
+static terrimp_result paged_build_end(paged_land *p)
+{
+    uint64_t bytes;
+    p->from = 0;
+    CHECK(terrimp_pages_place(&p->desc, 0, 0, &p->to, &bytes) == TERRIMP_OK && bytes == 0);
+    p->stores = 0;
+    return terrimp_pages_build_end(&p->desc, p->scratch, p->scratch_bytes);
+}
+
+/* A land in memory, and room for its pages. */
+static int paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int format,
+                         land_shape shape, uint32_t chunk_quads, uint32_t block_level)
+{
+    terrimp_pages_desc resolved;
+    uint64_t from, bytes;
+    memset(p, 0, sizeof *p);
+    land_prepare(&p->l, width, depth, format, shape);
+    p->l.desc.chunk_quads = chunk_quads;
+    p->l.desc.height_low = -126.0f;
+    p->l.desc.height_high = 257.0f;
+    p->last = UINT32_MAX;
+    p->desc.terrain = p->l.desc;
+    p->desc.terrain.field.samples = NULL;
+    p->desc.block_level = block_level;
+    p->desc.stamp = 7;
+    p->desc.user = p;
+    p->desc.read = paged_read;
+    p->desc.load = paged_load;
+    p->desc.store = paged_store;
+    CHECK(terrimp_pages_desc_resolve(&p->desc, &resolved, &p->block_count) == TERRIMP_OK);
+    CHECK(terrimp_pages_place(&p->desc, 0, p->block_count, &from, &bytes) == TERRIMP_OK);
+    p->bytes = (size_t)(from + bytes);
+    p->file = (unsigned char *)calloc(1, p->bytes);
+    p->scratch_bytes = terrimp_pages_scratch_bytes(&p->desc);
+    CHECK(p->scratch_bytes > 0);
+    p->scratch = malloc(p->scratch_bytes);
+    return land_build(&p->l);
+}
+
+static int paged_build(paged_land *p)
+{
+    uint32_t block;
+    for (block = 0; block < p->block_count; block++)
+        CHECK(paged_build_block(p, block) == TERRIMP_OK);
+    CHECK(paged_build_end(p) == TERRIMP_OK);
+    CHECK(terrimp_pages_check(p->file, p->bytes, &p->info) == TERRIMP_OK);
+    CHECK(p->info.bytes == p->bytes && p->info.node_count == p->l.info.node_count);
+    return check_bad == 0;
+}
+
+static int paged_open(paged_land *p, uint32_t slots)
+{
+    size_t bytes = terrimp_pages_bytes(p->file, p->bytes, slots);
+    p->memory = malloc(bytes);
+    CHECK(bytes > 0 && terrimp_pages_open(&p->l.desc.field, p->file, p->bytes, slots, p->memory,
+                                          bytes, &p->opened) == TERRIMP_OK);
+    return check_bad == 0;
+}
+
+/* Reads a page as a host would. */
+static terrimp_result paged_fetch(paged_land *p, uint32_t node)
+{
+    terrimp_page_info info;
+    void *page;
+    terrimp_result result = terrimp_page_begin(p->opened, node, &page);
+    if (result != TERRIMP_OK)
+        return result;
+    CHECK(terrimp_page_get_info(p->opened, node, &info) == TERRIMP_OK);
+    CHECK(info.state == TERRIMP_PAGE_COMING && info.offset + info.bytes <= p->bytes);
+    memcpy(page, p->file + info.offset, info.bytes);
+    return terrimp_page_put(p->opened, node);
+}
+
+static int paged_is_here(const paged_land *p, uint32_t node)
+{
+    terrimp_page_info info;
+    CHECK(terrimp_page_get_info(p->opened, node, &info) == TERRIMP_OK);
+    return info.state == TERRIMP_PAGE_HERE;
+}
+
+static void paged_free(paged_land *p)
+{
+    land_free(&p->l);
+    free(p->file);
+    free(p->scratch);
+    free(p->memory);
+}
+
+/* All pages, from the root down. */
+static void paged_fetch_all(paged_land *p)
+{
+    uint32_t node = p->l.info.node_count;
+    while (node-- > 0)
+        CHECK(paged_fetch(p, node) == TERRIMP_OK);
+}
+
+/* Ground, boxes, meshes and the floor of pages against those of memory: the same bits up to a
+   level; above it ground is the same, and no error smaller. */
+static void check_pages_say_the_same(const paged_land *p, uint32_t same_to)
+{
+    const land *l = &p->l;
+    uint32_t node, vertices = l->info.ground_vertex_count, stride = l->info.mesh_vertex_stride;
+    float *xyz[2];
+    uint16_t *indices[2];
+    terrimp_terrain_info info;
+    int i;
+    CHECK(terrimp_terrain_get_info(p->opened, &info) == TERRIMP_OK);
+    CHECK(info.floor_vertex_count == l->info.floor_vertex_count);
+    for (i = 0; i < 2; i++) {
+        size_t most = vertices + stride + info.floor_vertex_count;
+        xyz[i] = (float *)malloc(most * 3u * sizeof(float));
+        indices[i] = (uint16_t *)malloc((info.floor_index_count + info.mesh_index_stride) *
+                                        sizeof(uint16_t));
+    }
+    for (node = 0; node < l->info.node_count; node++) {
+        const terrimp_terrain *terrain[2];
+        terrimp_mesh_info mesh[2];
+        terrimp_box box[2], ground_box[2];
+        uint32_t level = land_place(l, node).level;
+        terrain[0] = l->terrain;
+        terrain[1] = p->opened;
+        for (i = 0; i < 2; i++) {
+            const terrimp_quadtree *tree = terrimp_terrain_tree(terrain[i]);
+            CHECK(terrimp_terrain_get_box(terrain[i], node, &box[i]) == TERRIMP_OK);
+            CHECK(terrimp_geomip_box(tree, node, &ground_box[i]) == TERRIMP_OK);
+            CHECK(terrimp_terrain_get_mesh(terrain[i], node, &mesh[i]) == TERRIMP_OK);
+            CHECK(terrimp_terrain_fill_ground(terrain[i], node, xyz[i], vertices * 3u) ==
+                  TERRIMP_OK);
+        }
+        CHECK(memcmp(xyz[0], xyz[1], vertices * 3u * sizeof(float)) == 0);
+        if (level > same_to) {
+            const terrimp_geomip_node *kept[2];
+            for (i = 0; i < 2; i++)
+                kept[i] = terrimpi_tree_kept(terrimp_terrain_tree(terrain[i]), node);
+            CHECK(kept[1]->error >= kept[0]->error * 0.99999f);
+            CHECK(mesh[1].error > 0.0f || mesh[0].error == 0.0f);
+            continue;
+        }
+        CHECK(memcmp(&ground_box[0], &ground_box[1], sizeof box[0]) == 0);
+        CHECK(memcmp(&box[0], &box[1], sizeof box[0]) == 0);
+        CHECK(mesh[0].error == mesh[1].error && mesh[0].error_rms == mesh[1].error_rms);
+        CHECK(mesh[0].vertex_count == mesh[1].vertex_count);
+        CHECK(mesh[0].index_count == mesh[1].index_count);
+        for (i = 0; i < 2; i++)
+            CHECK(terrimp_terrain_fill_mesh(terrain[i], node, xyz[i], stride * 3u, indices[i],
+                                            info.mesh_index_stride) == TERRIMP_OK);
+        CHECK(memcmp(xyz[0], xyz[1], stride * 3u * sizeof(float)) == 0);
+        CHECK(memcmp(indices[0], indices[1], info.mesh_index_stride * sizeof(uint16_t)) == 0);
+    }
+    for (i = 0; i < 2; i++)
+        CHECK(terrimp_terrain_fill_mesh(i ? p->opened : l->terrain, l->info.node_count, xyz[i],
+                                        info.floor_vertex_count * 3u, indices[i],
+                                        info.floor_index_count) == TERRIMP_OK);
+    CHECK(memcmp(indices[0], indices[1], info.floor_index_count * sizeof(uint16_t)) == 0);
+    for (node = 0; node < info.floor_vertex_count; node++) /* bottoms of walls: the root's lowest */
+        CHECK(same_to < UINT32_MAX || xyz[0][3u * node + 1u] == xyz[1][3u * node + 1u]);
+    for (i = 0; i < 2; i++) {
+        free(xyz[i]);
+        free(indices[i]);
+    }
+}
+
+static void pages_say_what_memory_does(void)
+{
+    static const int formats[] = {TERRIMP_FORMAT_U8, TERRIMP_FORMAT_U16, TERRIMP_FORMAT_S16};
+    uint32_t turn;
+    for (turn = 0; turn < 12u; turn++) {
+        paged_land p;
+        uint32_t width = random_range(2, 300), depth = random_range(2, 200);
+        uint32_t block_level = turn % 3u, chunk = turn % 2u ? 16u : 8u;
+        if (turn % 4u == 1u)
+            width = depth = 257u;
+        if (paged_prepare(&p, width, depth, formats[turn % 3u], turn % 5u ? LAND_HILLS : LAND_NOISE,
+                          chunk, block_level) && paged_build(&p)) {
+            if (paged_open(&p, p.l.info.node_count + 8u)) {
+                paged_fetch_all(&p);
+                check_pages_say_the_same(&p, block_level ? block_level : UINT32_MAX);
+            }
+        }
+        paged_free(&p);
+    }
+}
+
+/* Blocks in any order, some twice, some stopped halfway, each in its own part of the file: the same
+   bytes. What has not been built is told from what has. */
+static void pages_are_built_in_any_order(void)
+{
+    uint32_t turn;
+    for (turn = 0; turn < 4u; turn++) {
+        paged_land p;
+        unsigned char *file;
+        uint32_t i, block, left;
+        if (!paged_prepare(&p, 8u * random_range(10, 30), random_range(60, 200), TERRIMP_FORMAT_S16,
+                           LAND_HILLS, 8, 2) || !paged_build(&p)) {
+            paged_free(&p);
+            continue;
+        }
+        file = p.file;
+        p.file = (unsigned char *)calloc(1, p.bytes);
+        memset(p.scratch, 0x5a, p.scratch_bytes);
+        for (left = p.block_count; left > 0;) {
+            block = random_range(0, p.block_count - 1u);
+            i = terrimp_pages_check_block(&p.desc, block, p.scratch, p.scratch_bytes) == TERRIMP_OK;
+            if (i && random_range(0, 3))
+                continue;
+            p.last = random_range(0, 1) ? UINT32_MAX : random_range(0, 20);
+            CHECK(paged_build_block(&p, block) ==
+                  (p.stores > p.last ? TERRIMP_E_PAGE : TERRIMP_OK));
+            left -= !i && p.stores <= p.last;
+        }
+        p.last = UINT32_MAX;
+        CHECK(terrimp_pages_check(p.file, p.bytes, NULL) == TERRIMP_E_BAKE); /* no header yet */
+        CHECK(paged_build_end(&p) == TERRIMP_OK);
+        CHECK(memcmp(file, p.file, p.bytes) == 0);
+        p.file[p.from + p.bytes / 2u] ^= 1u;
+        free(file);
+        paged_free(&p);
+    }
+}
+
+/* Everything that can be wrong with a page that comes, or with when it comes. */
+static void pages_that_are_no_good_are_refused(void)
+{
+    paged_land p, other;
+    uint32_t turn, node, root;
+    void *page;
+    terrimp_page_info info;
+    if (!paged_prepare(&p, 150, 130, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2) || !paged_build(&p) ||
+        !paged_open(&p, 40) || !paged_prepare(&other, 150, 130, TERRIMP_FORMAT_U16, LAND_NOISE, 8,
+                                              2))
+        return;
+    other.desc.stamp = 8;
+    paged_build(&other);
+    root = p.l.info.node_count - 1u;
+    node = root - 1u;
+    CHECK(terrimp_page_begin(p.opened, node, &page) == TERRIMP_E_STATE); /* before its parent */
+    CHECK(terrimp_page_put(p.opened, root) == TERRIMP_E_STATE);          /* not begun */
+    CHECK(terrimp_page_fail(p.opened, root) == TERRIMP_E_STATE);
+    CHECK(terrimp_page_begin(p.opened, root + 1u, &page) == TERRIMP_E_RANGE);
+    CHECK(paged_fetch(&p, root) == TERRIMP_OK);
+    CHECK(paged_fetch(&p, root) == TERRIMP_E_STATE);            /* twice */
+    CHECK(terrimp_page_put(p.opened, root) == TERRIMP_E_STATE); /* the same */
+    for (turn = 0; turn < 400u; turn++) {
+        int fault = (int)(turn % 5u);
+        CHECK(terrimp_page_begin(p.opened, node, &page) == TERRIMP_OK);
+        CHECK(terrimp_page_get_info(p.opened, node, &info) == TERRIMP_OK);
+        memcpy(page, p.file + info.offset, info.bytes);
+        if (fault == 0) /* a bit turned */
+            ((unsigned char *)page)[random_range(0, info.bytes - 1u)] ^=
+                (unsigned char)(1u << random_range(0, 7));
+        else if (fault == 1) /* cut short */
+            memset((unsigned char *)page + random_range(0, info.bytes - 300u), 0, 300);
+        else if (fault == 2) /* of another node */
+            memcpy(page, p.file + info.offset - info.bytes, info.bytes);
+        else if (fault == 3) /* of another file */
+            memcpy(page, other.file + info.offset, info.bytes);
+        else /* of other heights, with the right stamp and a checksum */
+            ((uint32_t *)page)[1] = p.info.stamp;
+        if (fault == 4) {
+            uint32_t at, hash = 2166136261u, *words = (uint32_t *)page;
+            words[random_range(3, info.bytes / 4u - 1u)] = turn % 2u ? 0x7fc00000u : random_bits();
+            for (at = 1; at < info.bytes / 4u; at++)
+                hash = terrimpi_bake_hash_word(hash, words[at]);
+            words[0] = hash;
+        }
+        if (terrimp_page_put(p.opened, node) != TERRIMP_E_BAKE) {
+            /* what a page says that nothing else can tell is false, or a byte that stands for
+               nothing: it must be good to use */
+            CHECK(fault == 4 || (fault == 1 && paged_is_here(&p, node)));
+            CHECK(paged_is_here(&p, node));
+            terrimp_pages_next_frame(p.opened);
+            terrimp_pages_next_frame(p.opened);
+            terrimp_pages_next_frame(p.opened);
+            terrimpi_page_clear(&p.opened->tree, terrimpi_page_slot_of(p.opened->tree.pages, node));
+        } else {
+            CHECK(!paged_is_here(&p, node));
+        }
+    }
+    CHECK(terrimp_page_begin(p.opened, node, &page) == TERRIMP_OK);
+    CHECK(terrimp_page_fail(p.opened, node) == TERRIMP_OK);
+    CHECK(terrimp_page_put(p.opened, node) == TERRIMP_E_STATE); /* late */
+    CHECK(paged_fetch(&p, node) == TERRIMP_OK);
+    for (turn = 0; turn < 200u; turn++) { /* headers */
+        unsigned char header[TERRIMP_PAGES_HEADER_BYTES];
+        memcpy(header, p.file, sizeof header);
+        header[random_range(0, sizeof header - 1u)] ^= (unsigned char)(1u << random_range(0, 7));
+        CHECK(terrimp_pages_check(header, sizeof header, NULL) == TERRIMP_E_BAKE);
+    }
+    CHECK(terrimp_pages_check(p.file, TERRIMP_PAGES_HEADER_BYTES - 1u, NULL) == TERRIMP_E_BAKE);
+    paged_free(&p);
+    paged_free(&other);
+}
+
+/* Slots: the parent of what is here is here, a frame's pages stay, and there are never more. */
+static void pages_are_closed_upwards(void)
+{
+    paged_land p;
+    uint32_t turn, node, count, state[4] = {0, 0, 0, 0}, coming[64], full = 0;
+    void *page;
+    if (!paged_prepare(&p, 200, 170, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
+        !paged_open(&p, 24))
+        return;
+    for (turn = 0; turn < 2000u; turn++) {
+        terrimp_result result;
+        node = random_range(0, p.l.info.node_count - 1u);
+        node = p.l.info.node_count - 1u - random_range(0, node);
+        switch (turn % 400u ? random_range(0, 2) : 3u) {
+        case 0: result = paged_fetch(&p, node); break;
+        case 1: result = terrimp_page_begin(p.opened, node, &page); break;
+        case 2: result = terrimp_page_fail(p.opened, node); break;
+        default: result = terrimp_pages_next_frame(p.opened); break;
+        }
+        CHECK(result == TERRIMP_OK || result == TERRIMP_E_STATE || result == TERRIMP_E_CAPACITY);
+        full += result == TERRIMP_E_CAPACITY;
+        CHECK(terrimp_pages_withdrawn(p.opened, coming, 64, &count) == TERRIMP_OK);
+        while (count > 0 && turn % 16u == 0)
+            CHECK(terrimp_page_fail(p.opened, coming[--count]) == TERRIMP_OK);
+        memset(state, 0, sizeof state);
+        for (node = 0; node < p.l.info.node_count; node++) {
+            terrimp_page_info info, above;
+            CHECK(terrimp_page_get_info(p.opened, node, &info) == TERRIMP_OK);
+            state[info.state]++;
+            if (info.state == TERRIMP_PAGE_ABSENT || node + 1u == p.l.info.node_count)
+                continue;
+            CHECK(terrimp_page_get_info(
+                      p.opened, terrimpi_tree_parent_number(&p.opened->tree, node), &above) ==
+                  TERRIMP_OK);
+            CHECK(above.state == TERRIMP_PAGE_HERE && info.slot < 24u);
+        }
+        CHECK(state[TERRIMP_PAGE_HERE] + state[TERRIMP_PAGE_COMING] <= 24u);
+    }
+    CHECK(full > 0);
+    paged_free(&p);
+}
+
+/* Heights, normals and rays: exact where the finest page is here; else "not here", or of the finest
+   that is. */
+static void pages_answer_heights_and_rays(void)
+{
+    paged_land p;
+    uint32_t turn, level;
+    if (!paged_prepare(&p, 201, 161, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
+        !paged_open(&p, 2000))
+        return;
+    for (turn = 0; turn < 4000u; turn++) {
+        float x = random_float(0.0f, 200.0f), z = random_float(0.0f, 160.0f), h, exact;
+        float origin[3], way[3], n[3], m[3];
+        terrimp_ray_hit hit, truth;
+        terrimp_result result, true_result;
+        if (turn % 3u == 0 && turn < 3000u)
+            paged_fetch(&p, random_range(0, p.l.info.node_count - 1u));
+        if (turn == 3000u) {
+            for (level = p.l.info.node_count; level-- > 0;)
+                paged_fetch(&p, level);
+        }
+        CHECK(terrimp_heightfield_height(&p.l.desc.field, x, z, &exact) == TERRIMP_OK);
+        result = terrimp_terrain_height(p.opened, x, z, &h, n, &level);
+        CHECK(result == (paged_is_here(&p, p.l.info.node_count - 1u) ? TERRIMP_OK
+                                                                     : TERRIMP_E_PAGE));
+        if (result == TERRIMP_OK && level == 0) {
+            CHECK(fabsf(h - exact) < 1e-3f);
+            terrimp_heightfield_normal(&p.l.desc.field, x, z, m);
+            CHECK(fabsf(n[1] - m[1]) < 2e-3f);
+        } else if (result == TERRIMP_OK) {
+            CHECK(turn < 3000u);
+            CHECK(terrimp_terrain_height(p.opened, x, z, &h, NULL, NULL) == TERRIMP_E_PAGE);
+        }
+        origin[0] = random_float(-50.0f, 250.0f);
+        origin[1] = random_float(100.0f, 400.0f);
+        origin[2] = random_float(-50.0f, 210.0f);
+        way[0] = x - origin[0], way[1] = exact - origin[1], way[2] = z - origin[2];
+        result = terrimp_terrain_raycast(p.opened, origin, way, 1e6f, &hit, &level);
+        if (result == TERRIMP_E_PAGE)
+            continue;
+        true_result = terrimp_heightfield_raycast(&p.l.desc.field, origin, way, 1e6f, &truth);
+        if (turn >= 3000u) {
+            CHECK(result == true_result && level == 0);
+            if (result == TERRIMP_OK) {
+                CHECK(fabsf(hit.distance - truth.distance) < 1e-3f * truth.distance);
+                CHECK(hit.x + 1u >= truth.x && hit.x <= truth.x + 1u);
+            }
+        } else if (result == TERRIMP_OK && true_result == TERRIMP_OK && level == 0) {
+            CHECK(fabsf(hit.distance - truth.distance) < 1e-3f * truth.distance);
+        }
+    }
+    paged_free(&p);
+}
+
+/* What needs a page that is not here says so; what needs all samples at once does too. */
+static void bad_pages(void)
+{
+    paged_land p;
+    terrimp_box box;
+    terrimp_mesh_info mesh;
+    terrimp_rect all = {0, 0, 20, 20};
+    terrimp_terrain *terrain;
+    terrimp_pages_info info;
+    float xyz[3 * 81];
+    uint16_t index;
+    uint32_t level;
+    size_t bytes;
+    if (!paged_prepare(&p, 60, 50, TERRIMP_FORMAT_U8, LAND_HILLS, 8, 0) || !paged_build(&p) ||
+        !paged_open(&p, 8))
+        return;
+    bytes = terrimp_pages_bytes(p.file, p.bytes, 8);
+    REFUSES(TERRIMP_E_PAGE, box, terrimp_terrain_get_box(p.opened, 0, &box));
+    REFUSES(TERRIMP_E_PAGE, mesh, terrimp_terrain_get_mesh(p.opened, 0, &mesh));
+    REFUSES(TERRIMP_E_PAGE, xyz, terrimp_terrain_fill_ground(p.opened, 0, xyz, 3 * 81));
+    REFUSES(TERRIMP_E_PAGE, xyz, terrimp_terrain_fill_mesh(p.opened, 0, xyz, 243, &index, 1));
+    REFUSES(TERRIMP_E_PAGE, xyz, terrimp_terrain_fill_meshes(p.opened, xyz, 243, &index, 1));
+    REFUSES(TERRIMP_E_PAGE, xyz[0],
+            terrimp_terrain_height(p.opened, 1.0f, 1.0f, xyz, NULL, &level));
+    REFUSES(TERRIMP_E_MISS, xyz[0],
+            terrimp_terrain_height(p.opened, -1.0f, 1.0f, xyz, NULL, &level));
+    GIVES(TERRIMP_E_STATE, terrimp_terrain_rebuild(p.opened, &all, p.scratch, p.scratch_bytes));
+    GIVES(TERRIMP_E_STATE, terrimp_terrain_build_begin(p.opened));
+    GIVES(TERRIMP_E_STATE, terrimp_terrain_build_finish(p.opened));
+    GIVES(TERRIMP_E_STATE, terrimp_pages_next_frame(p.l.terrain));
+    CHECK(terrimp_bake_bytes(p.opened) == 0);
+    REFUSES(TERRIMP_E_NULL, info, terrimp_pages_check(NULL, 9000, &info));
+    REFUSES(TERRIMP_E_BAKE, info, terrimp_pages_check(p.file, 100, &info));
+    REFUSES(TERRIMP_E_RANGE, terrain,
+            terrimp_pages_open(NULL, p.file, p.bytes, 7, p.memory, bytes, &terrain));
+    REFUSES(TERRIMP_E_MEMORY, terrain,
+            terrimp_pages_open(NULL, p.file, p.bytes, 8, p.memory, bytes - 1u, &terrain));
+    REFUSES(TERRIMP_E_ALIGN, terrain,
+            terrimp_pages_open(NULL, p.file, p.bytes, 8, (char *)p.memory + 1, bytes, &terrain));
+    CHECK(terrimp_pages_bytes(p.file, p.bytes, 65535) == 0);
+    GIVES(TERRIMP_E_RANGE,
+          terrimp_pages_build_block(&p.desc, p.block_count, p.scratch, p.scratch_bytes));
+    GIVES(TERRIMP_E_MEMORY, terrimp_pages_build_block(&p.desc, 0, p.scratch, 100));
+    p.desc.terrain.height_low = 200.0f; /* above most samples */
+    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
+    p.desc.terrain.height_low = p.desc.terrain.height_high;
+    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
+    p.desc.terrain.height_low = 0.0f;
+    p.desc.terrain.field.format = TERRIMP_FORMAT_F32;
+    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
+    p.desc.read = NULL;
+    GIVES(TERRIMP_E_NULL, terrimp_pages_build_end(&p.desc, p.scratch, p.scratch_bytes));
+    paged_free(&p);
+}
+
+/* ---- views ---- */
+
+/* What a frame draws: where slots lie, and what follows from it, hangs on the order of captures. */
+typedef struct paged_frame {
+    terrimp_ground_command ground[2000];
+    terrimp_impostor_command impostors[2000];
+    uint32_t ground_count, impostor_count, captures, captured;
+    paged_land *p; /* NULL: all is in memory */
+    int in_capture;
+} paged_frame;
+
+static void paged_begin_capture(void *user, const terrimp_capture_command *c)
+{
+    paged_frame *f = (paged_frame *)user;
+    CHECK(!f->p || paged_is_here(f->p, c->node));
+    f->captures++;
+    f->in_capture = 1;
+}
+
+static void paged_end_capture(void *user, const terrimp_capture_command *c)
+{
+    (void)c;
+    ((paged_frame *)user)->in_capture = 0;
+}
+
+static void paged_ground(void *user, const terrimp_ground_command *c)
+{
+    paged_frame *f = (paged_frame *)user;
+    CHECK(!f->p || paged_is_here(f->p, c->node)); /* the host would fill its buffers now */
+    f->captured += f->in_capture ? 1u : 0u;
+    if (!f->in_capture && f->ground_count < 2000u)
+        f->ground[f->ground_count++] = *c;
+}
+
+static void paged_impostor(void *user, const terrimp_impostor_command *c)
+{
+    paged_frame *f = (paged_frame *)user;
+    terrimp_impostor_command *own = &f->impostors[f->impostor_count];
+    CHECK(!f->p || paged_is_here(f->p, c->node));
+    if (f->impostor_count == 2000u)
+        return;
+    f->impostor_count++;
+    *own = *c;
+    own->atlas = own->base_vertex = own->first_index = 0;
+    memset(own->texture_matrix, 0, sizeof own->texture_matrix);
+}
+
+static terrimp_result paged_render(terrimp_view *view, paged_frame *frame, paged_land *p)
+{
+    terrimp_callbacks callbacks;
+    memset(frame, 0, sizeof *frame);
+    memset(&callbacks, 0, sizeof callbacks);
+    frame->p = p;
+    callbacks.user = frame;
+    callbacks.begin_capture = paged_begin_capture;
+    callbacks.end_capture = paged_end_capture;
+    callbacks.draw_ground = paged_ground;
+    callbacks.draw_impostor = paged_impostor;
+    return terrimp_view_render(view, &callbacks);
+}
+
+/* A host whose pages come late, in any order, and sometimes not at all. */
+typedef struct paged_host {
+    paged_land *p;
+    uint32_t coming[64], count;
+    uint32_t reads, again; /* those of pages that had been read before */
+    uint32_t *times;       /* [node_count] each page has been read */
+    uint32_t pace;         /* percent of those coming that come in a frame */
+} paged_host;
+
+/* Returns whether anything is wanted or coming. */
+static int paged_serve(paged_host *h, terrimp_view *view)
+{
+    terrimp_want wants[64];
+    uint32_t count, i, gone[64], gone_count;
+    int busy;
+    CHECK(terrimp_view_wants(view, wants, 64, &count) == TERRIMP_OK);
+    busy = count > 0;
+    for (i = 0; i < count; i++) {
+        terrimp_page_info info;
+        void *page;
+        terrimp_result result;
+        CHECK(i == 0 || wants[i].urgency <= wants[i - 1u].urgency);
+        CHECK(terrimp_page_get_info(h->p->opened, wants[i].node, &info) == TERRIMP_OK);
+        CHECK(info.state == TERRIMP_PAGE_ABSENT && info.level == wants[i].level);
+        if (h->count == 64u || random_range(1, 100) > h->pace)
+            continue;
+        result = terrimp_page_begin(h->p->opened, wants[i].node, &page);
+        CHECK(result == TERRIMP_OK);
+        if (result != TERRIMP_OK)
+            continue;
+        memcpy(page, h->p->file + info.offset, info.bytes);
+        h->reads++;
+        h->again += h->times[wants[i].node]++ > 0;
+        h->coming[h->count++] = wants[i].node;
+    }
+    busy |= h->count > 0;
+    CHECK(terrimp_pages_withdrawn(h->p->opened, gone, 64, &gone_count) == TERRIMP_OK);
+    for (i = 0; i < h->count;) {
+        uint32_t node = h->coming[i], k, is_gone = 0;
+        for (k = 0; k < gone_count; k++)
+            is_gone |= gone[k] == node;
+        if (is_gone || random_range(1, 200) == 1u) {
+            CHECK(terrimp_page_fail(h->p->opened, node) == TERRIMP_OK);
+            h->reads--;
+            h->times[node]--;
+        } else if (random_range(1, 100) <= h->pace) {
+            CHECK(terrimp_page_put(h->p->opened, node) == TERRIMP_OK);
+        } else {
+            i++;
+            continue;
+        }
+        h->coming[i] = h->coming[--h->count];
+    }
+    return busy;
+}
+
+/* All of the terrain in sight is drawn, by ground or a picture, and ground meets ground: neighbours
+   differ by one level at most, and both know of it. */
+static void check_paged_frame(const land *l, const paged_frame *frame, const terrimp_camera *camera)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(l->terrain);
+    uint8_t *drawn = (uint8_t *)calloc(1, l->info.node_count); /* 1 ground, 2 impostor */
+    terrimp_frustum frustum;
+    uint32_t i, holes = 0, cracks = 0;
+    int side;
+    CHECK(terrimp_camera_frustum(camera, &frustum) == TERRIMP_OK);
+    for (i = 0; i < frame->ground_count; i++)
+        drawn[frame->ground[i].node] |= 1u;
+    for (i = 0; i < frame->impostor_count; i++)
+        drawn[frame->impostors[i].node] |= 2u;
+    for (i = 0; i < l->info.chunks_x * l->info.chunks_z; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i);
+        terrimp_box box;
+        int shown = drawn[i];
+        CHECK(terrimp_geomip_box(tree, i, &box) == TERRIMP_OK);
+        if (terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        while (!shown && n.level + 1u < tree->level_count) {
+            n = terrimpi_tree_parent(tree, &n);
+            shown = drawn[n.number];
+        }
+        holes += !shown;
+    }
+    for (i = 0; i < frame->ground_count; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, frame->ground[i].node), beyond;
+        terrimp_pattern pattern;
+        uint32_t k = 0;
+        for (;; k++) {
+            CHECK(k < TERRIMP_PATTERN_COUNT && terrimp_pattern_find(l->info.chunk_quads,
+                  TERRIMP_FORM_LIST, k, &pattern) == TERRIMP_OK);
+            if (k >= TERRIMP_PATTERN_COUNT || pattern.first_index == frame->ground[i].first_index)
+                break;
+        }
+        for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+            uint32_t up = 0;
+            if (!terrimpi_tree_beyond(tree, &n, side, &beyond))
+                continue;
+            while (!(drawn[beyond.number] & 1u) && beyond.level + 1u < tree->level_count) {
+                beyond = terrimpi_tree_parent(tree, &beyond);
+                up++;
+            }
+            if (drawn[beyond.number] & 1u) /* else finer ground, pictures or nothing is there */
+                cracks += up > 1u || (up == 1u) != (k >> side & 1u);
+        }
+    }
+    CHECK(holes == 0);
+    CHECK(cracks == 0);
+    free(drawn);
+}
+
+static terrimp_camera paged_camera(const land *l, uint32_t turn)
+{
+    terrimp_camera c;
+    float wide = (float)(l->desc.field.width - 1u), angle = random_float(0.0f, 6.28f);
+    memset(&c, 0, sizeof c);
+    c.eye[0] = random_float(0.05f, 0.95f) * wide;
+    c.eye[2] = random_float(0.05f, 0.95f) * wide;
+    c.eye[1] = turn % 3u == 0 ? random_float(300.0f, 900.0f) : random_float(200.0f, 260.0f);
+    c.forward[0] = cosf(angle);
+    c.forward[1] = turn % 3u == 0 ? -1.0f : -0.2f;
+    c.forward[2] = sinf(angle);
+    c.width_px = 640;
+    c.height_px = 480;
+    c.z_near = 1.0f;
+    c.z_far = 1e5f;
+    return c;
+}
+
+static void paged_wide(paged_land *p, uint32_t slots)
+{
+    if (!paged_prepare(p, 513, 513, TERRIMP_FORMAT_U16, LAND_HILLS, 16, 0) || !paged_build(p))
+        return;
+    paged_open(p, slots);
+}
+
+static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode)
+{
+    terrimp_view_desc desc;
+    terrimp_view *view = NULL;
+    memset(&desc, 0, sizeof desc);
+    desc.mode = mode;
+    desc.tolerance_px = 2.0f;
+    desc.atlas_size = 4096;
+    CHECK(terrimp_view_create(terrain, &desc, NULL, &view) == TERRIMP_OK);
+    return view;
+}
+
+/* Whatever the order in which pages come: in the end the eye sees what it sees of memory. */
+static void pages_settle_to_what_memory_shows(void)
+{
+    static paged_frame frames[2];
+    paged_land p;
+    uint32_t turn;
+    paged_wide(&p, 2000);
+    for (turn = 0; turn < 12u && check_bad == 0; turn++) {
+        int mode = turn % 4u == 3u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        terrimp_view *views[2];
+        terrimp_camera camera = paged_camera(&p.l, turn);
+        terrimp_stats stats[2] = {{0}, {0}};
+        paged_host host;
+        uint32_t frame, quiet = 0;
+        memset(&host, 0, sizeof host);
+        free(p.memory);
+        paged_open(&p, 2000);
+        host.p = &p;
+        host.pace = turn % 3u == 0 ? 10u : 60u;
+        host.times = (uint32_t *)calloc(p.l.info.node_count, sizeof *host.times);
+        views[0] = paged_view(p.l.terrain, mode);
+        views[1] = paged_view(p.opened, mode);
+        for (frame = 0; frame < 2000u && quiet < 8u; frame++) {
+            terrimp_result result;
+            CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+            result = terrimp_view_update(views[1], &camera);
+            CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && frame < 50u));
+            if (paged_serve(&host, views[1]) || result != TERRIMP_OK)
+                quiet = 0;
+            if (result != TERRIMP_OK)
+                continue;
+            CHECK(paged_render(views[1], &frames[1], &p) == TERRIMP_OK);
+            if (frame % 8u == 0)
+                check_paged_frame(&p.l, &frames[1], &camera);
+            quiet = frames[1].captures ? 0 : quiet + 1u;
+        }
+        CHECK(quiet == 8u);
+        for (frame = 0, quiet = 0; frame < 500u && quiet < 8u; frame++) {
+            CHECK(terrimp_view_update(views[0], &camera) == TERRIMP_OK);
+            CHECK(paged_render(views[0], &frames[0], NULL) == TERRIMP_OK);
+            quiet = frames[0].captures ? 0 : quiet + 1u;
+        }
+        CHECK(terrimp_view_get_stats(views[0], &stats[0]) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(views[1], &stats[1]) == TERRIMP_OK);
+        CHECK(stats[1].late == 0 && stats[0].late == 0);
+        CHECK(frames[0].ground_count == frames[1].ground_count);
+        CHECK(frames[0].impostor_count == frames[1].impostor_count);
+        CHECK(memcmp(frames[0].ground, frames[1].ground, sizeof frames[0].ground) == 0);
+        CHECK(memcmp(frames[0].impostors, frames[1].impostors, sizeof frames[0].impostors) == 0);
+        CHECK(stats[0].triangles == stats[1].triangles);
+        terrimp_view_destroy(views[0]);
+        terrimp_view_destroy(views[1]);
+        free(host.times);
+    }
+    paged_free(&p);
+}
+
+/* A flight with far too few slots: no holes, no cracks; nothing is read again while the eye rests.
+   With enough slots nothing is read again at all, but what failed to come. */
+static void pages_fly_without_holes(void)
+{
+    static paged_frame frame;
+    paged_land p;
+    uint32_t turn;
+    paged_wide(&p, 40);
+    for (turn = 0; turn < 6u && check_bad == 0; turn++) {
+        static const uint32_t slots[] = {40, 100, 1500};
+        int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        terrimp_camera camera = paged_camera(&p.l, turn);
+        terrimp_view *view;
+        paged_host host;
+        uint32_t i, k, once = 0, before = 0, at_rest = 0;
+        memset(&host, 0, sizeof host);
+        free(p.memory);
+        paged_open(&p, slots[turn % 3u]);
+        host.p = &p;
+        host.pace = 50;
+        host.times = (uint32_t *)calloc(p.l.info.node_count, sizeof *host.times);
+        view = paged_view(p.opened, mode);
+        for (i = 0; i < 300u; i++) {
+            terrimp_result result;
+            int rests = i % 100u >= 50u;
+            if (!rests) {
+                camera.eye[0] += camera.forward[0] * 2.0f;
+                camera.eye[2] += camera.forward[2] * 2.0f;
+                if (camera.eye[0] < 25.0f || camera.eye[0] > 487.0f || camera.eye[2] < 25.0f ||
+                    camera.eye[2] > 487.0f)
+                    camera.forward[0] = -camera.forward[0], camera.forward[2] = -camera.forward[2];
+            }
+            if (i == 150u)
+                camera = paged_camera(&p.l, turn);
+            CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+            result = terrimp_view_update(view, &camera);
+            CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && i < 40u));
+            paged_serve(&host, view);
+            if (i % 100u == 60u)
+                before = host.again;
+            if (i % 100u == 99u)
+                at_rest += host.again - before;
+            if (result != TERRIMP_OK)
+                continue;
+            CHECK(paged_render(view, &frame, &p) == TERRIMP_OK);
+            if (i % 3u == 0)
+                check_paged_frame(&p.l, &frame, &camera);
+        }
+        for (k = 0; k < p.l.info.node_count; k++)
+            once += host.times[k] > 0;
+        CHECK(at_rest <= 2u); /* not one, but for what was withdrawn with them */
+        if (slots[turn % 3u] == 1500u)
+            CHECK(host.reads * 10u <= once * 11u);
+        terrimp_view_destroy(view);
+        free(host.times);
+    }
+    paged_free(&p);
+}
+
+static void pages_tests(void)
+{
+    RUN(bad_pages);
+    RUN(pages_say_what_memory_does);
+    RUN(pages_are_built_in_any_order);
+    RUN(pages_that_are_no_good_are_refused);
+    RUN(pages_are_closed_upwards);
+    RUN(pages_answer_heights_and_rays);
+    RUN(pages_settle_to_what_memory_shows);
+    RUN(pages_fly_without_holes);
+}
+
+#endif
