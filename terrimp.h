@@ -1431,11 +1431,18 @@ typedef struct terrimp_view_desc {
     terrimp_costs costs;
 } terrimp_view_desc;
 
-/* Draw a coarse mesh with its picture, counter-clockwise faces only. With (s, t, r, q) the
-   texture matrix times (position - eye, 1), the colour is that of the atlas at (s / q, t / q),
-   bilinear, divided by its alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a
-   picture in two parts both are drawn, each only where r / q is within 0..1: by a discard, or by
-   the clip planes r >= 0 and q - r >= 0, which are rows of the matrix. */
+/* Draw a coarse mesh with its picture. With (s, t, r, q) the texture matrix times
+   (position - eye, 1), the colour is that of the atlas at (s / q, t / q), bilinear, divided by its
+   alpha; where alpha is below 0.5 nothing is drawn, depth neither. Of a picture in two parts both
+   are drawn, each only where r / q is within 0..1: by a discard, or by the clip planes r >= 0 and
+   q - r >= 0, which are rows of the matrix.
+   Draw both sides of it, but in painter's order only counter-clockwise faces. Where the eye is
+   over the ground a side that is turned away shows the sky through, or else a hole is closed: a
+   ray that leaves the ground has come in, so where it leaves is terrain. A picture made from
+   elsewhere may be transparent at the ridge where it came in; then it goes on below the surface,
+   and out of the mesh: over its back, or below its border, through the skirt there, which reaches
+   from above all of the ground beside it to below (see terrimpi_mesh_skirt_foot); or it stays
+   down, and meets the floor. */
 typedef struct terrimp_impostor_command {
     uint32_t node, level, x, z;
     uint32_t part, part_count;

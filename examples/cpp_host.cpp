@@ -318,6 +318,7 @@ std::vector<uint8_t> Renderer::draw(const Frame &frame)
         }
         turn_to_screen(frame.camera, frame.stats.z_far);
         glUniform1i(uniform("part"), c.kind == Command::impostor && c.mesh.part_count > 1);
+        (c.kind == Command::impostor ? glDisable : glEnable)(GL_CULL_FACE);
         if (c.kind == Command::impostor)
             draw_range(meshes_, c.mesh.base_vertex, c.mesh.first_index, c.mesh.index_count,
                        atlas_, c.mesh.texture_matrix, c.mesh.eye, c.mesh.alpha);

@@ -209,8 +209,10 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         clip_to_picture(h, c->texture_matrix, c->eye);
     glEnable(GL_ALPHA_TEST);
     begin_share(c->alpha);
+    glDisable(GL_CULL_FACE);
     draw(h, h->atlas, c->texture_matrix, c->eye, h->mesh_xyz + (size_t)c->base_vertex * 3,
          h->mesh_indices + c->first_index, c->index_count);
+    glEnable(GL_CULL_FACE);
     glDisable(GL_POLYGON_STIPPLE);
     glDisable(GL_ALPHA_TEST);
     glDisable(GL_CLIP_PLANE0);

@@ -30,12 +30,12 @@ static const char *const holes_ways[HOLES_WAYS] = { "auto", "auto eager", "impos
 
 /* What came of a frame, or of many. Pixels:
    holes   true ones, but for those that follow
-   slits   true ones of which each has sky of the full mesh beside it: a skyline within a pixel of
-           its place closes what the full mesh leaves open by less than that
-   shreds  true ones of which each looks under the terrain, where the full mesh shows slopes from
-           behind through slopes, by its sky; or at the picture's edge, whose sky may be outside
+   slits   true ones of which each has sky of the full mesh within two pixels: skylines that are as
+           close to their places as a filter of textures keeps them, but meet where it is narrow
+   shreds  true ones of which each comes from below, see holes_from_below; or at the picture's edge,
+           whose sky may be outside
    torn    sky, though the full mesh has none within the tolerance and 2 pixels, with or without a
-           way to the real sky: the skyline is cut off
+           way to the real sky, and none that comes from below: the skyline is cut off
    added   terrain, though the full mesh has none as close as that */
 typedef struct holes_sum {
     unsigned frames, frames_with_holes, frames_with_slits, frames_with_torn, frames_with_added;
@@ -210,11 +210,9 @@ static void holes_close(holes_scene *s)
     free(s->stack);
 }
 
-static void holes_show(holes_scene *s)
+/* Opens pictures of a size and an atlas. */
+static void holes_show(holes_scene *s, const int size[2], uint32_t atlas)
 {
-    static const int sizes[][2] = { { 128, 96 }, { 160, 128 }, { 200, 120 }, { 320, 256 } };
-    static const uint32_t atlases[] = { 256, 512, 1024, 2048, 4096 };
-    const int *size = sizes[random_range(0, 3)];
     size_t pixels = (size_t)size[0] * (size_t)size[1];
     gl_terrain_desc desc;
     memset(&desc, 0, sizeof desc);
@@ -229,8 +227,24 @@ static void holes_show(holes_scene *s)
     desc.terrain = s->terrain;
     desc.field = &s->field;
     desc.lightmap = s->lightmap;
-    desc.atlas_size = atlases[random_range(0, 4)];
+    desc.atlas_size = atlas;
     holes_need(gl_terrain_open(&s->gl, &desc));
+}
+
+/* Builds the terrain of samples that are there. */
+static void holes_build(holes_scene *s, uint32_t chunk_quads, uint32_t triangle_budget)
+{
+    terrimp_terrain_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.field = s->field;
+    desc.chunk_quads = chunk_quads;
+    desc.triangle_budget = triangle_budget;
+    holes_need_ok(terrimp_terrain_create(&desc, NULL, &s->terrain));
+    holes_need_ok(terrimp_terrain_get_info(s->terrain, &s->info));
+    holes_need_ok(terrimp_heightfield_bounds(&s->field, 0, 0, s->field.width, s->field.depth,
+                                             &s->low, &s->high));
+    snprintf(s->name + strlen(s->name), sizeof s->name - strlen(s->name), ", chunks of %u",
+             (unsigned)chunk_quads);
 }
 
 /* A chunk side that makes at least two chunks. */
@@ -243,10 +257,11 @@ static uint32_t holes_chunk(const terrimp_heightfield *f)
 
 static void holes_open(holes_scene *s, uint32_t seed)
 {
-    terrimp_terrain_desc desc;
-    uint32_t kind;
+    static const int sizes[][2] = { { 128, 96 }, { 160, 128 }, { 200, 120 }, { 320, 256 } };
+    static const uint32_t atlases[] = { 256, 512, 1024, 2048, 4096 };
+    uint32_t kind, chunk_quads;
+    const int *size;
     memset(s, 0, sizeof *s);
-    memset(&desc, 0, sizeof desc);
     s->seed = seed;
     check_state = seed * 2654435761u + 12345u;
     check_state = check_state ? check_state : 1u;
@@ -255,16 +270,10 @@ static void holes_open(holes_scene *s, uint32_t seed)
     kind = random_range(0, 5);
     if (kind > 1 || !holes_load_samples(s))
         holes_make_samples(s, kind > 3);
-    desc.field = s->field;
-    desc.chunk_quads = holes_chunk(&s->field);
-    desc.triangle_budget = holes_one_in(4) ? random_range(32, 200) : 0;
-    holes_need_ok(terrimp_terrain_create(&desc, NULL, &s->terrain));
-    holes_need_ok(terrimp_terrain_get_info(s->terrain, &s->info));
-    holes_need_ok(terrimp_heightfield_bounds(&s->field, 0, 0, s->field.width, s->field.depth,
-                                             &s->low, &s->high));
-    snprintf(s->name + strlen(s->name), sizeof s->name - strlen(s->name), ", chunks of %u",
-             (unsigned)desc.chunk_quads);
-    holes_show(s);
+    chunk_quads = holes_chunk(&s->field);
+    holes_build(s, chunk_quads, holes_one_in(4) ? random_range(32, 200) : 0);
+    size = sizes[random_range(0, 3)];
+    holes_show(s, size, atlases[random_range(0, 4)]);
 }
 
 /* ---- Paths -------------------------------------------------------------- */
@@ -438,39 +447,23 @@ static int holes_is_sky(const uint8_t *rgb)
 }
 
 /* Marks of pixels, and how far a skyline outside of the frame may reach into it. */
-enum { HOLES_TERRAIN, HOLES_LOST, HOLES_REAL_SKY, HOLES_EDGE = 3 };
+enum { HOLES_TERRAIN, HOLES_LOST, HOLES_REAL_SKY, HOLES_EDGE = 3, HOLES_SLIT = 2 };
 
 static int holes_smaller(int a, int b)
 {
     return a < b ? a : b;
 }
 
-/* Where a ray comes to be over or under the terrain, as a multiple of its direction; 0: it starts
-   there, or never does. */
-static float holes_entry(const terrimp_box *box, const float eye[3], const float way[3])
-{
-    float from = 0.0f;
-    int i;
-    for (i = 0; i < 3; i += 2) {
-        float side = eye[i] < box->min[i] ? box->min[i] : box->max[i];
-        if (eye[i] < box->min[i] || eye[i] > box->max[i])
-            from = fmaxf(from, (side - eye[i]) / way[i]);
-    }
-    return from;
-}
-
-/* Whether a pixel looks under the terrain, or over its outer border by no more than `reach` pixels:
-   there it is seen from below, and the full mesh shows shreds of slopes, seen through others from
-   behind. */
-static int holes_looks_under(const holes_scene *s, const holes_path *p, const holes_frame *f,
-                             size_t pixel, int reach)
+/* Whether a pixel's ray comes from below: the first of the surface that it meets, it meets from
+   behind. What the full mesh shows there are shreds, of slopes seen through slopes. */
+static int holes_from_below(const holes_scene *s, const holes_path *p, const holes_frame *f,
+                            size_t pixel)
 {
     terrimp_camera camera = tour_camera_at(&p->poses[f->pose], &s->info.box, p->fov,
                                            (uint32_t)f->width, (uint32_t)f->height);
-    float way[3], at[3], tan_up, right, up, from;
+    float way[3], along = 0.0f, tan_up, right, up;
+    terrimp_ray_hit hit;
     int i;
-    if (f->place < HOLES_BESIDE || f->place == HOLES_UNDER)
-        return f->place == HOLES_UNDER;
     memcpy(camera.up, p->up, sizeof camera.up);
     holes_need_ok(terrimp_camera_resolve(&camera, &camera));
     tan_up = tanf(0.5f * p->fov) / (0.5f * (float)f->height);
@@ -481,12 +474,11 @@ static int holes_looks_under(const holes_scene *s, const holes_path *p, const ho
         way[i] = camera.forward[i] + up * camera.up[i]
                  + right * (camera.forward[j] * camera.up[k] - camera.forward[k] * camera.up[j]);
     }
-    from = holes_entry(&s->info.box, camera.eye, way);
+    if (terrimp_heightfield_raycast(&s->field, camera.eye, way, 1e30f, &hit) != TERRIMP_OK)
+        return 0;
     for (i = 0; i < 3; i++)
-        at[i] = camera.eye[i] + from * way[i];
-    at[0] = fminf(fmaxf(at[0], s->info.box.min[0]), s->info.box.max[0]);
-    at[2] = fminf(fmaxf(at[2], s->info.box.min[2]), s->info.box.max[2]);
-    return at[1] < holes_ground(s, at) + (float)reach * tan_up * from;
+        along += way[i] * hit.normal[i];
+    return along > 0.0f;
 }
 
 /* Whether the full mesh shows sky within r columns and rows of a pixel. */
@@ -502,8 +494,7 @@ static int holes_sky_by(const holes_frame *f, int x, int y, int r)
 
 /* Takes the lost pixels that touch one another, from `pixel` on, marks them as terrain, and counts
    them as what they are: nothing when they touch the real sky. */
-static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f, size_t pixel,
-                       int reach)
+static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f, size_t pixel)
 {
     int is_hole = 1, over = 0, wide = 0, at_edge = 0, deep = 0, i, j;
     size_t depth = 0, count = 0;
@@ -516,8 +507,8 @@ static void holes_take(const holes_scene *s, const holes_path *p, holes_frame *f
                                  holes_smaller(y, f->height - 1 - y));
         at_edge |= edge == 0;
         deep |= edge >= HOLES_EDGE;
-        wide |= !holes_sky_by(f, x, y, 1);
-        over |= !holes_looks_under(s, p, f, at, reach) || !holes_sky_by(f, x, y, reach);
+        wide |= !holes_sky_by(f, x, y, HOLES_SLIT);
+        over |= !holes_from_below(s, p, f, at);
         count++;
         for (j = y > 0 ? y - 1 : 0; j <= y + 1 && j < f->height; j++)
             for (i = x > 0 ? x - 1 : 0; i <= x + 1 && i < f->width; i++) {
@@ -551,14 +542,14 @@ static void holes_count(const holes_scene *s, const holes_path *p, holes_frame *
         s->marks[i] = !holes_is_sky(f->rgb + i * 3) ? HOLES_TERRAIN
                       : holes_is_sky(f->full + i * 3) ? HOLES_REAL_SKY : HOLES_LOST;
         if (s->marks[i] != HOLES_LOST || holes_sky_by(f, x, y, reach) || x < reach || y < reach
-            || x + reach >= f->width || y + reach >= f->height)
+            || x + reach >= f->width || y + reach >= f->height || holes_from_below(s, p, f, i))
             continue;
         torn = f->torn++ ? torn : i;
     }
     f->first = torn;
     for (i = 0; i < count; i++)
         if (s->marks[i] == HOLES_LOST)
-            holes_take(s, p, f, i, reach);
+            holes_take(s, p, f, i);
 }
 
 /* Whether the full mesh has terrain within r columns and rows of a pixel, or the edge is there. */

@@ -1609,6 +1609,7 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
 
 #include "render_hidden.h"
 #include "render_scene.h"
+#include "render_holes.h"
 
 int main(void)
 {
@@ -1616,6 +1617,8 @@ int main(void)
     RUN(no_hole_in_hills);
     RUN(no_hole_in_rough_terrain);
     RUN(no_hole_in_a_real_tile);
+    RUN(no_hole_in_random_flights);
+    RUN(inputs_that_once_had_holes_have_none);
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
     RUN(a_real_tile_looks_like_the_full_mesh);

@@ -767,7 +767,9 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         glActiveTexture(GL_TEXTURE0);
     }
     glUniform3fv(p->picture_eye, 1, c->eye);
+    glDisable(GL_CULL_FACE);
     draw_mesh(g, g->atlas[c->atlas], slot, c->index_count);
+    glEnable(GL_CULL_FACE);
 }
 
 /* The floor only fills what would else be holes: its outlines would hide those that matter. */
