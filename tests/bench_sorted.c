@@ -249,7 +249,8 @@ static void fly_views(size_t frames, double rate)
     need(terrimp_terrain_fill_meshes(terrain, h.xyz, 3 * h.info.mesh_vertex_count, h.mesh_indices,
                                      h.info.mesh_index_count));
     say("\nViews of the same pages, repeated without end, and painter's order of all that they "
-        "draw; costs as predicted,\nin the unit of `terrimp_costs`, captures and all, from the 50th frame on\n\n"
+        "draw; costs as predicted,\nin the unit of `terrimp_costs`, captures and all, "
+        "from the 50th frame on\n\n"
         "| mode | draws | captures | triangles | update us | median cost | 99 %% / median | cycles "
         "a triangle of ground | of meshes |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     median = fly_view(&h, "GEOMIP", TERRIMP_MODE_GEOMIP, 0.0f, frames, rate);
