@@ -48,7 +48,7 @@
        >>atlas        first-fit decreasing height packing; an atlas whose slots come and go
        >>terrain      what was built, as the frame and the host's buffers use it
        >>bake         what was built as one block: for a file, for read-only memory
-       >>visibility   the horizon: which nodes are hidden behind others
+       >>visibility   which nodes are hidden behind others: the horizon, visible sets
        >>residency    terrain larger than memory: which pages are here
        >>capture      a picture to be made, and the ground that is drawn for it
        >>view         the per-frame decision, the schedule, the draw commands
@@ -56,9 +56,9 @@
        >>layers       pictures one behind the other, of what stands on terrain
    and, for those that build terrains and do not only draw them, behind one TERRIMP_NO_BUILD:
        >>simplifier   coarse meshes: borders, collapses, skirts, standing proud
-       >>builder      filling of voids, errors of the ground, coarse meshes, edits, writing bakes
+       >>builder      filling of voids, errors of the ground, coarse meshes, edits, materials, bakes
        >>page-builder pages of a terrain from samples that are larger than memory
-       >>visible-sets what a horizon is made of
+       >>visible-sets what a horizon is made of, and what can be seen from where
        >>layer-builder  where layers stand, what of them is hidden, rectangles that hold the rest;
                         depth meshes
        >>placement    which pictures to prepare so that no view costs too much
@@ -164,11 +164,10 @@
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
          TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
-         TERRIMP_NO_HORIZON    views take no walls: E_RANGE
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 35 KB of code at -Os on
-       a Cortex-M4, 27 KB without the four options that follow it above, if its linker drops
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 30 KB of code at -Os on
+       a Cortex-M4, 27 KB without the three options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -1096,12 +1095,50 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 
 /* ==== Visibility ========================================================= >>visibility */
 
-/* What lies behind a ridge need be neither drawn nor captured. A horizon says which nodes do, from
-   bounds of the heights within each node, the walls: bytes that are built with the terrain (room
-   Visible sets) and lie beside it. It says so only of nodes of which nothing can be seen.
+/* What lies behind a ridge need be neither drawn nor captured. Two things say which nodes do, only
+   of nodes of which nothing can be seen: a horizon, found anew in each frame from the walls (bounds
+   of the heights within each node); and visible sets, a table of what can be seen from where. Room
+   Visible sets builds walls and table. A view asks what it is given as its `hider`:
 
-   How to use it: begin with the camera, then ask for nodes, closest first for speed; or cull the
-   draws of terrimp_geomip_select. */
+     terrimp_horizon_init(&horizon, tree, walls);
+     settings.hider = &horizon.hider; */
+
+/* Something that hides nodes, of this room or the host's own: a struct that begins with this one.
+   Its functions are called within terrimp_view_update: views that are updated one after the other
+   may share one. */
+typedef struct terrimp_hider {
+    const terrimp_quadtree *tree; /* of the terrain */
+    /* Begins a frame. What is drawn may be off its samples by `low` [wu]; and what hides may be off
+       what it hides by `error` times its distance. The camera is resolved. Returns 0 when nothing
+       is hidden in the frame. */
+    int (*begin)(struct terrimp_hider *hider, const terrimp_camera *camera, float error, float low);
+    /* Returns nonzero for a node all of which is hidden. */
+    int (*hides)(struct terrimp_hider *hider, const terrimp_node *node);
+    struct terrimp_hider *next;   /* asked of what this one does not hide: what takes more time;
+                                     NULL: none */
+    int blind;                    /* set by the view: what begin returned was 0 */
+} terrimp_hider;
+
+/* Private: walls and how they are kept. */
+typedef struct terrimp_walls {
+    const terrimp_quadtree *tree;
+    const unsigned char *codes;
+    uint32_t quads, cells; /* of a cell at level 0: 2 or 4; cells along a side of a node */
+    uint32_t stride;       /* [bytes] from node to node */
+} terrimp_walls;
+
+/* Private: where an eye is, and what may be clipped round it. */
+typedef struct terrimp_stand {
+    float eye;         /* [wu] its height */
+    uint32_t quad[2];  /* that it is over */
+    float within[2];   /* its place in that, 0..1 */
+    float error, low;  /* by which ground may be drawn off its samples: per distance, [wu] */
+    float rounding;    /* [quads] of places */
+    float clipped[2];  /* [quads] to where z_near may clip ground */
+    float steepest;    /* slope of sight lines under which ground is clipped away */
+} terrimp_stand;
+
+/* --- the horizon --- */
 
 /* Bytes of the walls of a tree: 0.18 a sample with chunks of 64 quads, 0.2 with 32, 0.3 with 16.
    0 when tree is NULL. */
@@ -1129,39 +1166,36 @@ typedef struct terrimp_horizon_bin {
     uint16_t reached, top;                /* steps that were looked at */
 } terrimp_horizon_bin;
 
-/* The horizon of one eye, about 28 KiB. Begin fills it in; it holds for the life of the tree. */
+/* The horizon of one eye, about 28 KiB. */
 typedef struct terrimp_horizon {
-    const terrimp_quadtree *tree;
-    const unsigned char *walls;
-    uint32_t quads, cells, stride; /* private, all: how the walls are kept */
-    int blind;         /* nothing can be said to be hidden */
-    float eye;         /* [wu] its height */
-    uint32_t quad[2];  /* that it is over */
-    float within[2];   /* its place in that, 0..1 */
-    float error, low;  /* by which walls may lie below what is kept: per distance, [wu] */
-    float spread;      /* [wu] longest horizontal distance of a point at distance 1 on an axis */
-    float rounding;    /* [quads] of places */
-    float clipped[2];  /* [quads] to where z_near may clip ground */
-    float steepest;    /* slope of sight lines under which ground is clipped away */
+    terrimp_hider hider; /* for a view */
+    terrimp_walls walls; /* private, all from here on */
+    terrimp_stand stand;
+    int blind;    /* nothing can be said to be hidden */
+    float spread; /* [wu] longest horizontal distance of a point at distance 1 on an axis */
     float inverse[TERRIMP_HORIZON_BINS + 1];
     uint32_t step_count[4];
     terrimp_horizon_step steps[4][TERRIMP_HORIZON_STEPS]; /* towards +x, -x, +z, -z */
     terrimp_horizon_bin bins[4][TERRIMP_HORIZON_BINS];
 } terrimp_horizon;
 
+/* Makes a horizon over a terrain's walls.
+
+   tree     built; outlives the horizon
+   walls    [terrimp_walls_bytes] built, aligned to 4; the same */
+TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls);
+
 /* Begins the horizon of a camera. Ground that z_near clips hides nothing. An eye below the ground
    or beside the terrain has no horizon: nothing is hidden from it, and that is no error.
 
-   tree     built
-   walls    [terrimp_walls_bytes] built, aligned to 4
    error    how far below its samples the ground in front may be drawn, over the distance to it:
             0 for full resolution; a picture that is up to n pixels off its place: n / K
             [Limits: 0..0.5]
    low      [wu] the same whatever the distance [Limits: >= 0]
-   Errors   E_NULL; E_ALIGN; E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
+   Errors   E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
    Cost     about 3 us */
 TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
-                                                 const terrimp_quadtree *tree, const void *walls,
                                                  const terrimp_camera *camera, float error,
                                                  float low);
 
@@ -1186,9 +1220,42 @@ TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, f
    Errors     those of begin: the draws are unchanged
    Cost       25 to 60 us in mountains */
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
-                                                const terrimp_quadtree *tree, const void *walls,
                                                 const terrimp_camera *camera,
                                                 terrimp_geomip_view *view);
+
+/* --- visible sets --- */
+
+/* For each cell of the ground plane and each node the least height of an eye over the cell that can
+   see any of the node: what sees a point sees it from farther up, too, so one number tells all. The
+   look-up is a comparison of bytes. Cells are the nodes of one level, and nodes those of another
+   and all above it: 16 x 16 cells of as many nodes take 64 KiB.
+
+     sets.codes = malloc(terrimp_sets_bytes(tree, &sets));  cell_level, node_level: set before
+     terrimp_sets_init(&sets, tree);                        then build or load the codes
+     settings.hider = &sets.hider; */
+typedef struct terrimp_sets {
+    terrimp_hider hider; /* for a view */
+    uint32_t cell_level; /* [Limits: < level_count] */
+    uint32_t node_level; /* [Limits: < level_count] */
+    float error, low;    /* what is drawn may be so far off, as in terrimp_hider [Limits: 0..0.5,
+                            >= 0]: in a frame where it may be farther off nothing is hidden */
+    float reach;         /* [wu] what eyes above a cell's lowest ground are told apart
+                            [Default 0 -> three times the terrain's range of heights] */
+    uint8_t *codes;      /* (required) [terrimp_sets_bytes] a row of nodes for each cell */
+    const uint8_t *row;  /* private, all from here on: of the cell that the eye is over */
+    uint32_t code;       /* of the eye's height */
+    terrimp_stand stand;
+} terrimp_sets;
+
+/* Bytes of the codes; 0 for levels that the tree does not have. */
+TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets);
+
+/* Checks settings, fills in defaults. The codes are left as they are: zeros hide nothing.
+
+   tree     built; outlives the sets
+   Errors   E_RANGE, E_NOT_FINITE */
+TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree);
+
 /* ==== Residency ========================================================== >>residency */
 
 /* A terrain that is larger than memory lies in pages: a header, and for each node its ground, 65 x
@@ -1210,7 +1277,7 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
    pages that a frame uses stay where they are until the next frame's update. A page lies in its
    slot until another needs it, and what the host has made of it is good as long: a mesh has its
    place in the host's buffers by the slot (terrimp_terrain_get_mesh). Views of modes AUTO and
-   GEOMIP draw pages, without morph_ratio and walls. */
+   GEOMIP draw pages, without morph_ratio and hider. */
 
 #define TERRIMP_PAGES_VERSION 1u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
@@ -1418,16 +1485,16 @@ typedef struct terrimp_view_desc {
                                repetitions along each axis, with the eye's in the middle. The
                                field's quads are multiples of chunk_quads; nodes are drawn up to the
                                level at which its chunks are no multiple of theirs. It takes 44
-                               bytes more for each node that it has by that. No walls then
+                               bytes more for each node that it has by that. No hider then
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
-    const void *walls;      /* of the terrain's quadtree, aligned to 4, built, outliving the view:
-                               what lies behind a ridge is neither drawn nor captured. The view
-                               takes 28 KiB more [Default NULL -> nothing is hidden so] */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
                                they fit, and made finer again when that is predicted to fit, too; as
                                many captures are made as leave no frame dearer
                                [Limits: >= 0] [Default 0 -> no limit] */
+    terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
+                               neither drawn nor captured: see terrimp_horizon, terrimp_sets
+                               [Default NULL -> nothing is hidden so] */
     terrimp_costs costs;
 } terrimp_view_desc;
 
@@ -1539,8 +1606,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
               atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
-              before, or 0;
-              walls and exact_depth only if the view was made with them
+              before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -2205,6 +2271,35 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 
 #endif /* TERRIMP_NO_MALLOC */
 
+/* --- materials --- */
+
+/* Where a material lies: weights over the whole terrain, as a texture that is clamped at its edges
+   and read bilinearly. */
+typedef struct terrimp_weights {
+    const uint8_t *texels; /* (required) */
+    uint32_t width, depth; /* in texels [Limits: 1..65536] */
+    size_t texel_bytes;    /* from one to the next [Default 0 -> 1] */
+    size_t row_bytes;      /* from row to row [Default 0 -> width * texel_bytes] */
+    int centred;           /* nonzero: the middles of the first and the last texel lie on the first
+                              and the last sample; else their outer edges do */
+} terrimp_weights;
+
+/* Finds which materials lie on each node: bit k of masks[node] for weights k. A pass that lacks its
+   bit has no weight on any pixel of the node and need not be drawn: every command says its node, on
+   the screen and in captures.
+
+   weights    [count]
+   count      [Limits: 1..32]
+   reach      [texels] of a read to both sides: 1 when it is bilinear; with mipmaps up to level m
+              1.5 times 2^m, so let the texture have no more of them [Limits: 1..65536]
+   masks      [node_count] out
+   Errors     E_NULL, E_RANGE, E_NOT_FINITE; nothing is written
+   Cost       O(count * texels)
+   Source     Wagner 2003, "Materials" */
+TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
+                                                  const terrimp_weights *weights, uint32_t count,
+                                                  float reach, uint32_t *masks);
+
 /* --- bake --- */
 
 /* The bytes of a terrain's bake; 0 when the terrain is NULL or not built, or for 4 GiB and more. */
@@ -2297,6 +2392,29 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
    Cost       that of build_node for each: 0.05 ms for a chunk and all nodes above it */
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls);
+
+/* --- visible sets --- */
+
+/* Finds the codes of one cell, after terrimp_sets_init. Different cells may be built at the same
+   time by several threads.
+
+   sets       its codes of this cell are written
+   walls      [terrimp_walls_bytes] built
+   cell       [Limits: < nodes of cell_level]
+   samples    after an edit: only the nodes are found anew whose sight lines meet it; NULL: all
+   Errors     E_NULL; E_ALIGN; E_RANGE
+   Cost       10 ms for 256 nodes of 64 x 64 quads, 4 ms for those of 16 x 16
+   Source     Wagner 2003 asks for them; monotony in height, cuts and their proof are our own */
+TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, const void *walls,
+                                                   uint32_t cell, const terrimp_rect *samples);
+
+/* Forgets what an edit may have changed, in the frame of the edit: those nodes are not hidden any
+   more. Building its cells anew, at leisure, with the same rectangle, finds them again.
+
+   Errors     E_NULL; E_RANGE
+   Cost       20 ns for a cell and a node */
+TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
+                                              const terrimp_rect *samples);
 
 /* ==== Layer builder ====================================================== >>layer-builder */
 
@@ -7255,28 +7373,142 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 
 #define TERRIMPI_WALL_TOPS 4u      /* along a node's side: squares of which the height is kept */
 #define TERRIMPI_WALL_FINE 20.0f   /* quads of distance for each quad between walls */
-#define TERRIMPI_HORIZON_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
+#define TERRIMPI_STAND_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
 #define TERRIMPI_HORIZON_NONE -1e30f
 #define TERRIMPI_HORIZON_ALL 1e30f
 #define TERRIMPI_HORIZON_CLOSEST 0.25f /* [quads] of a wall: closer by, places are too rough */
 
+/* ---- where an eye is ---- */
+
+/* The last column, or row. */
+static uint32_t terrimpi_stand_last(const terrimp_quadtree *tree, uint32_t axis)
+{
+    return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
+}
+
+/* The highest that the ground can be within so many quads of the eye: of each quad the highest
+   corner or, if that is less, how far its triangles rise there. */
+static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *tree,
+                                const float reach[2])
+{
+    uint32_t from[2], to[2], k, i, j;
+    float top = TERRIMPI_HORIZON_NONE;
+    for (k = 0; k < 2u; k++) {
+        uint32_t last = terrimpi_stand_last(tree, k) - 1u;
+        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + s->rounding, 1e6f));
+        if (wide > TERRIMPI_STAND_CLIPPED)
+            return TERRIMPI_HORIZON_ALL;
+        from[k] = s->quad[k] - terrimpi_min_u32(wide, s->quad[k]);
+        to[k] = terrimpi_min_u32(s->quad[k] + wide, last);
+    }
+    for (j = from[1]; j <= to[1]; j++)
+        for (i = from[0]; i <= to[0]; i++) {
+            float a = terrimpi_field_sample(&tree->field, i, j), u, v, low, high;
+            float b = terrimpi_field_sample(&tree->field, i + 1u, j);
+            float c = terrimpi_field_sample(&tree->field, i, j + 1u);
+            float d = terrimpi_field_sample(&tree->field, i + 1u, j + 1u);
+            u = (float)((int32_t)s->quad[0] - (int32_t)i) + s->within[0];
+            v = (float)((int32_t)s->quad[1] - (int32_t)j) + s->within[1];
+            low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
+                  terrimpi_abs(d - b) * reach[1];
+            high = a + (d - c) * u + (c - a) * v + terrimpi_abs(d - c) * reach[0] +
+                   terrimpi_abs(c - a) * reach[1];
+            high = terrimpi_min(terrimpi_max(low, high),
+                                terrimpi_max(terrimpi_max(a, b), terrimpi_max(c, d)));
+            top = terrimpi_max(top, high);
+        }
+    return top;
+}
+
+/* Finds which sight lines may begin below the ground, for what is closer than z_near is not drawn.
+   Returns 0 when they all may. */
+static int terrimpi_stand_clip(terrimp_stand *s, const terrimp_quadtree *tree,
+                               const terrimp_capture *c)
+{
+    const terrimp_heightfield *field = &tree->field;
+    float x = terrimpi_max(c->tan_right, -c->tan_left), y = terrimpi_max(c->tan_up, -c->tan_down);
+    float reach = c->z_near * TERRIMP_SQRTF(1.0f + x * x + y * y), top = s->low, quads[2];
+    s->clipped[0] = quads[0] = reach / field->spacing_x;
+    s->clipped[1] = quads[1] = reach / field->spacing_z;
+    s->steepest = TERRIMPI_HORIZON_NONE;
+    if (tree->nodes[tree->node_count - 1u].high < s->eye - 2.0f * reach)
+        return 1;
+    top += terrimpi_stand_top(s, tree, quads) + 2.0f * s->error * reach;
+    if (top >= s->eye)
+        return 0;
+    if (top > s->eye - reach)
+        s->steepest = (top - s->eye) * terrimpi_min(field->spacing_x, field->spacing_z) / reach;
+    return 1;
+}
+
+/* By how many quads places may be off: two roundings of a float. */
+static float terrimpi_stand_rounding(const terrimp_quadtree *tree)
+{
+    const terrimp_heightfield *f = &tree->field;
+    float x = terrimpi_field_line(f->origin_x, f->spacing_x, f->width - 1u);
+    float z = terrimpi_field_line(f->origin_z, f->spacing_z, f->depth - 1u);
+    x = terrimpi_max(terrimpi_abs(f->origin_x), terrimpi_abs(x)) / f->spacing_x;
+    z = terrimpi_max(terrimpi_abs(f->origin_z), terrimpi_abs(z)) / f->spacing_z;
+    return 1e-6f + 1.2e-7f * terrimpi_max(x, z);
+}
+
+/* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
+static int terrimpi_stand_over(terrimp_stand *s, const terrimp_quadtree *tree, const float eye[3])
+{
+    const terrimp_heightfield *field = &tree->field;
+    float x, z;
+    if (!terrimpi_field_locate(field, eye[0], eye[2], &s->quad[0], &s->quad[1]))
+        return 0;
+    x = terrimpi_field_line(field->origin_x, field->spacing_x, s->quad[0]);
+    z = terrimpi_field_line(field->origin_z, field->spacing_z, s->quad[1]);
+    s->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
+    s->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
+    s->rounding = terrimpi_stand_rounding(tree);
+    return 1;
+}
+
+/* Looks at what a camera stands over. Returns 0 when nothing is hidden from it. */
+static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
+                                const terrimp_camera *camera, const terrimp_capture *capture,
+                                float error, float low)
+{
+    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    float ground;
+    s->eye = camera->eye[1];
+    s->error = error;
+    s->low = low + 4e-7f * (terrimpi_abs(s->eye) +
+                            terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
+    return terrimpi_stand_over(s, tree, camera->eye) &&
+           terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) ==
+               TERRIMP_OK &&
+           s->eye > ground + s->low && terrimpi_stand_clip(s, tree, capture);
+}
+
+/* Whether sight lines to a node whose lowest height is given could run below the ground where
+   z_near lets them begin. */
+static int terrimpi_stand_under(const terrimp_stand *s, float x, float z, float size, float low)
+{
+    float beside_x = terrimpi_max(terrimpi_max(x, -x - size), 0.0f);
+    float beside_z = terrimpi_max(terrimpi_max(z, -z - size), 0.0f);
+    return low - s->eye <= s->steepest * terrimpi_max(beside_x, beside_z);
+}
+
+/* ---- walls ---- */
+
 /* How the walls of a node are kept: the height of code 0 and the step of the codes, as floats;
    [2 axes][cells lines][cells] codes of lowest heights, rounded down; and those of the highest of
    each of 4 x 4 squares, rounded up. */
-typedef struct terrimpi_wall_form {
-    uint32_t quads, cells; /* of a cell at level 0, a power of two; along a side of a node */
-    uint32_t stride;       /* [bytes] from node to node */
-} terrimpi_wall_form;
-
-static terrimpi_wall_form terrimpi_wall_form_of(const terrimp_quadtree *tree)
+static terrimp_walls terrimpi_walls_of(const terrimp_quadtree *tree, const void *codes)
 {
-    terrimpi_wall_form form;
-    form.quads = tree->chunk_quads % 4u == 0 ? 4u : 2u;
-    form.cells = tree->chunk_quads / form.quads;
-    form.stride = 2u * (uint32_t)sizeof(float) + 2u * form.cells * form.cells +
-                  TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS;
-    form.stride = (form.stride + 3u) / 4u * 4u;
-    return form;
+    terrimp_walls w;
+    w.tree = tree;
+    w.codes = (const unsigned char *)codes;
+    w.quads = tree->chunk_quads % 4u == 0 ? 4u : 2u;
+    w.cells = tree->chunk_quads / w.quads;
+    w.stride = 2u * (uint32_t)sizeof(float) + 2u * w.cells * w.cells +
+               TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS;
+    w.stride = (w.stride + 3u) / 4u * 4u;
+    return w;
 }
 
 TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
@@ -7285,7 +7517,7 @@ TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
     int ok = 1;
     if (!tree)
         return 0;
-    bytes = terrimpi_mul(tree->node_count, terrimpi_wall_form_of(tree).stride, &ok);
+    bytes = terrimpi_mul(tree->node_count, terrimpi_walls_of(tree, NULL).stride, &ok);
     return ok ? bytes : 0;
 }
 
@@ -7297,28 +7529,52 @@ static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const v
 }
 
 /* The codes of a node's walls and the two floats before them. */
-static const unsigned char *terrimpi_wall_codes(const unsigned char *walls, uint32_t stride,
-                                                uint32_t node, float scale[2])
+static const unsigned char *terrimpi_walls_codes(const terrimp_walls *w, uint32_t node,
+                                                 float scale[2])
 {
-    const unsigned char *at = walls + (size_t)node * stride;
+    const unsigned char *at = w->codes + (size_t)node * w->stride;
     memcpy(scale, at, 2u * sizeof(float));
     return at + 2u * sizeof(float);
 }
 
-/* ---- walls as an eye sees them ---- */
-
-/* The last column, or row. */
-static uint32_t terrimpi_horizon_last(const terrimp_quadtree *tree, uint32_t axis)
+/* Those of its squares. */
+static const unsigned char *terrimpi_walls_tops(const terrimp_walls *w, uint32_t node,
+                                                float scale[2])
 {
-    return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
+    return terrimpi_walls_codes(w, node, scale) + 2u * w->cells * w->cells;
 }
+
+/* The lowest height of a wall of a level in the cells that quads i to j are in. The wall is told by
+   the node across the axis that it is in, and its row there. */
+static float terrimpi_walls_lowest(const terrimp_walls *w, uint32_t axis, uint32_t level,
+                                   uint32_t across, uint32_t row, uint32_t i, uint32_t j)
+{
+    uint32_t shift = level + w->quads / 2u; /* quads are 2 or 4 */
+    uint32_t cell = i >> shift, last = j >> shift, node = cell / w->cells;
+    uint32_t columns = w->tree->level_x[level];
+    float lowest = TERRIMPI_HORIZON_ALL, scale[2];
+    row = (axis * w->cells + row) * w->cells;
+    while (cell <= last) {
+        uint32_t end = terrimpi_min_u32(last + 1u, (node + 1u) * w->cells), lowest_code = 255u;
+        const unsigned char *codes = terrimpi_walls_codes(
+            w, w->tree->level_first[level] + (axis == 0 ? node * columns + across
+                                                        : across * columns + node), scale);
+        for (; cell < end; cell++)
+            lowest_code = terrimpi_min_u32(lowest_code, codes[row + cell - node * w->cells]);
+        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)lowest_code);
+        node++;
+    }
+    return lowest;
+}
+
+/* ---- walls as an eye sees them ---- */
 
 /* The sample where line `line` of an axis crosses line `other` of the other one. */
 static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
                                      uint32_t other)
 {
-    return axis == 0 ? terrimpi_field_sample(&h->tree->field, line, other)
-                     : terrimpi_field_sample(&h->tree->field, other, line);
+    return axis == 0 ? terrimpi_field_sample(&h->hider.tree->field, line, other)
+                     : terrimpi_field_sample(&h->hider.tree->field, other, line);
 }
 
 /* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
@@ -7336,29 +7592,6 @@ static float terrimpi_horizon_ground(const terrimp_horizon *h, uint32_t axis, ui
     return terrimpi_min(lowest, a + (b - a) * to);
 }
 
-/* The same from walls, of the cells that quads i to j are in. */
-static float terrimpi_horizon_walls(const terrimp_horizon *h, uint32_t axis,
-                                    const terrimp_horizon_step *step, uint32_t i, uint32_t j)
-{
-    uint32_t level = step->level - 1u, shift = level + h->quads / 2u; /* quads are 2 or 4 */
-    uint32_t cell = i >> shift, last = j >> shift, node = cell / h->cells;
-    uint32_t row = (axis * h->cells + step->row) * h->cells;
-    float lowest = TERRIMPI_HORIZON_ALL, scale[2];
-    while (cell <= last) {
-        uint32_t end = terrimpi_min_u32(last + 1u, (node + 1u) * h->cells), lowest_code = 255u;
-        const unsigned char *codes = terrimpi_wall_codes(
-            h->walls, h->stride,
-            h->tree->level_first[level] +
-                (axis == 0 ? node * h->tree->level_x[level] + step->node
-                           : step->node * h->tree->level_x[level] + node), scale);
-        for (; cell < end; cell++)
-            lowest_code = terrimpi_min_u32(lowest_code, codes[row + cell - node * h->cells]);
-        lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)lowest_code);
-        node++;
-    }
-    return lowest;
-}
-
 /* What integer a float is at or above. */
 static int32_t terrimpi_horizon_floor(float value)
 {
@@ -7373,21 +7606,22 @@ static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, 
 {
     const float width = 2.0f / (float)TERRIMP_HORIZON_BINS;
     uint32_t axis = quarter / 2u, other = 1u - axis, i, j;
-    uint32_t quads = terrimpi_horizon_last(h->tree, other);
+    uint32_t quads = terrimpi_stand_last(h->hider.tree, other);
     float t = (float)bin * width - 1.0f, lowest, slope;
-    float from = h->within[other] + t * step->distance - h->rounding;
-    float to = h->within[other] + (t + width) * step->distance + h->rounding;
+    float from = h->stand.within[other] + t * step->distance - h->stand.rounding;
+    float to = h->stand.within[other] + (t + width) * step->distance + h->stand.rounding;
     int32_t first = terrimpi_horizon_floor(from), last = terrimpi_horizon_floor(to);
-    i = h->quad[other] + (uint32_t)first; /* below 0 it becomes large */
-    j = h->quad[other] + (uint32_t)last;
+    i = h->stand.quad[other] + (uint32_t)first; /* below 0 it becomes large */
+    j = h->stand.quad[other] + (uint32_t)last;
     if (i >= quads || j >= quads)
         return TERRIMPI_HORIZON_NONE;
     lowest = step->level == 0 ? terrimpi_horizon_ground(h, axis, step->line, i, from - (float)first,
                                                         j, to - (float)last)
-                              : terrimpi_horizon_walls(h, axis, step, i, j);
-    slope = (lowest - h->low - h->eye) * step->inverse;
-    return slope - h->error * (h->spread + terrimpi_abs(slope)) -
-           h->rounding * step->inverse * terrimpi_abs(slope);
+                              : terrimpi_walls_lowest(&h->walls, axis, step->level - 1u, step->node,
+                                                      step->row, i, j);
+    slope = (lowest - h->stand.low - h->stand.eye) * step->inverse;
+    return slope - h->stand.error * (h->spread + terrimpi_abs(slope)) -
+           h->stand.rounding * step->inverse * terrimpi_abs(slope);
 }
 
 /* Whether the horizon of a bin, made of what stands before a distance, is above what has a height
@@ -7447,8 +7681,8 @@ static void terrimpi_horizon_span(const terrimp_horizon *h, const terrimpi_horiz
         *leave = terrimpi_min(*leave, box->beside[1] * inverse[0]);
     if (!right && box->beside[0] < 0.0f)
         *leave = terrimpi_min(*leave, box->beside[0] * inverse[1]);
-    *enter = terrimpi_max(*enter - 2.0f * h->rounding, 0.0f);
-    *leave = terrimpi_max(*leave + 2.0f * h->rounding, *enter);
+    *enter = terrimpi_max(*enter - 2.0f * h->stand.rounding, 0.0f);
+    *leave = terrimpi_max(*leave + 2.0f * h->stand.rounding, *enter);
 }
 
 /* Whether the part of a box that one quarter sees is hidden. */
@@ -7504,38 +7738,28 @@ static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, floa
     return 1;
 }
 
-/* Whether sight lines to a node whose lowest height is given could run below the ground where
-   z_near lets them begin. */
-static int terrimpi_horizon_under(const terrimp_horizon *h, float x, float z, float size, float low)
-{
-    float beside_x = terrimpi_max(terrimpi_max(x, -x - size), 0.0f);
-    float beside_z = terrimpi_max(terrimpi_max(z, -z - size), 0.0f);
-    return low - h->eye <= h->steepest * terrimpi_max(beside_x, beside_z);
-}
-
 /* First the node as a whole; then, since its summit is seldom at its border, its squares, from the
    one that is closest to the eye. */
 static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
 {
-    const terrimp_geomip_node *heights = &h->tree->nodes[node->number];
-    uint32_t quads = h->tree->chunk_quads << node->level, k, first;
+    const terrimp_geomip_node *heights = &h->hider.tree->nodes[node->number];
+    uint32_t quads = h->hider.tree->chunk_quads << node->level, k, first;
     float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
-    float x = (float)((int32_t)(node->x * quads) - (int32_t)h->quad[0]) - h->within[0];
-    float z = (float)((int32_t)(node->z * quads) - (int32_t)h->quad[1]) - h->within[1];
+    float x = (float)((int32_t)(node->x * quads) - (int32_t)h->stand.quad[0]) - h->stand.within[0];
+    float z = (float)((int32_t)(node->z * quads) - (int32_t)h->stand.quad[1]) - h->stand.within[1];
     const unsigned char *tops;
-    if (h->blind || terrimpi_horizon_under(h, x, z, size, heights->low - raised))
+    if (h->blind || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
         return 0;
-    if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->eye))
+    if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->stand.eye))
         return 1;
-    tops = terrimpi_wall_codes(h->walls, h->stride, node->number, scale) +
-           2u * h->cells * h->cells;
+    tops = terrimpi_walls_tops(&h->walls, node->number, scale);
     first = (x + 0.5f * size < 0.0f ? 3u : 0u) | (z + 0.5f * size < 0.0f ? 12u : 0u);
     for (k = 0; k < TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
         uint32_t i = k ^ first;
-        float top = scale[0] + scale[1] * (float)tops[i] + raised + h->low;
+        float top = scale[0] + scale[1] * (float)tops[i] + raised + h->stand.low;
         if (!terrimpi_horizon_hides_box(h, x + part * (float)(i % TERRIMPI_WALL_TOPS),
                                         z + part * (float)(i / TERRIMPI_WALL_TOPS), part,
-                                        terrimpi_min(top, heights->high) - h->eye))
+                                        terrimpi_min(top, heights->high) - h->stand.eye))
             return 0;
     }
     return 1;
@@ -7544,9 +7768,10 @@ static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *n
 TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, float raised)
 {
     terrimp_node n;
-    if (!horizon || !horizon->tree || node >= horizon->tree->node_count || !(raised >= 0.0f))
+    if (!horizon || !horizon->hider.tree || node >= horizon->hider.tree->node_count ||
+        !(raised >= 0.0f))
         return 0;
-    n = terrimpi_tree_node(horizon->tree, node);
+    n = terrimpi_tree_node(horizon->hider.tree, node);
     return terrimpi_horizon_hides_node(horizon, &n, raised);
 }
 
@@ -7557,27 +7782,28 @@ TERRIMP_API int terrimp_horizon_hides(terrimp_horizon *horizon, uint32_t node, f
 static void terrimpi_horizon_lay_steps(terrimp_horizon *h, uint32_t quarter)
 {
     uint32_t axis = quarter / 2u, back = quarter & 1u, count = 0, apart = 1, level = 0;
-    uint32_t end = terrimpi_horizon_last(h->tree, axis); /* behind the last one there is nothing */
-    uint32_t line = h->quad[axis] + (back ? 0u : 1u);
+    uint32_t end = terrimpi_stand_last(h->hider.tree, axis); /* behind the last is nothing */
+    uint32_t line = h->stand.quad[axis] + (back ? 0u : 1u);
     while (line < end && count < TERRIMP_HORIZON_STEPS) {
         terrimp_horizon_step *step = &h->steps[quarter][count];
-        float ahead = (float)(back ? h->quad[axis] - line : line - h->quad[axis]);
-        step->distance = back ? ahead + h->within[axis] : ahead - h->within[axis];
+        float ahead = (float)(back ? h->stand.quad[axis] - line : line - h->stand.quad[axis]);
+        step->distance = back ? ahead + h->stand.within[axis] : ahead - h->stand.within[axis];
         step->line = line;
         step->level = (uint8_t)level;
         if (level > 0) {
             uint32_t row = line / apart;
-            step->node = (uint16_t)(row / h->cells);
-            step->row = (uint8_t)(row % h->cells);
+            step->node = (uint16_t)(row / h->walls.cells);
+            step->row = (uint8_t)(row % h->walls.cells);
         }
-        if (step->distance >= TERRIMPI_HORIZON_CLOSEST && step->distance >= h->clipped[axis]) {
+        if (step->distance >= TERRIMPI_HORIZON_CLOSEST &&
+            step->distance >= h->stand.clipped[axis]) {
             step->inverse = 1.0f / step->distance;
             count++;
         }
         while ((float)(2u * apart) * TERRIMPI_WALL_FINE <= step->distance &&
-               line % (2u * apart) == 0 && level < h->tree->level_count) {
+               line % (2u * apart) == 0 && level < h->hider.tree->level_count) {
             apart *= 2u;
-            level += apart >= h->quads ? 1u : 0u;
+            level += apart >= h->walls.quads ? 1u : 0u;
         }
         line = back ? line - apart : line + apart; /* from 0 it becomes large */
     }
@@ -7623,7 +7849,7 @@ static void terrimpi_horizon_empty(terrimp_horizon *h, uint32_t quarter, const f
 static void terrimpi_horizon_cone(const terrimp_horizon *h, const terrimp_capture *c,
                                   float ahead[2], float cone[2])
 {
-    const terrimp_heightfield *field = &h->tree->field;
+    const terrimp_heightfield *field = &h->hider.tree->field;
     uint32_t i;
     ahead[0] = c->forward[0] / field->spacing_x;
     ahead[1] = c->forward[2] / field->spacing_z;
@@ -7646,102 +7872,17 @@ static void terrimpi_horizon_cone(const terrimp_horizon *h, const terrimp_captur
     cone[1] += 1e-4f * (1.0f + terrimpi_abs(cone[1]));
 }
 
-/* The highest that the ground can be within so many quads of the eye: of each quad the highest
-   corner or, if that is less, how far its triangles rise there. */
-static float terrimpi_horizon_ground_top(const terrimp_horizon *h, const float reach[2])
-{
-    uint32_t from[2], to[2], k, i, j;
-    float top = TERRIMPI_HORIZON_NONE;
-    for (k = 0; k < 2u; k++) {
-        uint32_t last = terrimpi_horizon_last(h->tree, k) - 1u;
-        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + h->rounding, 1e6f));
-        if (wide > TERRIMPI_HORIZON_CLIPPED)
-            return TERRIMPI_HORIZON_ALL;
-        from[k] = h->quad[k] - terrimpi_min_u32(wide, h->quad[k]);
-        to[k] = terrimpi_min_u32(h->quad[k] + wide, last);
-    }
-    for (j = from[1]; j <= to[1]; j++)
-        for (i = from[0]; i <= to[0]; i++) {
-            float a = terrimpi_field_sample(&h->tree->field, i, j), u, v, low, high;
-            float b = terrimpi_field_sample(&h->tree->field, i + 1u, j);
-            float c = terrimpi_field_sample(&h->tree->field, i, j + 1u);
-            float d = terrimpi_field_sample(&h->tree->field, i + 1u, j + 1u);
-            u = (float)((int32_t)h->quad[0] - (int32_t)i) + h->within[0];
-            v = (float)((int32_t)h->quad[1] - (int32_t)j) + h->within[1];
-            low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
-                  terrimpi_abs(d - b) * reach[1];
-            high = a + (d - c) * u + (c - a) * v + terrimpi_abs(d - c) * reach[0] +
-                   terrimpi_abs(c - a) * reach[1];
-            high = terrimpi_min(terrimpi_max(low, high),
-                                terrimpi_max(terrimpi_max(a, b), terrimpi_max(c, d)));
-            top = terrimpi_max(top, high);
-        }
-    return top;
-}
-
-/* Finds which sight lines may begin below the ground, for what is closer than z_near is not drawn.
-   Returns 0 when they all may. */
-static int terrimpi_horizon_clip(terrimp_horizon *h, const terrimp_capture *c)
-{
-    const terrimp_heightfield *field = &h->tree->field;
-    float x = terrimpi_max(c->tan_right, -c->tan_left), y = terrimpi_max(c->tan_up, -c->tan_down);
-    float reach = c->z_near * TERRIMP_SQRTF(1.0f + x * x + y * y), top = h->low, quads[2];
-    h->clipped[0] = quads[0] = reach / field->spacing_x;
-    h->clipped[1] = quads[1] = reach / field->spacing_z;
-    h->steepest = TERRIMPI_HORIZON_NONE;
-    if (h->tree->nodes[h->tree->node_count - 1u].high < h->eye - 2.0f * reach)
-        return 1;
-    top += terrimpi_horizon_ground_top(h, quads) + 2.0f * h->error * reach;
-    if (top >= h->eye)
-        return 0;
-    if (top > h->eye - reach)
-        h->steepest = (top - h->eye) * terrimpi_min(field->spacing_x, field->spacing_z) / reach;
-    return 1;
-}
-
-/* Finds the quad that the eye is above. Returns 0 when it is beside the terrain. */
-static int terrimpi_horizon_set_eye(terrimp_horizon *h, const float eye[3])
-{
-    const terrimp_heightfield *field = &h->tree->field;
-    float x, z, right, down;
-    if (!terrimpi_field_locate(field, eye[0], eye[2], &h->quad[0], &h->quad[1]))
-        return 0;
-    x = terrimpi_field_line(field->origin_x, field->spacing_x, h->quad[0]);
-    z = terrimpi_field_line(field->origin_z, field->spacing_z, h->quad[1]);
-    right = terrimpi_field_line(field->origin_x, field->spacing_x, field->width - 1u);
-    down = terrimpi_field_line(field->origin_z, field->spacing_z, field->depth - 1u);
-    h->within[0] = terrimpi_clamp((eye[0] - x) / field->spacing_x, 0.0f, 1.0f);
-    h->within[1] = terrimpi_clamp((eye[2] - z) / field->spacing_z, 0.0f, 1.0f);
-    x = terrimpi_max(terrimpi_abs(field->origin_x), terrimpi_abs(right)) / field->spacing_x;
-    z = terrimpi_max(terrimpi_abs(field->origin_z), terrimpi_abs(down)) / field->spacing_z;
-    h->rounding = 1e-6f + 1.2e-7f * terrimpi_max(x, z); /* two roundings of a float */
-    return 1;
-}
-
-static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *tree,
-                                   const void *walls, const terrimp_camera *camera, float error,
+static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_camera *camera, float error,
                                    float low)
 {
-    const terrimpi_wall_form form = terrimpi_wall_form_of(tree);
-    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    const terrimp_heightfield *field = &h->hider.tree->field;
     terrimp_capture capture;
-    float ahead[2], cone[2], ground;
+    float ahead[2], cone[2];
     uint32_t i;
-    h->tree = tree;
-    h->walls = (const unsigned char *)walls;
-    h->quads = form.quads;
-    h->cells = form.cells;
-    h->stride = form.stride;
-    h->eye = camera->eye[1];
-    h->error = error;
-    h->low = low + 4e-7f * (terrimpi_abs(h->eye) +
-                            terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
-    h->spread = TERRIMP_SQRTF(tree->field.spacing_x * tree->field.spacing_x +
-                              tree->field.spacing_z * tree->field.spacing_z);
+    h->spread = TERRIMP_SQRTF(field->spacing_x * field->spacing_x +
+                              field->spacing_z * field->spacing_z);
     terrimpi_camera_capture(camera, &capture);
-    h->blind = !terrimpi_horizon_set_eye(h, camera->eye) ||
-               terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) !=
-                   TERRIMP_OK || h->eye <= ground + h->low || !terrimpi_horizon_clip(h, &capture);
+    h->blind = !terrimpi_stand_begin(&h->stand, h->hider.tree, camera, &capture, error, low);
     if (h->blind)
         return;
     for (i = 0; i <= TERRIMP_HORIZON_BINS; i++)
@@ -7752,17 +7893,44 @@ static void terrimpi_horizon_begin(terrimp_horizon *h, const terrimp_quadtree *t
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
-                                                 const terrimp_quadtree *tree, const void *walls,
                                                  const terrimp_camera *camera, float error,
                                                  float low)
 {
     terrimp_camera c;
     TERRIMPI_REFUSE(!horizon, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_REFUSE(!terrimpi_finite2(error, low), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!terrimpi_within(error, 0.0f, 0.5f) || !(low >= 0.0f), TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
-    terrimpi_horizon_begin(horizon, tree, walls, &c, error, low);
+    terrimpi_horizon_begin(horizon, &c, error, low);
+    return TERRIMP_OK;
+}
+
+/* What a view calls. */
+static int terrimpi_horizon_hider_begin(terrimp_hider *hider, const terrimp_camera *camera,
+                                        float error, float low)
+{
+    terrimp_horizon *h = (terrimp_horizon *)(void *)hider;
+    terrimpi_horizon_begin(h, camera, error, low);
+    return !h->blind;
+}
+
+static int terrimpi_horizon_hider_hides(terrimp_hider *hider, const terrimp_node *node)
+{
+    terrimp_horizon *h = (terrimp_horizon *)(void *)hider;
+    return terrimpi_horizon_hides_node(h, node, h->stand.low);
+}
+
+TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
+                                                const terrimp_quadtree *tree, const void *walls)
+{
+    TERRIMPI_REFUSE(!horizon, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    memset(horizon, 0, sizeof *horizon);
+    horizon->hider.tree = tree;
+    horizon->hider.begin = terrimpi_horizon_hider_begin;
+    horizon->hider.hides = terrimpi_horizon_hider_hides;
+    horizon->walls = terrimpi_walls_of(tree, walls);
+    horizon->blind = 1;
     return TERRIMP_OK;
 }
 
@@ -7824,18 +7992,18 @@ static void terrimpi_horizon_draws_error(const terrimp_quadtree *tree,
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
-                                                const terrimp_quadtree *tree, const void *walls,
                                                 const terrimp_camera *camera,
                                                 terrimp_geomip_view *view)
 {
+    const terrimp_quadtree *tree;
     terrimp_camera c;
     float error, low;
     uint32_t i, count = 0;
     TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
+    tree = horizon->hider.tree;
     terrimpi_horizon_draws_error(tree, view, c.eye, &error, &low);
-    terrimpi_horizon_begin(horizon, tree, walls, &c, terrimpi_min(error, 0.5f), low);
+    terrimpi_horizon_begin(horizon, &c, terrimpi_min(error, 0.5f), low);
     horizon->blind |= error > 0.5f;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
@@ -7846,6 +8014,112 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
             view->draws[count++] = *draw;
     }
     view->draw_count = count;
+    return TERRIMP_OK;
+}
+
+/* ---- visible sets ---- */
+
+/* Heights over a cell's lowest ground have codes of 5 bits of a number and 3 of its exponent, up to
+   TERRIMPI_SETS_UNITS. */
+#define TERRIMPI_SETS_UNITS 4032.0f
+
+static float terrimpi_sets_height(const terrimp_sets *s, float ground, uint32_t code)
+{
+    uint32_t units = code < 32u ? code : (32u + code % 32u) << (code / 32u - 1u);
+    return ground + s->reach * (1.0f / TERRIMPI_SETS_UNITS) * (float)units;
+}
+
+/* The largest code of a height that is not above `y`. */
+static uint32_t terrimpi_sets_code(const terrimp_sets *s, float ground, float y)
+{
+    uint32_t code = 0, bit;
+    for (bit = 128u; bit > 0; bit >>= 1)
+        if (terrimpi_sets_height(s, ground, code + bit) <= y)
+            code += bit;
+    return code;
+}
+
+static uint32_t terrimpi_sets_level_nodes(const terrimp_quadtree *tree, uint32_t level)
+{
+    return tree->level_first[level + 1u] - tree->level_first[level];
+}
+
+/* What ground and nodes may be off their samples, with the rounding of heights [wu]. */
+static float terrimpi_sets_low(const terrimp_sets *s)
+{
+    const terrimp_geomip_node *all = &s->hider.tree->nodes[s->hider.tree->node_count - 1u];
+    float most = terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high));
+    return s->low + 1e-6f * (2.0f * most + s->reach);
+}
+
+static int terrimpi_sets_begin(terrimp_hider *hider, const terrimp_camera *camera, float error,
+                               float low)
+{
+    terrimp_sets *s = (terrimp_sets *)(void *)hider;
+    const terrimp_quadtree *tree = hider->tree;
+    uint32_t quads = tree->chunk_quads << s->cell_level;
+    terrimp_capture capture;
+    terrimp_node cell;
+    terrimpi_camera_capture(camera, &capture);
+    if (error > s->error || !terrimpi_stand_begin(&s->stand, tree, camera, &capture, error, low) ||
+        s->stand.low > terrimpi_sets_low(s))
+        return 0;
+    cell = terrimpi_tree_at(tree, s->cell_level, s->stand.quad[0] / quads,
+                            s->stand.quad[1] / quads);
+    s->row = s->codes + (size_t)(cell.number - tree->level_first[cell.level]) *
+                            terrimpi_sets_level_nodes(tree, s->node_level);
+    s->code = terrimpi_sets_code(s, tree->nodes[cell.number].low, s->stand.eye);
+    return 1;
+}
+
+/* A node is hidden when all those of the table's level in it are. */
+static int terrimpi_sets_hides(terrimp_hider *hider, const terrimp_node *node)
+{
+    const terrimp_sets *s = (const terrimp_sets *)(void *)hider;
+    const terrimp_quadtree *tree = hider->tree;
+    uint32_t columns = tree->level_x[s->node_level], rows = tree->level_z[s->node_level];
+    uint32_t quads = tree->chunk_quads << node->level, shift, x, z;
+    if (node->level < s->node_level)
+        return 0; /* then so was what it is in */
+    shift = node->level - s->node_level;
+    for (z = node->z << shift; z < (node->z + 1u) << shift && z < rows; z++)
+        for (x = node->x << shift; x < (node->x + 1u) << shift && x < columns; x++)
+            if (s->row[z * columns + x] <= s->code)
+                return 0;
+    return !terrimpi_stand_under(
+        &s->stand, (float)((int32_t)(node->x * quads) - (int32_t)s->stand.quad[0]) -
+                       s->stand.within[0],
+        (float)((int32_t)(node->z * quads) - (int32_t)s->stand.quad[1]) - s->stand.within[1],
+        (float)quads, tree->nodes[node->number].low - s->stand.low);
+}
+
+TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets)
+{
+    size_t bytes;
+    int ok = 1;
+    if (!tree || !sets || sets->cell_level >= tree->level_count ||
+        sets->node_level >= tree->level_count)
+        return 0;
+    bytes = terrimpi_mul(terrimpi_sets_level_nodes(tree, sets->cell_level),
+                         terrimpi_sets_level_nodes(tree, sets->node_level), &ok);
+    return ok ? bytes : 0;
+}
+
+TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree)
+{
+    const terrimp_geomip_node *all;
+    TERRIMPI_REFUSE(!sets || !tree || !tree->nodes || !sets->codes, TERRIMP_E_NULL);
+    all = &tree->nodes[tree->node_count - 1u];
+    TERRIMPI_REFUSE(!terrimpi_finite2(sets->error, sets->low) || !terrimpi_finite(sets->reach),
+                    TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(terrimp_sets_bytes(tree, sets) == 0 || !(sets->low >= 0.0f) ||
+                    !terrimpi_within(sets->error, 0.0f, 0.5f) || !(sets->reach >= 0.0f),
+                    TERRIMP_E_RANGE);
+    TERRIMPI_DEFAULT(sets->reach, 3.0f * (all->high - all->low));
+    sets->hider.tree = tree;
+    sets->hider.begin = terrimpi_sets_begin;
+    sets->hider.hides = terrimpi_sets_hides;
+    sets->hider.blind = 1;
     return TERRIMP_OK;
 }
 
@@ -8898,12 +9172,6 @@ typedef struct terrimpi_frame {
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
 
-#ifndef TERRIMP_NO_HORIZON
-#define TERRIMPI_CULL_HAS_HORIZON 1
-#else
-#define TERRIMPI_CULL_HAS_HORIZON 0
-#endif
-
 /* ---- settings ---- */
 
 /* Impostors of a mode. */
@@ -8980,6 +9248,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                                                      terrimp_view_desc *out)
 {
     terrimp_view_desc d;
+    const terrimp_hider *hider;
     uint32_t chunks;
     TERRIMPI_REFUSE(!terrain || !desc || !out, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
@@ -9003,20 +9272,21 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE((uintptr_t)d.walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
-    TERRIMPI_REFUSE(!TERRIMPI_CULL_HAS_HORIZON && d.walls, TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(!terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
                     TERRIMP_E_RANGE);
     if (terrain->desc.field.wrap) {
         const terrimp_heightfield *f = &terrain->desc.field;
-        TERRIMPI_REFUSE(d.walls || terrain->tree.pages ||
+        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
                         (f->width - 1u) % terrain->desc.chunk_quads ||
                         (f->depth - 1u) % terrain->desc.chunk_quads ||
                         (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
                         (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
     }
+    for (hider = d.hider; hider; hider = hider->next)
+        TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
+                        TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages &&
-                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.walls), TERRIMP_E_RANGE);
+                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.hider), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -9237,23 +9507,25 @@ typedef struct terrimpi_cull {
     uint32_t capacity, count;
     uint32_t ground_count, impostor_count; /* with TERRIMPI_CULL_GROUND, _IMPOSTOR */
     uint32_t hidden_count;
-    terrimp_horizon *horizon;  /* NULL: without walls there is none */
+    terrimp_hider *hider;      /* in use; NULL: none */
 } terrimpi_cull;
 
 /* Whether a node is hidden. What hides nodes has its place here: nodes come closest first. */
-static int terrimpi_cull_hides(terrimpi_cull *cull, int behind, const terrimpi_frame *f,
+static int terrimpi_cull_hides(terrimpi_cull *cull, const terrimpi_frame *f,
                                const terrimp_node *node, int *planes, terrimp_box *box)
 {
+    terrimp_hider *hider;
     terrimpi_terrain_node_box(f->terrain, node, box);
     if (*planes)
         *planes = terrimp_frustum_test(&f->frustum, box, *planes);
     if (*planes == TERRIMP_PLANES_OUTSIDE)
         return 1;
-    if (!TERRIMPI_CULL_HAS_HORIZON || !behind ||
-        !terrimpi_horizon_hides_node(cull->horizon, node, cull->horizon->low))
-        return 0;
-    cull->hidden_count++;
-    return 1;
+    for (hider = cull->hider; hider; hider = hider->next)
+        if (!hider->blind && hider->hides(hider, node)) {
+            cull->hidden_count++;
+            return 1;
+        }
+    return 0;
 }
 
 /* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
@@ -9345,8 +9617,7 @@ static size_t terrimpi_cull_capacity(const terrimp_quadtree *tree, size_t cuts)
 /* Lists the nodes in sight. Which cuts a node lies below goes down the tree beside its planes.
    Returns 0 when there is more ground than may be. */
 static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
-                              const terrimpi_cache *cache, const terrimpi_mip_frame *mip,
-                              int behind)
+                              const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
     const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
     terrimpi_tree_walk walk;
@@ -9357,7 +9628,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         terrimpi_cull_node *n = &cull->nodes[cull->count];
         int planes = v.planes % below, done = v.planes / below;
         terrimp_box box;
-        if (terrimpi_cull_hides(cull, behind, f, &v.node, &planes, &box))
+        if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
         if (cull->count++ == cull->capacity)
             return 0;
@@ -9380,13 +9651,13 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
     return 1;
 }
 
-/* Begins the horizon, with the ground that a walk without it has listed. That ground may be off its
+/* Begins what hides nodes, with the ground that a walk without it has listed. That may be off its
    samples both where it hides and where it is hidden, so its error counts twice. A border that a
    node draws as its coarser neighbour does is no closer than that neighbour, whose error over its
    distance is here too. What a picture shows is off its place by the parallax error. */
-static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimpi_frame *f,
-                                        int full)
+static void terrimpi_cull_begin_hiders(const terrimpi_cull *cull, const terrimpi_frame *f, int full)
 {
+    terrimp_hider *hider;
     const terrimp_quadtree *tree = &f->terrain->tree;
     float side = (float)tree->chunk_quads *
                  terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
@@ -9404,21 +9675,22 @@ static void terrimpi_cull_begin_horizon(const terrimpi_cull *cull, const terrimp
     }
     if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_NEVER)
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
-    terrimpi_horizon_begin(cull->horizon, tree, f->desc->walls, &f->camera,
-                           terrimpi_min(2.0f * error, 0.5f), low);
-    cull->horizon->blind |= 2.0f * error > 0.5f;
+    for (hider = f->desc->hider; hider; hider = hider->next)
+        hider->blind = 2.0f * error > 0.5f || !hider->begin(hider, &f->camera, 2.0f * error, low);
 }
 
-/* Lists the nodes in sight, without those behind ridges. */
+/* Lists the nodes in sight, without those that are hidden. */
 static int terrimpi_cull_list(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
-    if (!TERRIMPI_CULL_HAS_HORIZON || !cull->horizon)
-        return terrimpi_cull_walk(cull, f, cache, mip, 0);
-    if (mip && !terrimpi_cull_walk(cull, f, cache, mip, 0))
-        return 0;
-    terrimpi_cull_begin_horizon(cull, f, !mip);
-    return terrimpi_cull_walk(cull, f, cache, mip, !cull->horizon->blind);
+    cull->hider = NULL;
+    if (f->desc->hider) {
+        if (mip && !terrimpi_cull_walk(cull, f, cache, mip))
+            return 0;
+        terrimpi_cull_begin_hiders(cull, f, !mip);
+        cull->hider = f->desc->hider;
+    }
+    return terrimpi_cull_walk(cull, f, cache, mip);
 }
 
 /* ---- what things cost ---- */
@@ -9786,9 +10058,6 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
             v->terrain = v->tiled = t;
         }
     }
-    v->cull.horizon = NULL;
-    if (v->desc.walls)
-        v->cull.horizon = (terrimp_horizon *)terrimpi_take(&l, 1, sizeof *v->cull.horizon);
     return l.ok && slots ? l.bytes : 0;
 }
 
@@ -9853,7 +10122,6 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
                     d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
-                    (d.walls && !view->cull.horizon) ||
                     (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
@@ -15743,6 +16011,64 @@ TERRIMP_API terrimp_result terrimp_terrain_create(const terrimp_terrain_desc *de
 
 #endif /* TERRIMP_NO_MALLOC */
 
+/* ---- materials ---- */
+
+/* The texels that columns or rows of samples from `from` to `to` may read, of `count` over `last`
+   quads; with the 1 / 64 that machines round places by. */
+static void terrimpi_material_range(uint32_t from, uint32_t to, uint32_t last, uint32_t count,
+                                    int centred, float reach, uint32_t range[2])
+{
+    float scale = (float)(centred ? count - 1u : count) / (float)last;
+    float shift = centred ? 0.5f : 0.0f, most = (float)(count - 1u), slack = reach - 0.484375f;
+    range[0] = (uint32_t)terrimpi_clamp((float)from * scale + shift - slack, 0.0f, most);
+    range[1] = (uint32_t)terrimpi_clamp((float)to * scale + shift + slack, 0.0f, most);
+}
+
+/* Whether a material has any weight on a node of level 0. */
+static int terrimpi_material_on(const terrimp_quadtree *tree, const terrimp_node *n,
+                                const terrimp_weights *w, float reach)
+{
+    uint32_t last_x = tree->field.width - 1u, last_z = tree->field.depth - 1u;
+    uint32_t x = n->x * tree->chunk_quads, z = n->z * tree->chunk_quads, u[2], v[2], i, j;
+    size_t step = w->texel_bytes ? w->texel_bytes : 1u;
+    size_t row = w->row_bytes ? w->row_bytes : w->width * step;
+    terrimpi_material_range(x, terrimpi_min_u32(x + tree->chunk_quads, last_x), last_x, w->width,
+                            w->centred, reach, u);
+    terrimpi_material_range(z, terrimpi_min_u32(z + tree->chunk_quads, last_z), last_z, w->depth,
+                            w->centred, reach, v);
+    for (j = v[0]; j <= v[1]; j++)
+        for (i = u[0]; i <= u[1]; i++)
+            if (w->texels[j * row + i * step])
+                return 1;
+    return 0;
+}
+
+TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
+                                                  const terrimp_weights *weights, uint32_t count,
+                                                  float reach, uint32_t *masks)
+{
+    uint32_t i, k;
+    TERRIMPI_REFUSE(!tree || !weights || !masks, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(reach), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(count, 1u, 32u) || !terrimpi_within(reach, 1.0f, 65536.0f),
+                    TERRIMP_E_RANGE);
+    for (k = 0; k < count; k++) {
+        TERRIMPI_REFUSE(!weights[k].texels, TERRIMP_E_NULL);
+        TERRIMPI_REFUSE(!terrimpi_within_u32(weights[k].width, 1u, 65536u) ||
+                        !terrimpi_within_u32(weights[k].depth, 1u, 65536u), TERRIMP_E_RANGE);
+    }
+    memset(masks, 0, tree->node_count * sizeof *masks);
+    for (i = 0; i < tree->node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(tree, i);
+        for (k = 0; k < count && n.level == 0; k++)
+            if (terrimpi_material_on(tree, &n, &weights[k], reach))
+                masks[i] |= 1u << k;
+        if (n.level + 1u < tree->level_count)
+            masks[terrimpi_tree_parent(tree, &n).number] |= masks[i];
+    }
+    return TERRIMP_OK;
+}
+
 /* ---- the bake ---- */
 
 /* The bytes of the arrays, 0 when they and the header pass what 32 bits can count. */
@@ -16356,29 +16682,31 @@ TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *des
 
 /* A node whose walls are built. */
 typedef struct terrimpi_wall_site {
-    const terrimp_quadtree *tree;
-    const unsigned char *walls;
-    terrimpi_wall_form form;
+    terrimp_walls walls;
     terrimp_node node;
 } terrimpi_wall_site;
+
+/* The lowest or the highest of some samples, cut at the far edges. */
+static float terrimpi_wall_sample(const terrimpi_wall_site *s, uint32_t x, uint32_t z,
+                                  uint32_t cols, uint32_t rows, int highest)
+{
+    const terrimp_heightfield *field = &s->walls.tree->field;
+    float low = 0.0f, high = 0.0f;
+    x = terrimpi_min_u32(x, field->width - 1u);
+    z = terrimpi_min_u32(z, field->depth - 1u);
+    (void)terrimpi_field_range(field, terrimpi_rect(x, z, cols, rows), 1, &low, &high);
+    return highest ? high : low;
+}
 
 /* The lowest sample of a cell of a line, at level 0. */
 static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
                                   uint32_t cell)
 {
-    const terrimp_heightfield *field = &s->tree->field;
-    uint32_t quads = s->tree->chunk_quads, k;
-    uint32_t line = (axis == 0 ? s->node.x : s->node.z) * quads + row * s->form.quads;
-    uint32_t from = (axis == 0 ? s->node.z : s->node.x) * quads + cell * s->form.quads;
-    uint32_t last = (axis == 0 ? field->depth : field->width) - 1u;
-    float lowest = TERRIMPI_FLOAT_MAX;
-    line = terrimpi_min_u32(line, (axis == 0 ? field->width : field->depth) - 1u);
-    for (k = 0; k <= s->form.quads; k++) {
-        uint32_t at = terrimpi_min_u32(from + k, last);
-        lowest = terrimpi_min(lowest, axis == 0 ? terrimpi_field_sample(field, line, at)
-                                                : terrimpi_field_sample(field, at, line));
-    }
-    return lowest;
+    uint32_t chunk = s->walls.tree->chunk_quads, quads = s->walls.quads;
+    uint32_t x = s->node.x * chunk + (axis == 0 ? row : cell) * quads;
+    uint32_t z = s->node.z * chunk + (axis == 0 ? cell : row) * quads;
+    return terrimpi_wall_sample(s, x, z, axis == 0 ? 1u : quads + 1u, axis == 0 ? quads + 1u : 1u,
+                                0);
 }
 
 /* The lowest height of a cell: above level 0 of the two that its children have there; FLOAT_MAX
@@ -16386,7 +16714,7 @@ static float terrimpi_wall_lowest(const terrimpi_wall_site *s, uint32_t axis, ui
 static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint32_t row,
                                uint32_t cell)
 {
-    const uint32_t cells = s->form.cells;
+    const uint32_t cells = s->walls.cells;
     uint32_t line = 2u * row, k;
     float lowest = TERRIMPI_FLOAT_MAX;
     if (s->node.level == 0)
@@ -16396,10 +16724,10 @@ static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint3
         uint32_t z = 2u * s->node.z + (axis == 0 ? k : line) / cells;
         const unsigned char *codes;
         float scale[2];
-        if (!terrimpi_tree_has(s->tree, s->node.level - 1u, x, z))
+        if (!terrimpi_tree_has(s->walls.tree, s->node.level - 1u, x, z))
             continue;
-        codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
-                                        s->tree, s->node.level - 1u, x, z).number, scale);
+        codes = terrimpi_walls_codes(&s->walls, terrimpi_tree_at(
+                                         s->walls.tree, s->node.level - 1u, x, z).number, scale);
         lowest = terrimpi_min(lowest, scale[0] + scale[1] * (float)codes[(axis * cells +
                                               line % cells) * cells + k % cells]);
     }
@@ -16409,19 +16737,10 @@ static float terrimpi_wall_low(const terrimpi_wall_site *s, uint32_t axis, uint3
 /* The highest sample of one of the 4 x 4 squares of a node at level 0. */
 static float terrimpi_wall_highest(const terrimpi_wall_site *s, uint32_t x, uint32_t z)
 {
-    const terrimp_heightfield *field = &s->tree->field;
-    uint32_t quads = s->tree->chunk_quads, i, j;
-    uint32_t i0 = s->node.x * quads + x * quads / TERRIMPI_WALL_TOPS;
-    uint32_t j0 = s->node.z * quads + z * quads / TERRIMPI_WALL_TOPS;
+    uint32_t quads = s->walls.tree->chunk_quads;
     uint32_t size = (quads + TERRIMPI_WALL_TOPS - 1u) / TERRIMPI_WALL_TOPS + 1u;
-    float highest = -TERRIMPI_FLOAT_MAX;
-    for (j = j0; j < j0 + size; j++)
-        for (i = i0; i < i0 + size; i++)
-            highest = terrimpi_max(highest,
-                                   terrimpi_field_sample(field,
-                                                         terrimpi_min_u32(i, field->width - 1u),
-                                                         terrimpi_min_u32(j, field->depth - 1u)));
-    return highest;
+    return terrimpi_wall_sample(s, s->node.x * quads + x * quads / TERRIMPI_WALL_TOPS,
+                                s->node.z * quads + z * quads / TERRIMPI_WALL_TOPS, size, size, 1);
 }
 
 /* The highest height of a square; -FLOAT_MAX where there is no child. */
@@ -16434,11 +16753,10 @@ static float terrimpi_wall_top(const terrimpi_wall_site *s, uint32_t square)
     uint8_t highest = 0;
     if (s->node.level == 0)
         return terrimpi_wall_highest(s, x, z);
-    if (!terrimpi_tree_has(s->tree, s->node.level - 1u, child_x, child_z))
+    if (!terrimpi_tree_has(s->walls.tree, s->node.level - 1u, child_x, child_z))
         return -TERRIMPI_FLOAT_MAX;
-    codes = terrimpi_wall_codes(s->walls, s->form.stride, terrimpi_tree_at(
-                                    s->tree, s->node.level - 1u, child_x, child_z).number, scale) +
-            2u * s->form.cells * s->form.cells;
+    codes = terrimpi_walls_tops(&s->walls, terrimpi_tree_at(s->walls.tree, s->node.level - 1u,
+                                                            child_x, child_z).number, scale);
     for (k = 0; k < 4u; k++) {
         uint32_t i = (x % 2u) * 2u + k % 2u, j = (z % 2u) * 2u + k / 2u;
         if (codes[j * TERRIMPI_WALL_TOPS + i] > highest)
@@ -16450,7 +16768,7 @@ static float terrimpi_wall_top(const terrimpi_wall_site *s, uint32_t square)
 /* Code k of a node as a height: first the walls, then the squares. */
 static float terrimpi_wall_value(const terrimpi_wall_site *s, uint32_t k)
 {
-    const uint32_t cells = s->form.cells;
+    const uint32_t cells = s->walls.cells;
     if (k >= 2u * cells * cells)
         return terrimpi_wall_top(s, k - 2u * cells * cells);
     return terrimpi_wall_low(s, k / (cells * cells), k / cells % cells, k % cells);
@@ -16475,13 +16793,11 @@ static void terrimpi_wall_build(const terrimp_quadtree *tree, terrimp_node node,
     unsigned char *codes;
     uint32_t k, count;
     float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, scale[2];
-    s.tree = tree;
-    s.walls = walls;
-    s.form = terrimpi_wall_form_of(tree);
+    s.walls = terrimpi_walls_of(tree, walls);
     s.node = node;
-    codes = walls + (size_t)node.number * s.form.stride;
-    memset(codes, 0, s.form.stride);
-    count = 2u * s.form.cells * s.form.cells;
+    codes = walls + (size_t)node.number * s.walls.stride;
+    memset(codes, 0, s.walls.stride);
+    count = 2u * s.walls.cells * s.walls.cells;
     for (k = 0; k < count + TERRIMPI_WALL_TOPS * TERRIMPI_WALL_TOPS; k++) {
         float value = terrimpi_wall_value(&s, k);
         if (k < count)
@@ -16514,17 +16830,29 @@ static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uin
     range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
 }
 
+/* A rectangle of samples, NULL for all, cut at the far edges; `cut` may be NULL. Returns 0 when it
+   is empty or outside. */
+static int terrimpi_walls_rect(const terrimp_quadtree *tree, const terrimp_rect *samples,
+                               terrimp_rect *cut)
+{
+    uint32_t width = tree->field.width, depth = tree->field.depth;
+    terrimp_rect all = samples ? *samples : terrimpi_rect(0, 0, width, depth);
+    if (all.width < 1u || all.height < 1u || all.x >= width || all.y >= depth)
+        return 0;
+    all.width = terrimpi_min_u32(all.width, width - all.x);
+    all.height = terrimpi_min_u32(all.height, depth - all.y);
+    if (cut)
+        *cut = all;
+    return 1;
+}
+
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls)
 {
     terrimp_rect all;
     uint32_t level, x[2], z[2], i, j;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
-    all = samples ? *samples : terrimpi_rect(0, 0, tree->field.width, tree->field.depth);
-    TERRIMPI_REFUSE(all.width < 1u || all.height < 1u || all.x >= tree->field.width ||
-                    all.y >= tree->field.depth, TERRIMP_E_RANGE);
-    all.width = terrimpi_min_u32(all.width, tree->field.width - all.x);
-    all.height = terrimpi_min_u32(all.height, tree->field.depth - all.y);
+    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, &all), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++) {
         uint32_t quads = tree->chunk_quads << level;
         terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
@@ -16533,6 +16861,308 @@ TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
             for (i = x[0]; i <= x[1]; i++)
                 terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
                                     (unsigned char *)walls);
+    }
+    return TERRIMP_OK;
+}
+
+/* ---- visible sets ---- */
+/* What sees a point sees it from farther up, too: the upper sight line is above the lower one all
+   the way, so it clears the terrain. So for a cell and a node there is one least height.
+
+   A lower bound of it: take eyes in a rectangle, points of a height of at most Y in another one,
+   and a row of samples between the two. A sight line crosses the row at a part t of its way, of a
+   range that follows from the rectangles, and within an interval; the ground is nowhere lower there
+   than m, the lowest wall of the interval. It clears the row only if y (1 - t) + Y t >= m, so an
+   eye below (m - Y t) / (1 - t), which is monotone in t, is too low, whatever the line. Of all rows
+   of both axes the one that asks most counts. Cutting both rectangles makes intervals narrow and Y
+   low; the least of all pairs of parts is that of the whole. A part that a row proves to need more
+   than the least so far need not be looked at closer: mostly it is the row of the part before.
+
+   An eye has to be above the ground; ground that z_near clips is seen to in the look-up. What is
+   drawn off its samples by `low` is so both where it hides (m is lowered) and where it is hidden (Y
+   is raised); and the two lie no more than `error` times the distance of m off each other. */
+
+/* [quads] */
+typedef struct terrimpi_sets_rect {
+    float low[2], high[2];
+} terrimpi_sets_rect;
+
+typedef struct terrimpi_sets_job {
+    const terrimp_sets *sets;
+    terrimp_walls walls;
+    terrimpi_sets_rect cell, node;
+    float ground[16], tops[16]; /* of 4 x 4 parts of the two: lowest, highest heights */
+    float base, low, rounding;  /* base: the lowest of the cell */
+    uint32_t line[2], axis;     /* that asked most, the last time */
+} terrimpi_sets_job;
+
+/* Sight lines between two rectangles along an axis. */
+typedef struct terrimpi_sets_shaft {
+    terrimpi_sets_rect eye, to;
+    float top, off;        /* Y; what m is lowered by at the end of the way */
+    uint32_t axis, level;  /* of the walls */
+    uint32_t first, count; /* lines that are crossed, in steps of */
+    uint32_t apart;
+    float start, sign;     /* where the eyes' rectangle ends */
+    float wide, inverse[2]; /* its size; over the longest way from its end, the shortest from its
+                              beginning */
+} terrimpi_sets_shaft;
+
+/* Lays a shaft along an axis. Returns 0 when no line of it is between the two. */
+static int terrimpi_sets_along(const terrimpi_sets_job *b, terrimpi_sets_shaft *s, uint32_t axis,
+                               uint32_t level)
+{
+    const float *from, *to;
+    float gap, a, z;
+    int forward = s->to.low[axis] >= s->eye.high[axis];
+    if (!forward && s->to.high[axis] > s->eye.low[axis])
+        return 0;
+    from = forward ? s->eye.high : s->eye.low;
+    to = forward ? s->to.low : s->to.high;
+    s->axis = axis;
+    s->level = terrimpi_min_u32(level, b->walls.tree->level_count - 1u);
+    s->apart = b->walls.quads << s->level;
+    s->start = from[axis];
+    s->sign = forward ? 1.0f : -1.0f;
+    s->wide = s->eye.high[axis] - s->eye.low[axis];
+    gap = s->sign * (to[axis] - s->start);
+    s->inverse[0] = 1.0f / (gap + (s->to.high[axis] - s->to.low[axis]));
+    s->inverse[1] = 1.0f / (gap + s->wide);
+    a = terrimpi_max(terrimpi_min(from[axis], to[axis]), 0.0f);
+    z = terrimpi_max(from[axis], to[axis]);
+    s->first = terrimpi_ceil_u32(a / (float)s->apart);
+    s->count = (uint32_t)(z / (float)s->apart) + 1u;
+    s->count -= terrimpi_min_u32(s->first, s->count);
+    return s->count > 0;
+}
+
+/* The least height of an eye that one line of a shaft asks for. */
+static float terrimpi_sets_line(const terrimpi_sets_job *b, const terrimpi_sets_shaft *s,
+                                uint32_t line)
+{
+    uint32_t other = 1u - s->axis, row = line / s->apart;
+    uint32_t quads = terrimpi_stand_last(b->walls.tree, other) - 1u, i, j;
+    float way = s->sign * ((float)line - s->start), t[2], low, high, m, at;
+    float eye_low = s->eye.low[other], to_low = s->to.low[other] - eye_low;
+    float eye_high = s->eye.high[other], to_high = s->to.high[other] - eye_high;
+    t[0] = way * s->inverse[0];
+    t[1] = (way + s->wide) * s->inverse[1];
+    low = eye_low + terrimpi_min(to_low * t[0], to_low * t[1]) - b->rounding;
+    high = eye_high + terrimpi_max(to_high * t[0], to_high * t[1]) + b->rounding;
+    i = (uint32_t)terrimpi_max(low, 0.0f);
+    j = terrimpi_min_u32((uint32_t)high, quads);
+    m = terrimpi_walls_lowest(&b->walls, s->axis, s->level, row / b->walls.cells,
+                              row % b->walls.cells, i, j) - b->low - s->off * t[1];
+    at = m > s->top ? t[0] : t[1];
+    return at < 1.0f ? (m - s->top * at) / (1.0f - at) : TERRIMPI_HORIZON_NONE;
+}
+
+/* The least height that lines ask for, `least` or more; it need not be found once it is `enough`.
+   First the lines round those that asked most before, then all lines of the walls two levels up,
+   then those of finer ones round what asks most. */
+static float terrimpi_sets_least(terrimpi_sets_job *b, terrimpi_sets_shaft *s, uint32_t level,
+                                 float least, float enough)
+{
+    uint32_t turn, k, axis = b->axis;
+    for (turn = 0; turn < 8u && least < enough; turn++) {
+        uint32_t all = turn / 2u == 1u, coarser = turn < 2u ? 0u : 3u - turn / 2u, around;
+        if (!terrimpi_sets_along(b, s, (axis ^ turn) & 1u, level + coarser))
+            continue;
+        around = terrimpi_clamp_u32(b->line[s->axis] / s->apart, s->first,
+                                    s->first + s->count - 1u);
+        for (k = 0; k < (all ? 2u * s->count : 3u) && least < enough; k++) {
+            uint32_t n = around - s->first + (k % 2u ? 0u - (k + 1u) / 2u : k / 2u);
+            float asked;
+            if (n >= s->count) /* below 0 it becomes large */
+                continue;
+            asked = terrimpi_sets_line(b, s, (s->first + n) * s->apart);
+            if (asked > least) {
+                least = asked;
+                b->line[s->axis] = (s->first + n) * s->apart;
+                b->axis = s->axis;
+            }
+        }
+    }
+    return least;
+}
+
+/* Part (x, z) of a rectangle's 4 x 4, and those beside it: `size` along a side. */
+static terrimpi_sets_rect terrimpi_sets_part(const terrimpi_sets_job *b,
+                                             const terrimpi_sets_rect *of, const uint32_t at[2],
+                                             uint32_t size)
+{
+    terrimpi_sets_rect r;
+    uint32_t k;
+    for (k = 0; k < 2u; k++) {
+        float last = (float)terrimpi_stand_last(b->walls.tree, k);
+        float part = 0.25f * (of->high[k] - of->low[k]);
+        r.low[k] = terrimpi_min(of->low[k] + part * (float)at[k], last) - b->rounding;
+        r.high[k] = terrimpi_min(of->low[k] + part * (float)(at[k] + size), last) + b->rounding;
+    }
+    return r;
+}
+
+/* The highest of the same parts; of negative values the lowest. */
+static float terrimpi_sets_most(const float values[16], const uint32_t at[2], uint32_t size,
+                                float sign)
+{
+    uint32_t i;
+    float most = TERRIMPI_HORIZON_NONE;
+    for (i = 0; i < size * size; i++)
+        most = terrimpi_max(most, sign * values[(at[1] + i / size) * 4u + at[0] + i % size]);
+    return sign * most;
+}
+
+/* The least height of an eye in some parts of the cell that sees some of the node; `least` is known
+   of all parts that hold these. Returns the lesser one of it and `best`. */
+static float terrimpi_sets_search(terrimpi_sets_job *b, const uint32_t eye[2], const uint32_t to[2],
+                                  uint32_t size, float least, float best)
+{
+    const terrimp_quadtree *tree = b->walls.tree;
+    const terrimp_heightfield *field = &tree->field;
+    terrimpi_sets_shaft s;
+    float top = terrimpi_sets_most(b->tops, to, size, 1.0f), x, z, up;
+    uint32_t k, half = size / 2u;
+    least = terrimpi_max(least, terrimpi_sets_most(b->ground, eye, size, -1.0f));
+    if (least >= best)
+        return best;
+    s.eye = terrimpi_sets_part(b, &b->cell, eye, size);
+    s.to = terrimpi_sets_part(b, &b->node, to, size);
+    x = terrimpi_max(s.to.high[0] - s.eye.low[0], s.eye.high[0] - s.to.low[0]) * field->spacing_x;
+    z = terrimpi_max(s.to.high[1] - s.eye.low[1], s.eye.high[1] - s.to.low[1]) * field->spacing_z;
+    up = terrimpi_max(best, top) - tree->nodes[tree->node_count - 1u].low;
+    s.off = b->sets->error * TERRIMP_SQRTF(x * x + z * z + up * up);
+    s.top = top + b->low;
+    least = terrimpi_sets_least(b, &s, terrimpi_min_u32(b->sets->cell_level, b->sets->node_level) +
+                                           half, least, best); /* 4, 2, 1 parts: 2, 1, 0 */
+    if (least >= best)
+        return best;
+    if (size == 1u) /* rounded to codes, the rest need not be looked at any closer */
+        return terrimpi_sets_height(b->sets, b->base, terrimpi_sets_code(b->sets, b->base, least));
+    for (k = 0; k < 16u; k++) {
+        uint32_t eye_part[2], to_part[2];
+        eye_part[0] = eye[0] + (k & 1u) * half;
+        eye_part[1] = eye[1] + (k >> 1 & 1u) * half;
+        to_part[0] = to[0] + (k >> 2 & 1u) * half;
+        to_part[1] = to[1] + (k >> 3) * half;
+        best = terrimpi_sets_search(b, eye_part, to_part, half, least, best);
+    }
+    return best;
+}
+
+/* What a node of a level covers, also beyond the far edges. */
+static terrimpi_sets_rect terrimpi_sets_place(const terrimp_quadtree *tree, const terrimp_node *n)
+{
+    float quads = (float)(tree->chunk_quads << n->level);
+    terrimpi_sets_rect r;
+    r.low[0] = (float)n->x * quads;
+    r.low[1] = (float)n->z * quads;
+    r.high[0] = r.low[0] + quads;
+    r.high[1] = r.low[1] + quads;
+    return r;
+}
+
+/* Whether sight lines between two squares can meet quads round some samples: all are within half of
+   the larger square's side of the line between their middles. */
+static int terrimpi_sets_meets(const terrimpi_sets_rect *a, const terrimpi_sets_rect *b,
+                               const terrimp_rect *samples)
+{
+    float wide = 0.5f * terrimpi_max(a->high[0] - a->low[0], b->high[0] - b->low[0]) + 1.5f;
+    float from = 0.0f, to = 1.0f;
+    uint32_t k;
+    for (k = 0; k < 2u; k++) {
+        float start = 0.5f * (a->low[k] + a->high[k]);
+        float way = 0.5f * (b->low[k] + b->high[k]) - start;
+        float low = (float)(k == 0 ? samples->x : samples->y) - wide - start;
+        float high = low + 2.0f * wide + (float)(k == 0 ? samples->width : samples->height);
+        if (terrimpi_abs(way) < 0.5f) {
+            if (low > 0.0f || high < 0.0f)
+                return 0;
+            continue;
+        }
+        from = terrimpi_max(from, terrimpi_min(low / way, high / way) - 1e-4f);
+        to = terrimpi_min(to, terrimpi_max(low / way, high / way) + 1e-4f);
+    }
+    return from <= to;
+}
+
+/* Works on the codes of a cell that some samples can change: builds them, or without a job that has
+   walls forgets them. */
+static void terrimpi_sets_row(terrimpi_sets_job *b, const terrimp_node *cell,
+                              const terrimp_rect *samples)
+{
+    const terrimp_sets *sets = b->sets;
+    const terrimp_quadtree *tree = sets->hider.tree;
+    uint32_t first = tree->level_first[sets->node_level], i, k, zero[2] = {0, 0};
+    uint32_t count = terrimpi_sets_level_nodes(tree, sets->node_level);
+    uint8_t *row = sets->codes +
+                   (size_t)(cell->number - tree->level_first[cell->level]) * count;
+    float most = terrimpi_sets_height(sets, b->base, 255u);
+    for (i = 0; i < count; i++) {
+        terrimp_node node = terrimpi_tree_node(tree, first + i);
+        const unsigned char *tops;
+        float scale[2];
+        b->node = terrimpi_sets_place(tree, &node);
+        if (samples && !terrimpi_sets_meets(&b->cell, &b->node, samples))
+            continue;
+        row[i] = 0;
+        if (!b->walls.codes)
+            continue;
+        b->line[0] = b->line[1] = b->axis = 0; /* the same code, whatever was built before */
+        tops = terrimpi_walls_tops(&b->walls, node.number, scale);
+        for (k = 0; k < 16u; k++)
+            b->tops[k] = terrimpi_min(scale[0] + scale[1] * (float)tops[k],
+                                      tree->nodes[node.number].high);
+        row[i] = (uint8_t)terrimpi_sets_code(
+            sets, b->base, terrimpi_sets_search(b, zero, zero, 4u, b->base, most));
+    }
+}
+
+TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, const void *walls,
+                                                   uint32_t cell, const terrimp_rect *samples)
+{
+    const terrimp_quadtree *tree;
+    terrimpi_sets_job b;
+    terrimp_node node;
+    terrimpi_wall_site site;
+    uint32_t k;
+    TERRIMPI_REFUSE(!sets || !sets->hider.tree, TERRIMP_E_NULL);
+    tree = sets->hider.tree;
+    TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
+    TERRIMPI_REFUSE(cell >= terrimpi_sets_level_nodes(tree, sets->cell_level) ||
+                    (samples && !terrimpi_walls_rect(tree, samples, NULL)), TERRIMP_E_RANGE);
+    memset(&b, 0, sizeof b);
+    node = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + cell);
+    b.sets = sets;
+    b.walls = site.walls = terrimpi_walls_of(tree, walls);
+    b.cell = terrimpi_sets_place(tree, &node);
+    b.base = tree->nodes[node.number].low;
+    b.low = terrimpi_sets_low(sets);
+    b.rounding = 4.0f * terrimpi_stand_rounding(tree);
+    for (k = 0; k < 16u; k++) {
+        uint32_t quads = tree->chunk_quads << node.level, part = (quads + 3u) / 4u + 1u;
+        b.ground[k] = terrimpi_wall_sample(&site, node.x * quads + k % 4u * quads / 4u,
+                                           node.z * quads + k / 4u * quads / 4u, part, part, 0);
+    }
+    terrimpi_sets_row(&b, &node, samples);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
+                                              const terrimp_rect *samples)
+{
+    const terrimp_quadtree *tree;
+    terrimpi_sets_job b;
+    uint32_t i;
+    TERRIMPI_REFUSE(!sets || !samples || !sets->hider.tree, TERRIMP_E_NULL);
+    tree = sets->hider.tree;
+    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, NULL), TERRIMP_E_RANGE);
+    memset(&b, 0, sizeof b);
+    b.sets = sets;
+    for (i = 0; i < terrimpi_sets_level_nodes(tree, sets->cell_level); i++) {
+        terrimp_node cell = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + i);
+        b.cell = terrimpi_sets_place(tree, &cell);
+        terrimpi_sets_row(&b, &cell, samples);
     }
     return TERRIMP_OK;
 }
@@ -19234,7 +19864,7 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
    0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
           have an alpha, the share of the pixels in the fade band; texture matrices and
           terrimp_texture_coordinates take positions relative to the eye of the picture;
-          exact_depth; terrimp_view_set; walls, which hide what lies behind ridges; first what
+          exact_depth; terrimp_view_set; a hider, which hides what lies behind ridges; first what
           draws, then what builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement.
           Gone: the pair of atlases (a benchmark has it), evict, query, rect and reset of the live
           atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,

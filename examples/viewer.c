@@ -99,7 +99,7 @@ static terrimp_view_desc settings_of(const viewer *v, int mode)
     desc.tolerance_px = v->tolerance;
     desc.atlas_size = v->options.atlas;
     desc.texels_per_px = v->options.texels;
-    desc.walls = v->scene.job ? v->scene.job->walls : NULL;
+    desc.hider = v->scene.job ? &v->scene.job->horizon.hider : NULL;
     return desc;
 }
 

@@ -1611,8 +1611,9 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
 #include "render_scene.h"
 #include "render_holes.h"
 
-int main(void)
+int main(int argc, char **argv)
 {
+    check_only = argc > 1 ? argv[1] : NULL;
     setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
     RUN(no_hole_in_hills);
     RUN(no_hole_in_rough_terrain);

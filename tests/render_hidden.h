@@ -1,5 +1,5 @@
 /* What lies behind ridges and is not drawn would not have shown: ground at full resolution and
-   mipmapped ground give the same pixels with a horizon and without. */
+   mipmapped ground give the same pixels with a horizon or visible sets and without. */
 #ifndef RENDER_HIDDEN_H
 #define RENDER_HIDDEN_H
 
@@ -20,14 +20,14 @@ static flight_pose hidden_pose(const scene *s, int frame)
                    77.0f * t, 4.0f);
 }
 
-static hidden_count count_hidden(scene *s, int mode, const void *walls)
+static hidden_count count_hidden(scene *s, int mode, terrimp_hider *hider)
 {
     terrimp_view_desc settings = settings_of(mode), horizon = settings;
     terrimp_view *views[2], *full = open_full_view(s);
     uint8_t *plain = open_picture(s), *culled = open_picture(s), *truth = open_picture(s);
     hidden_count c = { 0, 0, { 0.0, 0.0 } };
     int i;
-    horizon.walls = walls;
+    horizon.hider = hider;
     views[0] = open_view(s, &settings);
     views[1] = open_view(s, &horizon);
     for (i = 0; i < HIDDEN_FRAMES; i++) {
@@ -53,17 +53,29 @@ static void check_hidden(scene *s)
     static const int modes[3] = { TERRIMP_MODE_FULL, TERRIMP_MODE_GEOMIP, TERRIMP_MODE_AUTO };
     const terrimp_quadtree *tree = terrimp_terrain_tree(s->terrain);
     void *walls = allocate(terrimp_walls_bytes(tree));
+    static terrimp_horizon horizon;
+    terrimp_sets sets;
+    uint32_t k;
     int i;
     need_ok(terrimp_walls_build(tree, NULL, walls));
-    for (i = 0; i < 3; i++) {
-        hidden_count c = count_hidden(s, modes[i], walls);
-        printf("  %s, mode %d: %u nodes hidden, %u pixels differ; %.2f dB without, %.2f with\n",
-               s->name, modes[i], (unsigned)c.hidden, (unsigned)c.different, c.likeness[0],
-               c.likeness[1]);
-        CHECK(c.hidden > 20);
-        CHECK(modes[i] == TERRIMP_MODE_AUTO ? c.likeness[1] > c.likeness[0] - 1.0
+    need_ok(terrimp_horizon_init(&horizon, tree, walls));
+    memset(&sets, 0, sizeof sets);
+    sets.codes = (uint8_t *)allocate(terrimp_sets_bytes(tree, &sets));
+    for (i = 0; i < 6; i++) {
+        hidden_count c;
+        sets.error = i < 2 ? 0.0f : 0.05f;
+        need_ok(terrimp_sets_init(&sets, tree));
+        for (k = 0; i < 4 && i % 2 && k < tree->level_first[1]; k++) /* for the modes that follow */
+            need_ok(terrimp_sets_build_cell(&sets, walls, k, NULL));
+        c = count_hidden(s, modes[i / 2], i % 2 ? &sets.hider : &horizon.hider);
+        printf("  %s, %s, mode %d: %u nodes hidden, %u pixels differ; %.2f dB without, %.2f with\n",
+               s->name, i % 2 ? "sets" : "horizon", modes[i / 2], (unsigned)c.hidden,
+               (unsigned)c.different, c.likeness[0], c.likeness[1]);
+        CHECK(c.hidden > (i % 2 ? 0 : 20)); /* coarse ground hides less for certain */
+        CHECK(modes[i / 2] == TERRIMP_MODE_AUTO ? c.likeness[1] > c.likeness[0] - 1.0
                                             : c.different == 0);
     }
+    free(sets.codes);
     free(walls);
 }
 

@@ -854,7 +854,7 @@ static void views_without_end_or_of_a_cost_refuse_bad_input(void)
 {
     static const uint32_t tiles[] = {1, 2, 4, 16, 17};
     static land one, nine;
-    float bytes_of_walls = 0.0f;
+    terrimp_hider hider;
     terrimp_view_desc d, out;
     terrimp_view *view = NULL;
     uint32_t i;
@@ -874,9 +874,10 @@ static void views_without_end_or_of_a_cost_refuse_bad_input(void)
         CHECK(terrimp_view_bytes(one.terrain, &d) == 0);
     }
     memset(&d, 0, sizeof d);
-    d.walls = &bytes_of_walls;
+    memset(&hider, 0, sizeof hider);
+    d.hider = &hider;
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
-    d.walls = NULL;
+    d.hider = NULL;
     d.max_cost = -1.0f;
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
     d.max_cost = not_a_number();

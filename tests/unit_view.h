@@ -1554,6 +1554,7 @@ static void settings_change_without_a_loss(void)
 {
     flight *f = &flight_room;
     terrimp_view_desc d, wrong;
+    terrimp_horizon horizon;
     terrimp_camera camera;
     uint32_t i;
     land l;
@@ -1584,7 +1585,8 @@ static void settings_change_without_a_loss(void)
         wrong.exact_depth = 1;
         CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
         wrong = d;
-        wrong.walls = &wrong;
+        memset(&horizon, 0, sizeof horizon); /* of no terrain */
+        wrong.hider = &horizon.hider;
         CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
         CHECK(terrimp_view_set(f->view, NULL) == TERRIMP_E_NULL);
         CHECK(terrimp_view_set(NULL, &d) == TERRIMP_E_NULL);

@@ -206,9 +206,10 @@ static void visibility_hides_nothing_that_shows(void)
         visible_scene s;
         uint32_t eye, n, k;
         visible_make_any(&s);
+        CHECK(terrimp_horizon_init(&h, &s.tree, s.walls) == TERRIMP_OK);
         for (eye = 0; eye < 8; eye++) {
             terrimp_camera c = visible_camera(&s);
-            CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &c, 0.0f, 0.0f) == TERRIMP_OK);
+            CHECK(terrimp_horizon_begin(&h, &c, 0.0f, 0.0f) == TERRIMP_OK);
             for (n = 0; n < s.tree.node_count; n++) {
                 uint32_t number = eye % 2u ? n : s.tree.node_count - 1u - n;
                 terrimp_node node = terrimpi_tree_node(&s.tree, number);
@@ -226,6 +227,139 @@ static void visibility_hides_nothing_that_shows(void)
         visible_free(&s);
     }
     CHECK(hidden > 100u * rounds); /* and it does find something */
+}
+
+/* ---- visible sets ---- */
+
+static void visible_sets(const visible_scene *s, terrimp_sets *sets, float error, float low)
+{
+    uint32_t cell = 0;
+    size_t bytes;
+    memset(sets, 0, sizeof *sets);
+    sets->error = error;
+    sets->low = low;
+    while ((bytes = terrimp_sets_bytes(&s->tree, sets)) > 40000) {
+        if (random_range(0, 1))
+            sets->cell_level++;
+        else
+            sets->node_level++;
+    }
+    sets->codes = (uint8_t *)calloc(bytes, 1);
+    CHECK(bytes > 0 && terrimp_sets_init(sets, &s->tree) == TERRIMP_OK);
+    while (terrimp_sets_build_cell(sets, s->walls, cell, NULL) == TERRIMP_OK)
+        cell++;
+    CHECK(cell == terrimpi_sets_level_nodes(&s->tree, sets->cell_level));
+}
+
+/* Whether sets are right about a camera; returns points of hidden nodes that were looked at. */
+static uint32_t visible_sets_hide(const visible_scene *s, terrimp_sets *sets,
+                                  const terrimp_camera *c)
+{
+    uint32_t n, k, hidden = 0;
+    if (!sets->hider.begin(&sets->hider, c, 0.0f, 0.0f))
+        return 0;
+    for (n = 0; n < s->tree.node_count; n++) {
+        terrimp_node node = terrimpi_tree_node(&s->tree, n);
+        if (!sets->hider.hides(&sets->hider, &node))
+            continue;
+        for (k = 0; k < 6; k++) {
+            double point[3], start;
+            visible_point(s, &node, point);
+            start = visible_start(c, point);
+            hidden += start < 1.0;
+            CHECK(start > 1.0 || visible_blocked(&s->tree.field, c->eye, point, start));
+        }
+    }
+    return hidden;
+}
+
+/* A hill, a hole, or noise in a rectangle of samples. */
+static terrimp_rect visible_edit(const visible_scene *s)
+{
+    terrimp_rect r;
+    uint32_t x, z;
+    float by = random_float(-30.0f, 10.0f), noise = random_range(0, 1) ? 8.0f : 0.0f;
+    r.x = random_range(0, s->tree.field.width - 1u);
+    r.y = random_range(0, s->tree.field.depth - 1u);
+    r.width = random_range(1, 60);
+    r.height = random_range(1, 30);
+    for (z = r.y; z < r.y + r.height && z < s->tree.field.depth; z++)
+        for (x = r.x; x < r.x + r.width && x < s->tree.field.width; x++)
+            s->samples[z * s->tree.field.width + x] += by + random_float(-noise, noise);
+    CHECK(terrimp_geomip_build(&s->tree, s->scratch) == TERRIMP_OK);
+    CHECK(terrimp_walls_build(&s->tree, &r, s->walls) == TERRIMP_OK);
+    return r;
+}
+
+/* The law of visible sets, whatever terrain, levels, eye and direction; also right after an edit,
+   and after its cells have been built anew. */
+static void visible_sets_hide_nothing_that_shows(void)
+{
+    uint32_t round, rounds = check_rounds(40, 400), hidden[3] = {0, 0, 0}, step, eye, cell;
+    for (round = 0; round < rounds; round++) {
+        visible_scene s;
+        terrimp_sets sets;
+        terrimp_rect edit;
+        visible_make_any(&s);
+        visible_sets(&s, &sets, round % 4u ? 0.0f : 0.01f, round % 4u ? 0.0f : 0.1f);
+        for (step = 0; step < 3; step++) {
+            if (step == 1) {
+                edit = visible_edit(&s);
+                CHECK(terrimp_sets_touch(&sets, &edit) == TERRIMP_OK);
+            }
+            for (cell = 0; step == 2; cell++)
+                if (terrimp_sets_build_cell(&sets, s.walls, cell, &edit) != TERRIMP_OK)
+                    break;
+            for (eye = 0; eye < 30; eye++) {
+                terrimp_camera c = visible_camera(&s);
+                hidden[step] += visible_sets_hide(&s, &sets, &c);
+            }
+        }
+        free(sets.codes);
+        visible_free(&s);
+    }
+    CHECK(hidden[0] > 50u * rounds); /* and they do find something */
+    CHECK(hidden[1] > 20u * rounds && hidden[2] > 40u * rounds);
+}
+
+/* What an edit cannot change, it does not; and where it can, building anew finds what building all
+   does. */
+static void visible_sets_are_rebuilt_where_samples_change(void)
+{
+    uint32_t round, kept = 0, cell, k, count;
+    for (round = 0; round < 20; round++) {
+        visible_scene s;
+        terrimp_sets sets, old;
+        terrimp_rect edit;
+        size_t bytes;
+        visible_make_any(&s);
+        visible_sets(&s, &sets, 0.0f, 0.0f);
+        bytes = terrimp_sets_bytes(&s.tree, &sets);
+        old = sets;
+        old.codes = (uint8_t *)malloc(bytes);
+        memcpy(old.codes, sets.codes, bytes);
+        edit = visible_edit(&s);
+        CHECK(terrimp_sets_touch(&old, &edit) == TERRIMP_OK);
+        count = terrimpi_sets_level_nodes(&s.tree, sets.node_level);
+        for (k = 0; k < bytes; k++)
+            kept += old.codes[k] > 0;
+        for (cell = 0; cell < bytes / count; cell++)
+            CHECK(terrimp_sets_build_cell(&old, s.walls, cell, &edit) == TERRIMP_OK &&
+                  terrimp_sets_build_cell(&sets, s.walls, cell, NULL) == TERRIMP_OK);
+        for (k = 0; k < bytes; k++) {
+            terrimp_node c = terrimpi_tree_node(&s.tree, s.tree.level_first[sets.cell_level] +
+                                                             k / count);
+            terrimp_node n = terrimpi_tree_node(&s.tree, s.tree.level_first[sets.node_level] +
+                                                             k % count);
+            terrimpi_sets_rect a = terrimpi_sets_place(&s.tree, &c);
+            terrimpi_sets_rect b = terrimpi_sets_place(&s.tree, &n);
+            CHECK(!terrimpi_sets_meets(&a, &b, &edit) || old.codes[k] == sets.codes[k]);
+        }
+        free(old.codes);
+        free(sets.codes);
+        visible_free(&s);
+    }
+    CHECK(kept > 1000);
 }
 
 /* ---- what is drawn ---- */
@@ -319,6 +453,7 @@ static void culled_draws_are_behind_those_that_are_left(void)
         v.marks = (terrimp_geomip_mark *)calloc(s.tree.node_count, sizeof *v.marks);
         v.draws = (terrimp_geomip_draw *)malloc(s.tree.node_count * sizeof *v.draws);
         all = (terrimp_geomip_draw *)malloc(s.tree.node_count * sizeof *all);
+        CHECK(terrimp_horizon_init(&h, &s.tree, s.walls) == TERRIMP_OK);
         for (i = 0; i < 6; i++) {
             c = visible_camera(&s);
             v.rule = (int)random_range(1, 3);
@@ -328,7 +463,7 @@ static void culled_draws_are_behind_those_that_are_left(void)
             memcpy(all, v.draws, v.draw_count * sizeof *all);
             count = v.draw_count;
             triangles = v.triangle_count;
-            CHECK(terrimp_horizon_cull(&h, &s.tree, s.walls, &c, &v) == TERRIMP_OK);
+            CHECK(terrimp_horizon_cull(&h, &c, &v) == TERRIMP_OK);
             culled += count - v.draw_count;
             for (k = 0; k < count; k++) {
                 uint32_t left, j;
@@ -427,6 +562,7 @@ static void visibility_of_a_wall(void)
     CHECK(terrimp_geomip_build(&tree, scratch) == TERRIMP_OK);
     walls = malloc(terrimp_walls_bytes(&tree));
     CHECK(terrimp_walls_build(&tree, NULL, walls) == TERRIMP_OK);
+    CHECK(terrimp_horizon_init(&h, &tree, walls) == TERRIMP_OK);
     for (eye = 0; eye < 5; eye++) {
         memset(&c, 0, sizeof c);
         c.eye[0] = 64.5f;
@@ -436,7 +572,7 @@ static void visibility_of_a_wall(void)
         c.width_px = c.height_px = 500;
         c.z_near = 0.5f;
         c.z_far = 1000.0f;
-        CHECK(terrimp_horizon_begin(&h, &tree, walls, &c, 0.0f, 0.0f) == TERRIMP_OK);
+        CHECK(terrimp_horizon_begin(&h, &c, 0.0f, 0.0f) == TERRIMP_OK);
         for (k = hidden = 0; k < 256; k++) {
             int hides = terrimp_horizon_hides(&h, k, 0.0f) != 0;
             hidden += (uint32_t)hides;
@@ -481,6 +617,7 @@ static void visible_draw(terrimp_view *view, const terrimp_camera *c, visible_dr
 static void views_leave_out_what_is_hidden(void)
 {
     static visible_drawn with, without;
+    static terrimp_horizon h;
     uint32_t round, hidden = 0;
     for (round = 0; round < 30; round++) {
         visible_scene s;
@@ -488,6 +625,7 @@ static void views_leave_out_what_is_hidden(void)
         terrimp_view_desc settings;
         terrimp_terrain *terrain;
         terrimp_view *views[2];
+        terrimp_sets sets;
         terrimp_stats stats;
         uint32_t i, j, k, eye;
         visible_make(&s, 129, 129, 8);
@@ -502,7 +640,11 @@ static void views_leave_out_what_is_hidden(void)
         CHECK(terrimp_terrain_create(&desc, NULL, &terrain) == TERRIMP_OK);
         CHECK(terrimp_walls_build(terrimp_terrain_tree(terrain), NULL, s.walls) == TERRIMP_OK);
         CHECK(terrimp_view_create(terrain, &settings, NULL, &views[0]) == TERRIMP_OK);
-        settings.walls = s.walls;
+        visible_sets(&s, &sets, round % 2u ? 0.0f : 0.1f, 0.0f);
+        CHECK(terrimp_horizon_init(&h, terrimp_terrain_tree(terrain), s.walls) == TERRIMP_OK);
+        sets.hider.tree = terrimp_terrain_tree(terrain);
+        settings.hider = round % 3u == 0 ? &sets.hider : &h.hider;
+        sets.hider.next = round % 6u == 0 ? &h.hider : NULL;
         CHECK(terrimp_view_create(terrain, &settings, NULL, &views[1]) == TERRIMP_OK);
         for (eye = 0; eye < 6; eye++) {
             terrimp_camera c = visible_camera(&s);
@@ -530,9 +672,104 @@ static void views_leave_out_what_is_hidden(void)
         terrimp_view_destroy(views[0]);
         terrimp_view_destroy(views[1]);
         terrimp_terrain_destroy(terrain);
+        free(sets.codes);
         visible_free(&s);
     }
     CHECK(hidden > 1000);
+}
+
+/* ---- materials ---- */
+
+/* The weight that a bilinear read finds at a place in quads. */
+static double material_weight(const terrimp_heightfield *f, const terrimp_weights *w, double x,
+                              double z)
+{
+    double at[2], weight = 0.0;
+    uint32_t size[2], quads[2], k;
+    size[0] = w->width;
+    size[1] = w->depth;
+    quads[0] = f->width - 1u;
+    quads[1] = f->depth - 1u;
+    for (k = 0; k < 2; k++) {
+        double part = (k == 0 ? x : z) / (double)quads[k];
+        at[k] = w->centred ? part * (double)(size[k] - 1u) : part * (double)size[k] - 0.5;
+    }
+    for (k = 0; k < 4; k++) {
+        double u = floor(at[0]) + (double)(k % 2u), v = floor(at[1]) + (double)(k / 2u);
+        double share = (1.0 - fabs(at[0] - u)) * (1.0 - fabs(at[1] - v));
+        size_t i = u < 0.0 ? 0u : u > (double)(size[0] - 1u) ? size[0] - 1u : (size_t)u;
+        size_t j = v < 0.0 ? 0u : v > (double)(size[1] - 1u) ? size[1] - 1u : (size_t)v;
+        weight += share * (double)w->texels[j * w->row_bytes + i * w->texel_bytes];
+    }
+    return weight;
+}
+
+/* No place on a node has a weight whose bit is missing; and a bit has a weight on the node or, by
+   the rounding that is allowed for, right beside it. Parents have the bits of their children. */
+static void masks_have_the_materials_that_lie_on_a_node(void)
+{
+    uint32_t round, set = 0, clear = 0;
+    for (round = 0; round < 60; round++) {
+        visible_scene s;
+        terrimp_weights w[3];
+        uint8_t texels[3][40 * 40];
+        uint32_t k, n, i, *masks;
+        visible_make_any(&s);
+        masks = (uint32_t *)malloc(s.tree.node_count * sizeof *masks);
+        memset(texels, 0, sizeof texels);
+        memset(w, 0, sizeof w);
+        for (k = 0; k < 3; k++) {
+            w[k].texels = texels[k];
+            w[k].texel_bytes = random_range(1, 2);
+            w[k].width = random_range(1, 20);
+            w[k].depth = random_range(1, 40);
+            w[k].row_bytes = 40;
+            w[k].centred = (int)random_range(0, 1);
+            for (i = random_range(0, 5); i > 0; i--)
+                texels[k][random_range(0, w[k].depth - 1u) * 40u +
+                          random_range(0, w[k].width - 1u) * w[k].texel_bytes] = 255;
+        }
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 1.0f, masks) == TERRIMP_OK);
+        for (n = 0; n < s.tree.node_count; n++) {
+            terrimp_node node = terrimpi_tree_node(&s.tree, n);
+            double quads = (double)(s.tree.chunk_quads << node.level);
+            double last_x = (double)(s.tree.field.width - 1u);
+            double last_z = (double)(s.tree.field.depth - 1u);
+            if (n + 1u < s.tree.node_count)
+                CHECK((masks[n] & ~masks[terrimpi_tree_parent_number(&s.tree, n)]) == 0);
+            for (k = 0; k < 3; k++) {
+                double near_by = 0.02 * last_x / (double)w[k].width +
+                                 0.02 * last_z / (double)w[k].depth, found = 0.0;
+                for (i = 0; i < 81; i++) { /* from side to side, and a little beyond */
+                    double x = ((double)node.x + (double)(i % 9u) / 8.0) * quads;
+                    double z = ((double)node.z + (double)(i / 9u) / 8.0) * quads;
+                    x = x > last_x ? last_x : x;
+                    z = z > last_z ? last_z : z;
+                    if (!(masks[n] >> k & 1u))
+                        CHECK(material_weight(&s.tree.field, &w[k], x, z) == 0.0);
+                    x += (double)((int)(i % 9u) - 4) * near_by;
+                    z += (double)((int)(i / 9u) - 4) * near_by;
+                    x = x < 0.0 ? 0.0 : x > last_x ? last_x : x;
+                    z = z < 0.0 ? 0.0 : z > last_z ? last_z : z;
+                    found += material_weight(&s.tree.field, &w[k], x, z);
+                }
+                if (quads * (double)w[k].width < 4.0 * last_x &&
+                    quads * (double)w[k].depth < 4.0 * last_z)
+                    CHECK(!(masks[n] >> k & 1u) || found > 0.0);
+                set += masks[n] >> k & 1u;
+                clear += !(masks[n] >> k & 1u);
+            }
+        }
+        CHECK(terrimp_material_masks(&s.tree, w, 33, 1.0f, masks) == TERRIMP_E_RANGE);
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 0.5f, masks) == TERRIMP_E_RANGE);
+        CHECK(terrimp_material_masks(&s.tree, w, 3, NAN, masks) == TERRIMP_E_NOT_FINITE);
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 1.0f, NULL) == TERRIMP_E_NULL);
+        w[2].texels = NULL;
+        CHECK(terrimp_material_masks(&s.tree, w, 3, 1.0f, masks) == TERRIMP_E_NULL);
+        free(masks);
+        visible_free(&s);
+    }
+    CHECK(set > 1000 && clear > 1000);
 }
 
 static void visibility_refuses_what_makes_no_sense(void)
@@ -542,25 +779,29 @@ static void visibility_refuses_what_makes_no_sense(void)
     terrimp_camera c, bad;
     terrimp_geomip_view v;
     terrimp_rect rect;
+    terrimp_sets sets;
+    static uint8_t codes[25 * 25];
     visible_make(&s, 40, 40, 8);
     c = visible_camera(&s);
     memset(&v, 0, sizeof v);
     CHECK(terrimp_walls_bytes(NULL) == 0);
-    CHECK(terrimp_horizon_begin(NULL, &s.tree, s.walls, &c, 0, 0) == TERRIMP_E_NULL);
-    CHECK(terrimp_horizon_begin(&h, NULL, s.walls, &c, 0, 0) == TERRIMP_E_NULL);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, NULL, &c, 0, 0) == TERRIMP_E_NULL);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, NULL, 0, 0) == TERRIMP_E_NULL);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, (char *)s.walls + 1, &c, 0, 0) == TERRIMP_E_ALIGN);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &c, 0.6f, 0) == TERRIMP_E_RANGE);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &c, -0.1f, 0) == TERRIMP_E_RANGE);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &c, 0, -1.0f) == TERRIMP_E_RANGE);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &c, 0, NAN) == TERRIMP_E_NOT_FINITE);
+    CHECK(terrimp_horizon_init(NULL, &s.tree, s.walls) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_init(&h, NULL, s.walls) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_init(&h, &s.tree, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_init(&h, &s.tree, (char *)s.walls + 1) == TERRIMP_E_ALIGN);
+    CHECK(terrimp_horizon_init(&h, &s.tree, s.walls) == TERRIMP_OK);
+    CHECK(terrimp_horizon_begin(NULL, &c, 0, 0) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_begin(&h, NULL, 0, 0) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_begin(&h, &c, 0.6f, 0) == TERRIMP_E_RANGE);
+    CHECK(terrimp_horizon_begin(&h, &c, -0.1f, 0) == TERRIMP_E_RANGE);
+    CHECK(terrimp_horizon_begin(&h, &c, 0, -1.0f) == TERRIMP_E_RANGE);
+    CHECK(terrimp_horizon_begin(&h, &c, 0, NAN) == TERRIMP_E_NOT_FINITE);
     bad = c;
     bad.z_near = 0.0f;
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &bad, 0, 0) == TERRIMP_E_RANGE);
-    CHECK(terrimp_horizon_cull(&h, &s.tree, s.walls, &c, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_horizon_cull(&h, &s.tree, s.walls, &c, &v) == TERRIMP_E_NULL);
-    CHECK(terrimp_horizon_begin(&h, &s.tree, s.walls, &c, 0, 0) == TERRIMP_OK);
+    CHECK(terrimp_horizon_begin(&h, &bad, 0, 0) == TERRIMP_E_RANGE);
+    CHECK(terrimp_horizon_cull(&h, &c, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_cull(&h, &c, &v) == TERRIMP_E_NULL);
+    CHECK(terrimp_horizon_begin(&h, &c, 0, 0) == TERRIMP_OK);
     CHECK(!terrimp_horizon_hides(NULL, 0, 0));
     CHECK(!terrimp_horizon_hides(&h, s.tree.node_count, 0));
     CHECK(!terrimp_horizon_hides(&h, 0, NAN));
@@ -574,16 +815,40 @@ static void visibility_refuses_what_makes_no_sense(void)
     rect.x = 40;
     CHECK(terrimp_walls_build(&s.tree, &rect, s.walls) == TERRIMP_E_RANGE);
     CHECK(terrimp_walls_build(NULL, NULL, s.walls) == TERRIMP_E_NULL);
+    memset(&sets, 0, sizeof sets);
+    CHECK(terrimp_sets_bytes(NULL, &sets) == 0 && terrimp_sets_bytes(&s.tree, NULL) == 0);
+    CHECK(terrimp_sets_init(&sets, &s.tree) == TERRIMP_E_NULL);
+    CHECK(terrimp_sets_build_cell(&sets, s.walls, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sets_touch(&sets, &rect) == TERRIMP_E_NULL);
+    sets.codes = codes;
+    sets.cell_level = s.tree.level_count;
+    CHECK(terrimp_sets_init(&sets, &s.tree) == TERRIMP_E_RANGE);
+    sets.cell_level = 0;
+    sets.low = NAN;
+    CHECK(terrimp_sets_init(&sets, &s.tree) == TERRIMP_E_NOT_FINITE);
+    sets.low = -1.0f;
+    CHECK(terrimp_sets_init(&sets, &s.tree) == TERRIMP_E_RANGE);
+    sets.low = 0.0f;
+    CHECK(terrimp_sets_bytes(&s.tree, &sets) == sizeof codes);
+    CHECK(terrimp_sets_init(&sets, &s.tree) == TERRIMP_OK);
+    CHECK(terrimp_sets_build_cell(&sets, s.walls, 25, NULL) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sets_build_cell(&sets, s.walls, 0, &rect) == TERRIMP_E_RANGE);
+    CHECK(terrimp_sets_build_cell(&sets, NULL, 0, NULL) == TERRIMP_E_NULL);
+    CHECK(terrimp_sets_touch(&sets, &rect) == TERRIMP_E_RANGE);
+    CHECK(!sets.hider.begin(&sets.hider, &c, 0.01f, 0.0f)); /* drawn farther off than told */
     visible_free(&s);
 }
 
 static void visibility_tests(void)
 {
     RUN(visibility_hides_nothing_that_shows);
+    RUN(visible_sets_hide_nothing_that_shows);
+    RUN(visible_sets_are_rebuilt_where_samples_change);
     RUN(culled_draws_are_behind_those_that_are_left);
     RUN(walls_are_rebuilt_where_samples_change);
     RUN(visibility_of_a_wall);
     RUN(views_leave_out_what_is_hidden);
+    RUN(masks_have_the_materials_that_lie_on_a_node);
     RUN(visibility_refuses_what_makes_no_sense);
 }
 

@@ -94,6 +94,7 @@ static job_stage build_walls(job *j)
     j->walls = malloc(terrimp_walls_bytes(tree));
     if (!j->walls)
         return fail(j, "no memory for what ridges hide");
+    terrimp_horizon_init(&j->horizon, tree, j->walls);
     return check(j, terrimp_walls_build(tree, NULL, j->walls), JOB_LIGHT);
 }
 

@@ -23,7 +23,8 @@ typedef struct job {
     terrimp_terrain *terrain;  /* in memory */
     void *memory, *scratch;
     uint32_t node_count, left;
-    void *walls;               /* of what ridges hide */
+    void *walls;
+    terrimp_horizon horizon;   /* over these: what ridges hide */
     uint8_t *lightmap;         /* rgb[depth][width][3] */
     char error[512];           /* one line, when the stage is JOB_FAILED */
 #ifndef HOST_NO_THREADS
