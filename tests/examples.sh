@@ -227,6 +227,10 @@ if [ -x build/geomip ]; then
 fi
 check "software draws its frames without a GPU, close to the full mesh" host_runs software
 check "sorted draws the same frames without and with a depth buffer" host_runs sorted
+check "prepared draws pictures from memory, close to the full mesh" host_runs prepared
+if [ -x build/town ]; then
+    check "town keeps to its budget of triangles and shows no hole" host_runs town
+fi
 if [ -x build/fixed_function ]; then
     check "fixed_function draws its frames, close to the full mesh" host_runs fixed_function
     check "fixed_function calls nothing newer than OpenGL 1.1" \
