@@ -302,8 +302,8 @@ typedef struct terrimp_heightfield {
     float no_data;          /* the sample value that means no data, when has_no_data */
     int has_no_data;        /* nonzero: samples equal to no_data are voids; F32 NaN is one too */
     int wrap;               /* nonzero: the field repeats without end, its last column and row being
-                               the first ones of the next. Heights, normals, rays and Sorted know
-                               of it; a terrain is one repetition */
+                               the first ones of the next. Heights, normals, rays, Sorted and views
+                               know of it; a terrain is one repetition */
 } terrimp_heightfield;
 
 /* Every function below takes the descriptor as it was filled in, or as resolve wrote it. The
@@ -1463,6 +1463,8 @@ typedef struct terrimp_ground_command {
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
+    float offset[2];      /* [wu] x and z to be added to its vertices: 0, but in a terrain that
+                             wraps. All that commands say in world units is with that offset */
 } terrimp_ground_command;
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
@@ -1558,6 +1560,17 @@ typedef struct terrimp_view_desc {
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
+    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
+                               repetitions along each axis, with the eye's in the middle. The
+                               field's quads are multiples of chunk_quads; nodes are drawn up to the
+                               level at which its chunks are no multiple of theirs. It takes 44
+                               bytes more for each node that it has by that. No hider then
+                               [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
+    float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
+                               and captures are predicted to cost. The ground is coarsened until
+                               they fit, and made finer again when that is predicted to fit, too; as
+                               many captures are made as leave no frame dearer
+                               [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
                                [Default NULL -> nothing is hidden so] */
@@ -1595,6 +1608,7 @@ typedef struct terrimp_impostor_command {
                              picture has there, 0..1, to the place relative to the frame's eye,
                              times a factor. For a host that keeps the depth of its atlases and
                              writes that place's own: see terrimp_place_matrix. Else 0 */
+    float offset[2];      /* [wu] as for ground */
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
@@ -1607,6 +1621,7 @@ typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
+    float offset[2]; /* [wu] as for ground; one floor for each repetition */
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1643,7 +1658,8 @@ typedef struct terrimp_stats {
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
     uint32_t late;               /* nodes and pictures that pages were missing for */
-    float ground_tolerance_px;   /* what max_ground made of it */
+    float ground_tolerance_px;   /* what max_ground and max_cost made of it */
+    float cost;                  /* of the frame, predicted: all but what is shaded either way */
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
@@ -1678,8 +1694,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0;
-              exact_depth only if the view was made with it
+              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
+              before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1729,6 +1745,14 @@ TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *
               before the first update, and after invalidate, touch and drop until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
+
+/* The max_cost of the next frames from what the last one took, for a host that measures: at most a
+   twentieth less or a fiftieth more, the same within 3 % of the target. No clock inside, and it
+   settles where time rises with cost, and no faster than it does. A pause costs one step.
+
+   cost        that the frame was allowed; ms that it took; target_ms that it should take. What is
+               not above 0, or not finite: the cost stays */
+TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
 /* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
@@ -1971,11 +1995,12 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
    `sorted`. Nothing but the eye's place within or beside the node counts.
 
    first_index  of its command
-   eye          of the frame; for the ground of a capture, that of the capture's command [wu]
+   eye          of the frame, for the ground of a capture that of the capture's command, less the
+                offset of its command [wu]
    indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
                 pattern's triangles, but none of no area
    count        out. Never more than the command's index_count
-   Cost         O(quads); 15 cycles a triangle */
+   Cost         O(quads); about 20 cycles a triangle of a processor of 2020 */
 TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
                                                  uint32_t first_index, const float eye[3],
                                                  uint16_t *indices, size_t capacity,
@@ -5181,6 +5206,8 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    if (split2 >= TERRIMPI_MIP_MOST)
+        return split2; /* at no distance; or it cannot be drawn at all */
     terrimpi_camera_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
@@ -6629,6 +6656,9 @@ struct terrimp_terrain {
     uint32_t *corners;                     /* [node_count][index_limit / 4] four indices each */
     uint32_t *stale;                       /* a bit for each node that edits have left; NULL for a
                                               bake: none */
+    uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
+                                              which a node is a repetition. NULL: itself */
+    uint32_t tiles;                        /* then: repetitions along each axis */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6821,18 +6851,24 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
     return &((const terrimpi_record *)(const void *)terrimpi_page_record(&t->tree, node))->mesh;
 }
 
+/* The node of the built terrain that a node is, or repeats. */
+static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
+{
+    return t->real ? t->real[node] : node;
+}
+
 /* The stored vertices of a node's mesh, and behind them the words with its indices. */
 static const uint32_t *terrimpi_points_of(const terrimp_terrain *t, uint32_t node)
 {
     if (t->points)
-        return t->points + (size_t)node * t->vertex_limit;
+        return t->points + (size_t)terrimpi_real_node(t, node) * t->vertex_limit;
     return (const uint32_t *)(const void *)(terrimpi_page_of(t->tree.pages, node) +
                                             TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD);
 }
 
 static const uint32_t *terrimpi_corners_of(const terrimp_terrain *t, uint32_t node)
 {
-    return t->corners ? t->corners + (size_t)node * (t->index_limit / 4u)
+    return t->corners ? t->corners + (size_t)terrimpi_real_node(t, node) * (t->index_limit / 4u)
                       : terrimpi_points_of(t, node) + t->vertex_limit;
 }
 
@@ -6864,6 +6900,17 @@ static float terrimpi_mesh_step(const terrimpi_mesh *mesh)
 static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t steps)
 {
     return t->range_low + t->range_step * (float)steps;
+}
+
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+{
+    terrimp_node n = *node;
+    n.number = terrimpi_real_node(t, n.number);
+    if (t->real) {
+        n.x %= t->tree.level_x[n.level] / t->tiles;
+        n.z %= t->tree.level_z[n.level] / t->tiles;
+    }
+    return n;
 }
 
 /* Vertex i of a node's mesh. */
@@ -6948,7 +6995,7 @@ static uint32_t terrimpi_mesh_places(const terrimp_terrain *t)
 
 static uint32_t terrimpi_mesh_at(const terrimp_terrain *t, uint32_t node)
 {
-    return t->tree.pages ? t->tree.pages->slot_of[node] - 1u : node;
+    return t->tree.pages ? t->tree.pages->slot_of[node] - 1u : terrimpi_real_node(t, node);
 }
 
 /* Where a node's mesh stands in the host's buffers, and how good it is. */
@@ -9409,7 +9456,7 @@ static uint32_t terrimpi_capture_side(const terrimpi_capture_row *row, uint32_t 
 static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                       terrimpi_capture_draw draws[TERRIMPI_CAPTURE_DRAWS])
 {
-    const terrimp_heightfield *field = &t->desc.field;
+    const terrimp_heightfield *field = &t->tree.field;
     const float *eye = plan->eye;
     uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
     uint32_t i, j, k, count = 0;
@@ -9454,28 +9501,48 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. */
+/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
+   the one in the middle is. */
+static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
+                                 const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    if (!t->real)
+        return;
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+}
+
+/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. `middle` is
+   added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                   const terrimpi_capture_draw *draws, uint32_t from, uint32_t to,
-                                  uint32_t layer, terrimp_capture_command *command,
-                                  int depth_zero_to_one, const terrimp_callbacks *callbacks)
+                                  uint32_t layer, const float middle[2],
+                                  terrimp_capture_command *command, int depth_zero_to_one,
+                                  const terrimp_callbacks *callbacks)
 {
     const terrimp_heightfield *field = &t->desc.field;
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
+    terrimp_node place = terrimpi_real_place(t, &plan->node);
     camera.z_far = terrimpi_capture_end(plan, layer);
-    command->node = plan->node.number;
-    command->level = plan->node.level;
-    command->x = plan->node.x;
-    command->z = plan->node.z;
+    camera.eye[0] += middle[0];
+    camera.eye[2] += middle[1];
+    command->node = place.number;
+    command->level = place.level;
+    command->x = place.x;
+    command->z = place.z;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
-    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x;
-    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z;
-    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x;
-    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z;
+    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x + middle[0];
+    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z + middle[1];
+    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
+    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
@@ -9483,6 +9550,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
+        terrimpi_tile_offset(t, &node, middle, ground.offset);
+        node = terrimpi_real_place(t, &node);
         ground.node = node.number;
         ground.x = node.x;
         ground.z = node.z;
@@ -9521,7 +9590,11 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
-#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; when costs fall with the square
+                                         of that, for max_cost */
+#define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
+#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
+#define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
 #define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
@@ -9604,6 +9677,7 @@ typedef struct terrimpi_frame {
     float side_px;                 /* pixels of a unit of a fitted frustum's side: K, too, or */
     int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
+    float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
@@ -9677,6 +9751,7 @@ static terrimp_result terrimpi_view_settings(const terrimp_terrain *t, terrimp_v
                           &result);
     terrimpi_view_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
     terrimpi_view_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
+    terrimpi_view_setting(&d->max_cost, 0.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
@@ -9705,14 +9780,27 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.max_slot, d.atlas_size / 2u);
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
+    TERRIMPI_DEFAULT(d.wrap_tiles, 3);
     chunks = terrain->tree.level_first[1];
+    if (terrain->desc.field.wrap && !terrain->real)
+        chunks *= d.wrap_tiles * d.wrap_tiles;
     TERRIMPI_DEFAULT(d.max_ground,
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size) ||
+                    !terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
+                    TERRIMP_E_RANGE);
+    if (terrain->desc.field.wrap) {
+        const terrimp_heightfield *f = &terrain->desc.field;
+        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
+                        (f->width - 1u) % terrain->desc.chunk_quads ||
+                        (f->depth - 1u) % terrain->desc.chunk_quads ||
+                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
+                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
+    }
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -10037,7 +10125,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0; /* too much of what a picture may be off goes to how far eyes are apart */
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
+        (f->terrain->real && /* and it is no repetition of a whole node */
+         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0))
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
@@ -10388,7 +10478,8 @@ typedef struct terrimpi_job {
 } terrimpi_job;
 
 struct terrimp_view {
-    const terrimp_terrain *terrain;
+    const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
+                                               wraps */
     uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
@@ -10407,15 +10498,62 @@ struct terrimp_view {
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
-    float ground_scale;            /* of its tolerance: 1, or more when max_ground is short */
+    float ground_scale;            /* of its tolerance: 1, or more when max_ground or max_cost are
+                                      short */
+    float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
     terrimp_stats stats;
+    terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                 terrimp_terrain *t)
+{
+    terrimp_heightfield field = terrain->desc.field;
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
+    if (!field.wrap)
+        return;
+    v->terrain = v->tiled = t;
+    *t = *terrain;
+    t->tiles = v->desc.wrap_tiles;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
 
 /* ---- memory ---- */
 
@@ -10486,16 +10624,31 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->draws = (terrimpi_view_draw *)terrimpi_take(&l, ground + impostors + 1u, sizeof *v->draws);
+    v->draws = (terrimpi_view_draw *)terrimpi_take(
+        &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
+        sizeof *v->draws);
+    if (v->tiled) {
+        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
+        terrimp_terrain made = *v->tiled;
+        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
+        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
+        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
+        if (t) {
+            *t = made;
+            terrimpi_tiled_fill(t, v->built);
+            v->terrain = v->tiled = t;
+        }
+    }
     return l.ok && slots ? l.bytes : 0;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
 {
     terrimp_view v;
+    terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    v.terrain = terrain;
+    terrimpi_tiled_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -10512,11 +10665,12 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              size_t bytes, terrimp_view **view)
 {
     terrimp_view v, *made = (terrimp_view *)memory;
+    terrimp_terrain tiled;
     size_t needed;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    v.terrain = terrain;
+    terrimpi_tiled_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -10525,8 +10679,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
-    v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
+    v.frame.terrain = v.terrain;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
@@ -10544,10 +10698,11 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
-                    d.max_captures != has->max_captures ||
+                    d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
                     (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
@@ -10581,6 +10736,80 @@ static void terrimpi_view_cancel(terrimp_view *v)
     if (v->open) {
         v->jobs[0] = v->jobs[v->open - 1u];
         v->open = 1;
+    }
+}
+
+/* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
+   node that a node was, or node_count when it was none. */
+static uint32_t terrimpi_tiled_before(const terrimp_terrain *t, const terrimp_node *n, int32_t x,
+                                      int32_t z)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t was_x = n->x + (uint32_t)(x * (int32_t)(tree->level_x[n->level] / t->tiles));
+    uint32_t was_z = n->z + (uint32_t)(z * (int32_t)(tree->level_z[n->level] / t->tiles));
+    if (terrimpi_mesh_triangles(&t->meshes[n->number]) == 0 ||
+        !terrimpi_tree_has(tree, n->level, was_x, was_z))
+        return tree->node_count;
+    return terrimpi_tree_at(tree, n->level, was_x, was_z).number;
+}
+
+static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
+{
+    const terrimp_terrain *t = v->terrain;
+    uint32_t count = t->tree.node_count, k;
+    int up = z > 0 || (z == 0 && x > 0);
+    terrimpi_cache_picture *p;
+    float way[2];
+    way[0] = (float)x * terrimpi_field_period(&t->desc.field, 0);
+    way[1] = (float)z * terrimpi_field_period(&t->desc.field, 1);
+    v->frame.camera.eye[0] -= way[0];
+    v->frame.camera.eye[2] -= way[1];
+    v->outdated = 1; /* its draws are of nodes that are elsewhere now */
+    terrimpi_view_cancel(v);
+    if (v->open)
+        terrimpi_job_cancel(&v->cache, &v->jobs[0]);
+    v->open = 0;
+    for (k = 0; k < count; k++) { /* from which they come is later in this direction */
+        terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
+        uint32_t was = terrimpi_tiled_before(t, &n, x, z);
+        int is = was < count;
+        v->kind_of[n.number] = is ? v->kind_of[was] : (unsigned char)TERRIMPI_VIEW_KIND_GROUND;
+        v->ground.marks[n.number].measure = is ? v->ground.marks[was].measure : 0.0f;
+        v->ground.marks[n.number].frame = is ? v->ground.marks[was].frame : 0;
+    }
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+        if (p->seen)
+            v->cache.of_node[p->node.number] = TERRIMPI_CACHE_NO_PICTURE;
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
+        terrimp_node n = p->node;
+        uint32_t now = p->seen ? terrimpi_tiled_before(t, &n, -x, -z) : count;
+        if (!p->seen)
+            continue;
+        if (now == count) {
+            uint16_t *at = &v->cache.of_node[n.number], other = *at;
+            terrimpi_cache_drop(&v->cache, p);
+            *at = other;
+            continue;
+        }
+        p->node = terrimpi_tree_node(&t->tree, now);
+        p->eye[0] -= way[0];
+        p->eye[2] -= way[1];
+        v->cache.of_node[now] = (uint16_t)(p - v->cache.pictures);
+    }
+}
+
+/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
+   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
+static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
+                                 int32_t went[2])
+{
+    const terrimp_heightfield *field = &v->terrain->desc.field;
+    int k;
+    for (k = 0; k < 2 && v->terrain->real; k++) {
+        float period = terrimpi_field_period(field, k), step;
+        middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
+        step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
+        went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
 }
 
@@ -10619,9 +10848,11 @@ static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int los
 {
     terrimpi_cache_picture *p;
     TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->cache.node_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count,
+                    TERRIMP_E_RANGE);
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
-        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE && p->node.number != node))
+        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE &&
+                             terrimpi_real_node(v->terrain, p->node.number) != node))
             continue;
         *(lost ? &p->lost : &p->expired) = 1;
         if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
@@ -10635,17 +10866,24 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 {
     const terrimp_quadtree *tree;
     terrimpi_cache_picture *p;
+    uint32_t tiles, k;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
-    tree = &view->terrain->tree;
+    tree = &view->built->tree;
+    tiles = view->terrain->real ? view->desc.wrap_tiles : 1u;
     TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
+    if (view->terrain->real)
+        terrimpi_tiled_fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
-        if (terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
-            terrimpi_view_forget(view, p);
+        for (k = 0; k < tiles * tiles; k++)
+            if (terrimpi_cache_shows(p, tree->chunk_quads,
+                                     x + k % tiles * (tree->field.width - 1u),
+                                     z + k / tiles * (tree->field.depth - 1u), cols, rows))
+                terrimpi_view_forget(view, p);
     return TERRIMP_OK;
 }
 
@@ -10959,7 +11197,6 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_view_make_regions(v, NULL);
         return TERRIMP_OK;
     }
-    v->ground_scale = terrimpi_max(1.0f, v->ground_scale * TERRIMPI_VIEW_FINER);
     for (;;) {
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
@@ -11199,14 +11436,16 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
+    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    command.node = ground->node.number;
-    command.level = ground->node.level;
-    command.x = ground->node.x;
-    command.z = ground->node.z;
+    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    command.node = place.number;
+    command.level = place.level;
+    command.x = place.x;
+    command.z = place.z;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -11219,15 +11458,17 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
+    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    command.node = picture->node.number;
-    command.level = picture->node.level;
-    command.x = picture->node.x;
-    command.z = picture->node.z;
+    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    command.node = place.number;
+    command.level = place.level;
+    command.x = place.x;
+    command.z = place.z;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
@@ -11236,6 +11477,8 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     memcpy(command.eye, picture->eye, sizeof command.eye);
     if (v->frame.camera.orthographic)
         terrimpi_capture_origin(v->terrain, &picture->node, command.eye);
+    command.eye[0] += v->frame.middle[0];
+    command.eye[2] += v->frame.middle[1];
     picture->drawn_count++;
     for (k = 0; k < picture->layer_count; k++) {
         layer = v->desc.sorted ? picture->layer_count - 1u - k : k;
@@ -11256,13 +11499,19 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
                                      const terrimp_callbacks *callbacks)
 {
     terrimp_floor_command command;
-    (void)draw;
     if (!callbacks->draw_floor)
         return;
     memset(&command, 0, sizeof command);
-    command.base_vertex = terrimpi_mesh_places(v->terrain) * v->terrain->vertex_stride;
-    command.first_index = terrimpi_mesh_places(v->terrain) * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_indices(v->terrain);
+    command.base_vertex = terrimpi_mesh_places(v->built) * v->terrain->vertex_stride;
+    command.first_index = terrimpi_mesh_places(v->built) * v->terrain->index_stride;
+    command.index_count = terrimpi_floor_indices(v->built);
+    if (v->terrain->real) { /* its first chunk says of which repetition */
+        uint32_t tiles = v->terrain->tiles;
+        terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
+                                              v->built->tree.level_x[0], draw->index / tiles *
+                                              v->built->tree.level_z[0]);
+        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+    }
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -11418,7 +11667,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     if (!job->picture)
         return 0;
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
-    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
+    job->in_pieces = f->desc->max_capture_triangles ||
+                     ((job->triangles > room ||
+                       (f->desc->max_cost > 0.0f &&
+                        c->capture_cost > costs->triangle * (float)room)) && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -11537,6 +11789,14 @@ static uint32_t terrimpi_spending_left(const terrimpi_frame *f, const terrimpi_s
     return left;
 }
 
+/* The same for a certain one, when max_cost counts what its pixels cost, too. */
+static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
+                                       const terrimpi_job *job)
+{
+    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
+    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
+}
+
 /* Adds a job, or a piece of one, of which the draws are in draws. A picture that will be complete
    is judged anew: it is drawn in this frame. */
 static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
@@ -11565,9 +11825,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
     if (v->job_count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
+        (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
         (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
         !terrimpi_job_prepare(v, c, room, job))
         return 0;
+    room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
          s->texels + job->texels > d->max_capture_texels) ||
         (job->triangles > room && v->open)) {
@@ -11601,7 +11863,9 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_job_cut(v->capture_draws, terrimpi_spending_left(&v->frame, s), job);
+    terrimpi_job_cut(v->capture_draws,
+                     terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job),
+                     job);
     terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
 }
 
@@ -11614,6 +11878,8 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     uint32_t i, count, put_off = 0, due = 0;
     memset(&s, 0, sizeof s);
     s.allowance = terrimpi_max(TERRIMPI_VIEW_SPREAD * spread, drawn);
+    if (v->desc.max_cost > 0.0f)
+        s.allowance = terrimpi_clamp(v->desc.max_cost - drawn, 0.0f, s.allowance);
     s.spread = spread;
     if (v->open)
         terrimpi_view_continue(v, &s);
@@ -11629,6 +11895,7 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
         v->stats.captures += v->jobs[i].plan.layer_count;
         v->stats.splits += v->jobs[i].plan.layer_count - 1u;
     }
+    v->stats.cost = drawn + s.cost;
     v->stats.captured_texels = s.texels;
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
@@ -11715,7 +11982,8 @@ static void terrimpi_view_list(terrimp_view *v)
         impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
     if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame))
-        terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, 0);
+        for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
+            terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
 /* What a draw adds to the statistics. */
@@ -11740,7 +12008,7 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
         s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
     } else {
         s->draws++;
-        s->triangles += terrimpi_floor_indices(v->terrain) / 3u;
+        s->triangles += terrimpi_floor_indices(v->built) / 3u;
     }
 }
 
@@ -11810,15 +12078,45 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
+/* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
+   that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
+static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
+                                        float *drawn)
+{
+    float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
+    float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    uint32_t tries, i;
+    if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
+        v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
+    for (tries = 0;; tries++) {
+        TERRIMPI_TRY(terrimpi_view_cut(v, f));
+        if (!f->camera.orthographic != !v->frame.camera.orthographic)
+            terrimp_view_invalidate(v); /* no picture is of use to a camera of the other kind */
+        v->frame = *f;
+        *spread = *drawn = 0.0f;
+        for (i = 0; i < v->region_count; i++)
+            terrimpi_view_decide(v, &v->regions[i], spread, drawn);
+        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+        if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
+            tries == TERRIMPI_VIEW_TRIES)
+            return TERRIMP_OK;
+        v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera)
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, spread = 0.0f, drawn = 0.0f;
-    uint32_t i;
+    float reuse, spread, drawn, middle[2] = {0.0f, 0.0f};
+    int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
+    terrimpi_tiled_enter(view, &resolved, middle, went);
+    if (went[0] || went[1])
+        terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
+    memcpy(frame.middle, middle, sizeof middle);
     if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
                                                           view->terrain->tree.node_count - 1u)) {
         terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
@@ -11826,10 +12124,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
         return TERRIMP_E_PAGE;
     }
-    TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
-    if (!frame.camera.orthographic != !view->frame.camera.orthographic)
-        terrimp_view_invalidate(view); /* no picture is of use to a camera of the other kind */
-    view->frame = frame;
+    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
     view->cache.frame = frame.number;
     view->outdated = 0;
     terrimpi_view_cancel(view);
@@ -11839,8 +12134,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     if (!terrimpi_view_full(&view->desc))
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
-    for (i = 0; i < view->region_count; i++)
-        terrimpi_view_decide(view, &view->regions[i], &spread, &drawn);
     terrimpi_view_schedule(view, spread, drawn);
     terrimpi_view_list(view);
     terrimpi_view_count_frame(view);
@@ -11912,7 +12205,8 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
         command.clear = job->from == 0;
         command.complete = job->to == job->draw_count;
         terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
-                              &command, v->frame.camera.depth_zero_to_one, callbacks);
+                              v->frame.middle, &command, v->frame.camera.depth_zero_to_one,
+                              callbacks);
     }
     job->from = job->to;
     if (job->to < job->draw_count)
@@ -11955,6 +12249,16 @@ TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terr
     TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
     *stats = view->stats;
     return TERRIMP_OK;
+}
+
+TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms)
+{
+    float next = cost * terrimpi_clamp(target_ms / ms, 0.95f, 1.02f);
+    if (!terrimpi_finite2(ms, target_ms) || !terrimpi_finite2(cost, next) || !(ms > 0.0f) ||
+        !(target_ms > 0.0f) || !(cost > 0.0f) ||
+        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+        return cost;
+    return next;
 }
 
 #ifndef TERRIMP_NO_MALLOC
@@ -12864,14 +13168,10 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 
 TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
 {
-    float ratio = target_ms / ms, next;
-    if (!terrimpi_finite2(ms, target_ms) || !(ms > 0.0f) || !(target_ms > 0.0f) ||
-        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+    float now = (float)(triangles ? triangles : 1u), next = terrimp_view_pace(now, ms, target_ms);
+    if (!(next > now || next < now) || next >= 4294967040.0f)
         return triangles;
-    next = (float)triangles * terrimpi_clamp(ratio, 0.95f, 1.02f);
-    if (next >= 4294967040.0f)
-        return triangles;
-    return ratio > 1.0f ? triangles + (uint32_t)(next - (float)triangles) + 1u : (uint32_t)next;
+    return next > now ? triangles + (uint32_t)(next - now) + 1u : (uint32_t)next;
 }
 
 /* The three texels of a line that are mixed at one of them: before, itself, after. At an end where
@@ -13074,14 +13374,16 @@ static float terrimpi_sorted_cross(const terrimpi_sorted_block *b, int i, int j,
     return (b->z[l] - b->z[j]) * b->x[i] - (b->x[k] - b->x[i]) * b->z[j];
 }
 
-static void terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t x, uint32_t z,
-                                        uint32_t *order)
+/* The order of a block's quads; *sides: those of it that are coarse. */
+static uint32_t terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t x, uint32_t z,
+                                            uint32_t *sides)
 {
     uint32_t last = b->out.quads - 2u, coarse = b->out.pattern;
     uint32_t right = b->x[1] < 0.0f ? 1u : 0u, below = b->z[1] < 0.0f ? 1u : 0u;
     uint32_t bits = right * 3u + below * 12u;
     coarse &= (z == 0 ? 1u : 0u) | (z == last ? 2u : 0u) | (x == 0 ? 4u : 0u) |
               (x == last ? 8u : 0u);
+    *sides = coarse;
     if (coarse & 9u) /* merged with the quad at the corner of +x, -z */
         right = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? 1u : 0u;
     if (coarse & 6u)
@@ -13090,23 +13392,29 @@ static void terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t
     bits = coarse & 8u ? (bits & ~8u) | right << 3 : bits;
     bits = coarse & 2u ? (bits & ~2u) | below << 1 : bits;
     bits = coarse & 4u ? (bits & ~4u) | below << 2 : bits;
-    *order = terrimpi_sorted_quads[bits];
+    return terrimpi_sorted_quads[bits];
 }
 
 static void terrimpi_sorted_write_block(terrimpi_sorted_block *b, uint32_t x, uint32_t z)
 {
-    uint32_t order, k;
-    terrimpi_sorted_block_order(b, x, z, &order);
+    uint32_t k, sides, row = b->out.quads + 1u;
+    uint32_t order = terrimpi_sorted_block_order(b, x, z, &sides);
     for (k = 0; k < 4u; k++, order >>= 2) {
         uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz;
         int first = terrimpi_sorted_cross(b, (int)dx, (int)dz, (int)dx + 1, (int)dz + 1) < 0.0f;
         uint16_t v[4];
         if (i < b->part.x0 || i >= b->part.x1 || j < b->part.z0 || j >= b->part.z1)
             continue;
-        v[0] = terrimpi_mip_index(&b->out, i, j);
-        v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
-        v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
-        v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+        v[0] = (uint16_t)(j * row + i);
+        v[1] = (uint16_t)(v[0] + row);
+        v[2] = (uint16_t)(v[1] + 1u);
+        v[3] = (uint16_t)(v[0] + 1u);
+        if (sides) {
+            v[0] = terrimpi_mip_index(&b->out, i, j);
+            v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
+            v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
+            v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+        }
         if (first)
             terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
         terrimpi_mip_triangle(&b->out, v[0], v[2], v[3]);
