@@ -184,7 +184,7 @@ $(EXAMPLES_CPP:%=$(BUILD)/%): LINK = $(CXX) -pthread
 
 $(BUILD)/bench_%: FLAGS = $(BENCH_FLAGS)
 $(BUILD)/bench_%: LIBS = $(BENCH_LIBS) -pthread
-$(BUILD)/parallel_build: LIBS = -lpthread
+$(BUILD)/parallel_build $(BUILD)/pages $(BUILD)/stream: LIBS = -lpthread
 $(BUILD)/viewer $(BUILD)/test_viewer: LIBS = -lpthread
 $(BUILD)/viewer $(BUILD)/test_viewer: GL_LIBS = -lglfw -lGL
 

@@ -292,8 +292,8 @@ typedef struct terrimp_heightfield {
     float no_data;          /* the sample value that means no data, when has_no_data */
     int has_no_data;        /* nonzero: samples equal to no_data are voids; F32 NaN is one too */
     int wrap;               /* nonzero: the field repeats without end, its last column and row being
-                               the first ones of the next. Heights, normals, rays and Sorted know
-                               of it; a terrain is one repetition */
+                               the first ones of the next. Heights, normals, rays, Sorted and views
+                               know of it; a terrain is one repetition */
 } terrimp_heightfield;
 
 /* Every function below takes the descriptor as it was filled in, or as resolve wrote it. The
@@ -755,6 +755,18 @@ TERRIMP_API terrimp_result terrimp_place_matrix(const terrimp_capture *capture,
    xyz. */
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
                                                        const float *xyz, size_t count, float *stq);
+
+/* A normal of ground in two bytes, for pictures that are lit when they are drawn: they keep colours
+   without light, and these in a second plane of the same slots. A shader has the normal back as
+   terrimp_normal_decode does, from e = 2 code / 255 - 1: p = (e.x + e.y, e.x - e.y) / 2, and
+   (p.x, 1 - |p.x| - |p.y|, p.y) of unit length. Bytes may be filtered as they are.
+
+   normal     [3] any length > 0 [Limits: y >= 0]
+   code       out: off by 0.55 degrees at most, 2.5 of 255 grey levels of matt ground
+   Source     Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors,
+              2014: the octahedron of a hemisphere */
+TERRIMP_API terrimp_result terrimp_normal_encode(const float normal[3], uint8_t code[2]);
+TERRIMP_API void terrimp_normal_decode(const uint8_t code[2], float normal[3]);
 
 /* The largest angle, over the box's eight corners, between the directions to two eyes.
 
@@ -1387,6 +1399,8 @@ typedef struct terrimp_ground_command {
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
     float side_coarse[TERRIMP_SIDE_COUNT];
+    float offset[2];      /* [wu] x and z to be added to its vertices: 0, but in a terrain that
+                             wraps. All that commands say in world units is with that offset */
 } terrimp_ground_command;
 
 /* Render a picture, or a piece of one: bind the atlas, set viewport and scissor to the slot, clear
@@ -1479,6 +1493,17 @@ typedef struct terrimp_view_desc {
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
+    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
+                               repetitions along each axis, with the eye's in the middle. The
+                               field's quads are multiples of chunk_quads; nodes are drawn up to the
+                               level at which its chunks are no multiple of theirs. It takes 44
+                               bytes more for each node that it has by that. No hider then
+                               [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
+    float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
+                               and captures are predicted to cost. The ground is coarsened until
+                               they fit, and made finer again when that is predicted to fit, too; as
+                               many captures are made as leave no frame dearer
+                               [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
                                [Default NULL -> nothing is hidden so] */
@@ -1512,6 +1537,7 @@ typedef struct terrimp_impostor_command {
                              picture has there, 0..1, to the place relative to the frame's eye,
                              times a factor. For a host that keeps the depth of its atlases and
                              writes that place's own: see terrimp_place_matrix. Else 0 */
+    float offset[2];      /* [wu] as for ground */
 } terrimp_impostor_command;
 
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
@@ -1524,6 +1550,7 @@ typedef struct terrimp_floor_command {
     uint32_t base_vertex;
     uint32_t first_index;
     uint32_t index_count;
+    float offset[2]; /* [wu] as for ground; one floor for each repetition */
 } terrimp_floor_command;
 
 /* What a host implements. A command is valid during the call; copy it to keep it. Callbacks run on
@@ -1560,7 +1587,8 @@ typedef struct terrimp_stats {
                                     are made */
     uint32_t evictions;          /* pictures given up for others, so far */
     uint32_t late;               /* nodes and pictures that pages were missing for */
-    float ground_tolerance_px;   /* what max_ground made of it */
+    float ground_tolerance_px;   /* what max_ground and max_cost made of it */
+    float cost;                  /* of the frame, predicted: all but what is shaded either way */
     float worst_angle_rad;       /* of the impostors on the screen */
     float worst_parallax_px;     /* the same: predicted parallax error */
     float z_near, z_far;         /* [wu] clip distances along forward that cut nothing of what is
@@ -1589,8 +1617,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground and max_captures are those of before, or 0;
-              exact_depth only if the view was made with it
+              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
+              before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1635,6 +1663,14 @@ TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *
               before the first update, and after invalidate, touch and drop until the next one */
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
+
+/* The max_cost of the next frames from what the last one took, for a host that measures: at most a
+   twentieth less or a fiftieth more, the same within 3 % of the target. No clock inside, and it
+   settles where time rises with cost, and no faster than it does. A pause costs one step.
+
+   cost        that the frame was allowed; ms that it took; target_ms that it should take. What is
+               not above 0, or not finite: the cost stays */
+TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
 /* The statistics of the last update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
@@ -1876,11 +1912,12 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
    `sorted`. Nothing but the eye's place within or beside the node counts.
 
    first_index  of its command
-   eye          of the frame; for the ground of a capture, that of the capture's command [wu]
+   eye          of the frame, for the ground of a capture that of the capture's command, less the
+                offset of its command [wu]
    indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
                 pattern's triangles, but none of no area
    count        out. Never more than the command's index_count
-   Cost         O(quads); 15 cycles a triangle */
+   Cost         O(quads); about 20 cycles a triangle of a processor of 2020 */
 TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
                                                  uint32_t first_index, const float eye[3],
                                                  uint16_t *indices, size_t capacity,
@@ -1952,7 +1989,6 @@ typedef struct terrimp_layer_quad {
    atlas       [2] width and height of the atlas [texels]
    xyz         [4][3] out [wu]
    st          [4][2] out, 0..1 over the atlas; may be NULL
-   Errors      E_NULL; E_RANGE for a layer that is not there or an empty atlas
    Cost        O(log(count)) */
 TERRIMP_API terrimp_result terrimp_layer_corners(const terrimp_layers *layers,
                                                  const terrimp_capture *picture,
@@ -1971,7 +2007,6 @@ typedef struct terrimp_depth_vertex {
 
    vertices    [count]
    xyz         [count][3] out [wu]
-   Errors      E_NULL; E_RANGE for layers that are none
    Cost        O(count * log(layers)) */
 TERRIMP_API terrimp_result terrimp_depth_points(const terrimp_layers *layers,
                                                 const terrimp_capture *picture,
@@ -2417,8 +2452,8 @@ typedef struct terrimp_layers_desc {
    direction, beside where it passes the next: so texels uncover at most what is right behind them.
 
    layers     out. Its count is the answer for those that only want to know the price
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed, as for
-              scenery without end that is seen from a cell without end
+   Errors     E_RANGE also when more than 65535 layers were needed, as for scenery without end
+              that is seen from a cell without end
    Cost       O(log(count)), no list is made
    Source     Jeschke 2004, equations 3.1 to 3.7, derived anew: implementation */
 TERRIMP_API terrimp_result terrimp_layers_plan(const terrimp_layers_desc *desc,
@@ -2448,7 +2483,6 @@ typedef enum terrimp_cull_rule {
    state      [1 or 4][height][TERRIMP_MASK_WORDS(width)] in and out; 0 before the first layer
    visible    [height][TERRIMP_MASK_WORDS(width)] out: those opaque texels that can be seen; may be
               opaque itself
-   Errors     E_NULL; E_RANGE for an empty layer or a rule that is none
    Cost       O(width * height / 32): 0.05 ms for 512 x 512
    Source     Jeschke 2004, sections 3.4 and 3.4.1 */
 TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t width,
@@ -2471,13 +2505,12 @@ typedef struct terrimp_cover_desc {
 TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, uint32_t capacity);
 
 /* Covers all opaque texels with rectangles that do not overlap, so that texels + quad_cost *
-   rectangles becomes small: cuts in two, where that leaves the fewest texels, until no cut can
-   pay; takes back the cuts that did not pay; then joins rectangles where that does.
+   rectangles becomes small: cuts in two where little is left, until no cut can pay; takes back the
+   cuts that did not pay; then joins rectangles where that does.
 
    scratch    aligned to 8 bytes
    rects      [capacity] out, without gutter
    count      out: how many there are; none for an empty mask
-   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY
    Cost       about O(width * height / 32 * log(count)) */
 TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *scratch,
                                          size_t bytes, terrimp_rect *rects, uint32_t capacity,
@@ -2491,8 +2524,7 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
    gutter      [texels] [Limits: 0..64]
    rects       [count] out: the places, gutters included
    order       [2 * count] scratch
-   Errors      E_NULL; E_RANGE for an empty quad, or a side above 65536; E_CAPACITY when not all
-               fit: quads are unchanged
+   Errors      E_CAPACITY when not all fit: quads are unchanged
    Cost        that of terrimp_pack_ffdh
    Source      Jeschke 2004, section 3.6, without his powers of two */
 TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_layer_quad *quads,
@@ -2511,8 +2543,7 @@ TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_l
    depths     [3] of the vertices [wu], finite
    low, high  [wu] borders of the layer [Limits: low <= high]
    out        [5][stride] the polygon, with the triangle's winding; not vertices
-   count      out: of its vertices; 0 when nothing is between
-   Errors     E_NULL; E_RANGE; E_NOT_FINITE */
+   count      out: of its vertices; 0 when nothing is between */
 TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
                                               const float depths[3], float low, float high,
                                               float *out, uint32_t *count);
@@ -2531,7 +2562,6 @@ typedef struct terrimp_layer_record {
    border is in both layers; what lies outside of the picture or of all layers is left out.
 
    xyz        [3][3] [wu]
-   Errors     E_NULL; E_RANGE; E_NOT_FINITE for a vertex
    Cost       O(rows that are touched, in all layers) */
 TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *record,
                                                   const float xyz[9]);
@@ -2542,7 +2572,6 @@ TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *re
 
    depths     [height + 1][width + 1] of the corners of texels, row 0 the lowest [wu]; <= 0, NaN or
               infinite where there is nothing. Texels without any depth stay empty
-   Errors     E_NULL; E_RANGE
    Cost       O(width * height * log(count)) */
 TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *record,
                                                 const float *depths);
@@ -2554,7 +2583,6 @@ TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *reco
    front, back   [height][TERRIMP_MASK_WORDS(width)] layer k and layer k + 1
    wanted        [height][TERRIMP_MASK_WORDS(width)] out: texels whose colours are to be copied from
                  front to back; neither of the two
-   Errors        E_NULL; E_RANGE for an empty layer
    Cost          O(width * height / 32) */
 TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
                                                 uint32_t width, uint32_t height,
@@ -2609,7 +2637,7 @@ TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_des
 
    scratch    aligned to 8 bytes
    mesh       in: arrays; out: the rest
-   Errors     E_NULL; E_RANGE; E_ALIGN; E_MEMORY; E_CAPACITY: counts say how much is needed
+   Errors     E_CAPACITY: counts say how much is needed
    Cost       about 3 us for each visible texel; 0.14 s for 58,000 in 113 layers
    Source     Jeschke 2004, chapter 4. Ours: one vertex for each corner of texels where he has four
               for each texel; the bound from mesh to layers; sheets */
@@ -2628,8 +2656,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
               cell_size, cell_depth, cell_tan and view_tan are not looked at
    half       [wu] of the cube's side [Limits: > 0]
    layers     out
-   pictures   [6] out: +x, -x, +y, -y, +z, -z
-   Errors     those of terrimp_layers_plan */
+   pictures   [6] out: +x, -x, +y, -y, +z, -z */
 TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc,
                                                  const float centre[3], float half,
                                                  terrimp_layers *layers,
@@ -2643,7 +2670,7 @@ TERRIMP_API terrimp_result terrimp_layers_around(const terrimp_layers_desc *desc
    slope      largest tangent between a line of sight and the axis of the set that is drawn: 1 for
               eyes far away, 1 + extent / distance for closer ones [Limits: >= 1]
    counts     [3] out: layers across x, y, z. Texels pass each other by one at most
-   Errors     E_NULL; E_NOT_FINITE; E_RANGE, also when more than 65535 layers were needed */
+   Errors     E_RANGE also when more than 65535 layers were needed */
 TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float texel, float slope,
                                                  uint32_t counts[3]);
 
@@ -2699,9 +2726,7 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
               candidate is to be made if it is shown in any
    costs      [view_count] out: what views cost then
    placement  out
-   Errors     E_NULL; E_ALIGN; E_MEMORY; E_NOT_FINITE; E_RANGE for a number that points nowhere, a
-              parent that is not greater, memory that is not > 0, or a gain of two candidates.
-              Then shown, costs and placement are untouched
+   Errors     E_RANGE also for a parent that is not greater, or a gain of two candidates
    Cost       about O(gains + chosen * log(candidates)): scores only ever fall, so that only the
               best one is scored anew until it stays the best. 2 s for 300,000 candidates with 2.2
               million gains, 60 bytes of scratch memory for each of these
@@ -2709,7 +2734,6 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
 TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
                                          size_t bytes, uint8_t *shown, float *costs,
                                          terrimp_placement *placement);
-
 
 /* --- a prepared set for a terrain --- */
 
@@ -2763,8 +2787,7 @@ TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terra
    memory: for machines that cannot render into textures.
 
    scratch    aligned to 8 bytes
-   Errors     E_NULL; E_STATE for a terrain that is not built; E_NOT_FINITE; E_RANGE; E_ALIGN;
-              E_MEMORY; E_CAPACITY: the counts say how much is needed
+   Errors     E_CAPACITY: the counts say how much is needed
    Cost       O(views * nodes * cell_levels)
    Source     Jeschke 2004, sections 5.5 and 5.6; box cells */
 TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
@@ -4800,6 +4823,8 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    if (split2 >= TERRIMPI_MIP_MOST)
+        return split2; /* at no distance; or it cannot be drawn at all */
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
     measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
@@ -5321,6 +5346,30 @@ TERRIMP_API terrimp_result terrimp_place_matrix(const terrimp_capture *capture,
     terrimpi_impostor_place_matrix(capture, slot, atlas_width, atlas_height, matrix);
     terrimpi_impostor_place_from(matrix, capture->eye, eye);
     return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_normal_encode(const float normal[3], uint8_t code[2])
+{
+    float x, z, sum;
+    TERRIMPI_REFUSE(!normal || !code, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(normal), TERRIMP_E_NOT_FINITE);
+    sum = terrimpi_largest(normal); /* first, so that nothing overflows */
+    TERRIMPI_REFUSE(!(sum > 0.0f) || normal[1] < 0.0f, TERRIMP_E_RANGE);
+    x = normal[0] / sum;
+    z = normal[2] / sum;
+    sum = terrimpi_abs(x) + normal[1] / sum + terrimpi_abs(z);
+    code[0] = (uint8_t)(((x + z) / sum + 1.0f) * 127.5f + 0.5f);
+    code[1] = (uint8_t)(((x - z) / sum + 1.0f) * 127.5f + 0.5f);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API void terrimp_normal_decode(const uint8_t code[2], float normal[3])
+{
+    float a = (float)code[0] / 127.5f - 1.0f, b = (float)code[1] / 127.5f - 1.0f;
+    normal[0] = 0.5f * (a + b);
+    normal[2] = 0.5f * (a - b);
+    normal[1] = terrimpi_max(1.0f - terrimpi_abs(normal[0]) - terrimpi_abs(normal[2]), 0.0f);
+    terrimpi_normalize(normal);
 }
 
 TERRIMP_API terrimp_result terrimp_texture_coordinates(const float matrix[16], const float eye[3],
@@ -6178,6 +6227,9 @@ struct terrimp_terrain {
     terrimpi_mesh *meshes;                 /* [node_count] */
     uint32_t *points;                      /* [node_count][vertex_limit] */
     uint32_t *corners;                     /* [node_count][index_limit / 4] four indices each */
+    uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
+                                              which a node is a repetition. NULL: itself */
+    uint32_t tiles;                        /* then: repetitions along each axis */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6339,18 +6391,24 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
     return &((const terrimpi_record *)(const void *)terrimpi_page_record(&t->tree, node))->mesh;
 }
 
+/* The node of the built terrain that a node is, or repeats. */
+static uint32_t terrimpi_real_node(const terrimp_terrain *t, uint32_t node)
+{
+    return t->real ? t->real[node] : node;
+}
+
 /* The stored vertices of a node's mesh, and behind them the words with its indices. */
 static const uint32_t *terrimpi_points_of(const terrimp_terrain *t, uint32_t node)
 {
     if (t->points)
-        return t->points + (size_t)node * t->vertex_limit;
+        return t->points + (size_t)terrimpi_real_node(t, node) * t->vertex_limit;
     return (const uint32_t *)(const void *)(terrimpi_page_of(t->tree.pages, node) +
                                             TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD);
 }
 
 static const uint32_t *terrimpi_corners_of(const terrimp_terrain *t, uint32_t node)
 {
-    return t->corners ? t->corners + (size_t)node * (t->index_limit / 4u)
+    return t->corners ? t->corners + (size_t)terrimpi_real_node(t, node) * (t->index_limit / 4u)
                       : terrimpi_points_of(t, node) + t->vertex_limit;
 }
 
@@ -6382,6 +6440,17 @@ static float terrimpi_mesh_step(const terrimpi_mesh *mesh)
 static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t steps)
 {
     return t->range_low + t->range_step * (float)steps;
+}
+
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+{
+    terrimp_node n = *node;
+    n.number = terrimpi_real_node(t, n.number);
+    if (t->real) {
+        n.x %= t->tree.level_x[n.level] / t->tiles;
+        n.z %= t->tree.level_z[n.level] / t->tiles;
+    }
+    return n;
 }
 
 /* Vertex i of a node's mesh. */
@@ -6466,7 +6535,7 @@ static uint32_t terrimpi_mesh_places(const terrimp_terrain *t)
 
 static uint32_t terrimpi_mesh_at(const terrimp_terrain *t, uint32_t node)
 {
-    return t->tree.pages ? t->tree.pages->slot_of[node] - 1u : node;
+    return t->tree.pages ? t->tree.pages->slot_of[node] - 1u : terrimpi_real_node(t, node);
 }
 
 /* Where a node's mesh stands in the host's buffers, and how good it is. */
@@ -8900,7 +8969,7 @@ static uint32_t terrimpi_capture_side(const terrimpi_capture_row *row, uint32_t 
 static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                       terrimpi_capture_draw draws[TERRIMPI_CAPTURE_DRAWS])
 {
-    const terrimp_heightfield *field = &t->desc.field;
+    const terrimp_heightfield *field = &t->tree.field;
     const float *eye = plan->camera.eye;
     uint32_t quads = t->desc.chunk_quads, shift = plan->node.level - plan->source;
     uint32_t i, j, k, count = 0;
@@ -8945,28 +9014,48 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. */
+/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
+   the one in the middle is. */
+static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
+                                 const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    if (!t->real)
+        return;
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+}
+
+/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. `middle` is
+   added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                   const terrimpi_capture_draw *draws, uint32_t from, uint32_t to,
-                                  uint32_t layer, terrimp_capture_command *command,
-                                  int depth_zero_to_one, const terrimp_callbacks *callbacks)
+                                  uint32_t layer, const float middle[2],
+                                  terrimp_capture_command *command, int depth_zero_to_one,
+                                  const terrimp_callbacks *callbacks)
 {
     const terrimp_heightfield *field = &t->desc.field;
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
+    terrimp_node place = terrimpi_real_place(t, &plan->node);
     camera.z_far = terrimpi_capture_end(plan, layer);
-    command->node = plan->node.number;
-    command->level = plan->node.level;
-    command->x = plan->node.x;
-    command->z = plan->node.z;
+    camera.eye[0] += middle[0];
+    camera.eye[2] += middle[1];
+    command->node = place.number;
+    command->level = place.level;
+    command->x = place.x;
+    command->z = place.z;
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
-    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x;
-    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z;
-    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x;
-    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z;
+    command->clip_min[0] = plan->box.min[0] - border * field->spacing_x + middle[0];
+    command->clip_min[1] = plan->box.min[2] - border * field->spacing_z + middle[1];
+    command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
+    command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
@@ -8974,6 +9063,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
+        terrimpi_tile_offset(t, &node, middle, ground.offset);
+        node = terrimpi_real_place(t, &node);
         ground.node = node.number;
         ground.x = node.x;
         ground.z = node.z;
@@ -9012,7 +9103,11 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
-#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; when costs fall with the square
+                                         of that, for max_cost */
+#define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
+#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
+#define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
 #define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
@@ -9093,6 +9188,7 @@ typedef struct terrimpi_frame {
     int still;                     /* the camera is that of the frame before */
     terrimp_frustum frustum;
     float pixel_factor;
+    float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
@@ -9160,6 +9256,7 @@ static terrimp_result terrimpi_view_settings(const terrimp_terrain *t, terrimp_v
                           &result);
     terrimpi_view_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
     terrimpi_view_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
+    terrimpi_view_setting(&d->max_cost, 0.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.triangle, 1.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.ground_px, 0.25f, 0.0f, most, &result);
@@ -9187,13 +9284,26 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.atlas_count, 1);
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
+    TERRIMPI_DEFAULT(d.wrap_tiles, 3);
     chunks = terrain->tree.level_first[1];
+    if (terrain->desc.field.wrap && !terrain->real)
+        chunks *= d.wrap_tiles * d.wrap_tiles;
     TERRIMPI_DEFAULT(d.max_ground,
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
+                    TERRIMP_E_RANGE);
+    if (terrain->desc.field.wrap) {
+        const terrimp_heightfield *f = &terrain->desc.field;
+        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
+                        (f->width - 1u) % terrain->desc.chunk_quads ||
+                        (f->depth - 1u) % terrain->desc.chunk_quads ||
+                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
+                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
+    }
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -9453,7 +9563,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
+        (f->terrain->real && /* and it is no repetition of a whole node */
+         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0))
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
@@ -9807,7 +9919,8 @@ typedef struct terrimpi_job {
 } terrimpi_job;
 
 struct terrimp_view {
-    const terrimp_terrain *terrain;
+    const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
+                                               wraps */
     uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
@@ -9826,15 +9939,62 @@ struct terrimp_view {
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
-    float ground_scale;            /* of its tolerance: 1, or more when max_ground is short */
+    float ground_scale;            /* of its tolerance: 1, or more when max_ground or max_cost are
+                                      short */
+    float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
     terrimp_stats stats;
+    terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                 terrimp_terrain *t)
+{
+    terrimp_heightfield field = terrain->desc.field;
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
+    if (!field.wrap)
+        return;
+    v->terrain = v->tiled = t;
+    *t = *terrain;
+    t->tiles = v->desc.wrap_tiles;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
 
 /* ---- memory ---- */
 
@@ -9905,16 +10065,31 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
     v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
     v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->draws = (terrimpi_view_draw *)terrimpi_take(&l, ground + impostors + 1u, sizeof *v->draws);
+    v->draws = (terrimpi_view_draw *)terrimpi_take(
+        &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
+        sizeof *v->draws);
+    if (v->tiled) {
+        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
+        terrimp_terrain made = *v->tiled;
+        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
+        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
+        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
+        if (t) {
+            *t = made;
+            terrimpi_tiled_fill(t, v->built);
+            v->terrain = v->tiled = t;
+        }
+    }
     return l.ok && slots ? l.bytes : 0;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
 {
     terrimp_view v;
+    terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    v.terrain = terrain;
+    terrimpi_tiled_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -9931,11 +10106,12 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
                                              size_t bytes, terrimp_view **view)
 {
     terrimp_view v, *made = (terrimp_view *)memory;
+    terrimp_terrain tiled;
     size_t needed;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    v.terrain = terrain;
+    terrimpi_tiled_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -9944,8 +10120,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
-    v.frame.terrain = terrain;
     v.frame.desc = &made->desc;
+    v.frame.terrain = v.terrain;
     *made = v;
     *view = made;
     return terrimp_view_invalidate(made);
@@ -9963,10 +10139,11 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_impostors, has->max_impostors);
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
+    TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
-                    d.max_captures != has->max_captures ||
+                    d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
                     (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
@@ -10000,6 +10177,80 @@ static void terrimpi_view_cancel(terrimp_view *v)
     if (v->open) {
         v->jobs[0] = v->jobs[v->open - 1u];
         v->open = 1;
+    }
+}
+
+/* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
+   node that a node was, or node_count when it was none. */
+static uint32_t terrimpi_tiled_before(const terrimp_terrain *t, const terrimp_node *n, int32_t x,
+                                      int32_t z)
+{
+    const terrimp_quadtree *tree = &t->tree;
+    uint32_t was_x = n->x + (uint32_t)(x * (int32_t)(tree->level_x[n->level] / t->tiles));
+    uint32_t was_z = n->z + (uint32_t)(z * (int32_t)(tree->level_z[n->level] / t->tiles));
+    if (terrimpi_mesh_triangles(&t->meshes[n->number]) == 0 ||
+        !terrimpi_tree_has(tree, n->level, was_x, was_z))
+        return tree->node_count;
+    return terrimpi_tree_at(tree, n->level, was_x, was_z).number;
+}
+
+static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
+{
+    const terrimp_terrain *t = v->terrain;
+    uint32_t count = t->tree.node_count, k;
+    int up = z > 0 || (z == 0 && x > 0);
+    terrimpi_cache_picture *p;
+    float way[2];
+    way[0] = (float)x * terrimpi_field_period(&t->desc.field, 0);
+    way[1] = (float)z * terrimpi_field_period(&t->desc.field, 1);
+    v->frame.camera.eye[0] -= way[0];
+    v->frame.camera.eye[2] -= way[1];
+    v->outdated = 1; /* its draws are of nodes that are elsewhere now */
+    terrimpi_view_cancel(v);
+    if (v->open)
+        terrimpi_job_cancel(&v->cache, &v->jobs[0]);
+    v->open = 0;
+    for (k = 0; k < count; k++) { /* from which they come is later in this direction */
+        terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
+        uint32_t was = terrimpi_tiled_before(t, &n, x, z);
+        int is = was < count;
+        v->kind_of[n.number] = is ? v->kind_of[was] : (unsigned char)TERRIMPI_VIEW_KIND_GROUND;
+        v->ground.marks[n.number].measure = is ? v->ground.marks[was].measure : 0.0f;
+        v->ground.marks[n.number].frame = is ? v->ground.marks[was].frame : 0;
+    }
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+        if (p->seen)
+            v->cache.of_node[p->node.number] = TERRIMPI_CACHE_NO_PICTURE;
+    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
+        terrimp_node n = p->node;
+        uint32_t now = p->seen ? terrimpi_tiled_before(t, &n, -x, -z) : count;
+        if (!p->seen)
+            continue;
+        if (now == count) {
+            uint16_t *at = &v->cache.of_node[n.number], other = *at;
+            terrimpi_cache_drop(&v->cache, p);
+            *at = other;
+            continue;
+        }
+        p->node = terrimpi_tree_node(&t->tree, now);
+        p->eye[0] -= way[0];
+        p->eye[2] -= way[1];
+        v->cache.of_node[now] = (uint16_t)(p - v->cache.pictures);
+    }
+}
+
+/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
+   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
+static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
+                                 int32_t went[2])
+{
+    const terrimp_heightfield *field = &v->terrain->desc.field;
+    int k;
+    for (k = 0; k < 2 && v->terrain->real; k++) {
+        float period = terrimpi_field_period(field, k), step;
+        middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
+        step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
+        went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
 }
 
@@ -10038,9 +10289,11 @@ static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int los
 {
     terrimpi_cache_picture *p;
     TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->cache.node_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count,
+                    TERRIMP_E_RANGE);
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
-        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE && p->node.number != node))
+        if (p->seen == 0 || (node != TERRIMP_EVERY_NODE &&
+                             terrimpi_real_node(v->terrain, p->node.number) != node))
             continue;
         *(lost ? &p->lost : &p->expired) = 1;
         if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
@@ -10054,17 +10307,24 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
 {
     const terrimp_quadtree *tree;
     terrimpi_cache_picture *p;
+    uint32_t tiles, k;
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
-    tree = &view->terrain->tree;
+    tree = &view->built->tree;
+    tiles = view->terrain->real ? view->desc.wrap_tiles : 1u;
     TERRIMPI_REFUSE(x >= tree->field.width || z >= tree->field.depth || cols == 0 ||
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
+    if (view->terrain->real)
+        terrimpi_tiled_fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
-        if (terrimpi_cache_shows(p, tree->chunk_quads, x, z, cols, rows))
-            terrimpi_view_forget(view, p);
+        for (k = 0; k < tiles * tiles; k++)
+            if (terrimpi_cache_shows(p, tree->chunk_quads,
+                                     x + k % tiles * (tree->field.width - 1u),
+                                     z + k / tiles * (tree->field.depth - 1u), cols, rows))
+                terrimpi_view_forget(view, p);
     return TERRIMP_OK;
 }
 
@@ -10378,7 +10638,6 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_view_make_regions(v, NULL);
         return TERRIMP_OK;
     }
-    v->ground_scale = terrimpi_max(1.0f, v->ground_scale * TERRIMPI_VIEW_FINER);
     for (;;) {
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
@@ -10614,14 +10873,16 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
+    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    command.node = ground->node.number;
-    command.level = ground->node.level;
-    command.x = ground->node.x;
-    command.z = ground->node.z;
+    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    command.node = place.number;
+    command.level = place.level;
+    command.x = place.x;
+    command.z = place.z;
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -10634,21 +10895,25 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
+    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    command.node = picture->node.number;
-    command.level = picture->node.level;
-    command.x = picture->node.x;
-    command.z = picture->node.z;
+    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    command.node = place.number;
+    command.level = place.level;
+    command.x = place.x;
+    command.z = place.z;
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
     command.index_count = mesh.index_count;
     command.alpha = draw->alpha;
     memcpy(command.eye, picture->eye, sizeof command.eye);
+    command.eye[0] += v->frame.middle[0];
+    command.eye[2] += v->frame.middle[1];
     picture->drawn_count++;
     for (k = 0; k < picture->layer_count; k++) {
         layer = v->desc.sorted ? picture->layer_count - 1u - k : k;
@@ -10669,13 +10934,19 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
                                      const terrimp_callbacks *callbacks)
 {
     terrimp_floor_command command;
-    (void)draw;
     if (!callbacks->draw_floor)
         return;
     memset(&command, 0, sizeof command);
-    command.base_vertex = terrimpi_mesh_places(v->terrain) * v->terrain->vertex_stride;
-    command.first_index = terrimpi_mesh_places(v->terrain) * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_indices(v->terrain);
+    command.base_vertex = terrimpi_mesh_places(v->built) * v->terrain->vertex_stride;
+    command.first_index = terrimpi_mesh_places(v->built) * v->terrain->index_stride;
+    command.index_count = terrimpi_floor_indices(v->built);
+    if (v->terrain->real) { /* its first chunk says of which repetition */
+        uint32_t tiles = v->terrain->tiles;
+        terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
+                                              v->built->tree.level_x[0], draw->index / tiles *
+                                              v->built->tree.level_z[0]);
+        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+    }
     callbacks->draw_floor(callbacks->user, &command);
 }
 
@@ -10825,7 +11096,10 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     if (!job->picture)
         return 0;
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
-    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
+    job->in_pieces = f->desc->max_capture_triangles ||
+                     ((job->triangles > room ||
+                       (f->desc->max_cost > 0.0f &&
+                        c->capture_cost > costs->triangle * (float)room)) && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -10944,6 +11218,14 @@ static uint32_t terrimpi_spending_left(const terrimpi_frame *f, const terrimpi_s
     return left;
 }
 
+/* The same for a certain one, when max_cost counts what its pixels cost, too. */
+static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
+                                       const terrimpi_job *job)
+{
+    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
+    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
+}
+
 /* Adds a job, or a piece of one, of which the draws are in draws. A picture that will be complete
    is judged anew: it is drawn in this frame. */
 static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
@@ -10973,9 +11255,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
     if (v->job_count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
+        (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
         (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
         !terrimpi_job_prepare(v, c, room, job))
         return 0;
+    room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
          s->texels + job->texels > d->max_capture_texels) ||
         (job->triangles > room && v->open)) {
@@ -11009,7 +11293,9 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_job_cut(v->capture_draws, terrimpi_spending_left(&v->frame, s), job);
+    terrimpi_job_cut(v->capture_draws,
+                     terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job),
+                     job);
     terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
 }
 
@@ -11022,6 +11308,8 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     uint32_t i, count, put_off = 0, due = 0;
     memset(&s, 0, sizeof s);
     s.allowance = terrimpi_max(TERRIMPI_VIEW_SPREAD * spread, drawn);
+    if (v->desc.max_cost > 0.0f)
+        s.allowance = terrimpi_clamp(v->desc.max_cost - drawn, 0.0f, s.allowance);
     s.spread = spread;
     if (v->open)
         terrimpi_view_continue(v, &s);
@@ -11037,6 +11325,7 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
         v->stats.captures += v->jobs[i].plan.layer_count;
         v->stats.splits += v->jobs[i].plan.layer_count - 1u;
     }
+    v->stats.cost = drawn + s.cost;
     v->stats.captured_texels = s.texels;
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
@@ -11073,7 +11362,8 @@ static void terrimpi_view_list(terrimp_view *v)
     for (i = 0; i < v->draw_count; i++)
         impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
     if (impostors > 0 && terrimpi_view_over(&v->frame))
-        terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, 0);
+        for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
+            terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
 /* What a draw adds to the statistics. */
@@ -11098,7 +11388,7 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
         s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
     } else {
         s->draws++;
-        s->triangles += terrimpi_floor_indices(v->terrain) / 3u;
+        s->triangles += terrimpi_floor_indices(v->built) / 3u;
     }
 }
 
@@ -11155,15 +11445,43 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
+/* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
+   that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
+static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
+                                        float *drawn)
+{
+    float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
+    float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    uint32_t tries, i;
+    if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
+        v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
+    for (tries = 0;; tries++) {
+        TERRIMPI_TRY(terrimpi_view_cut(v, f));
+        v->frame = *f;
+        *spread = *drawn = 0.0f;
+        for (i = 0; i < v->region_count; i++)
+            terrimpi_view_decide(v, &v->regions[i], spread, drawn);
+        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+        if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
+            tries == TERRIMPI_VIEW_TRIES)
+            return TERRIMP_OK;
+        v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
+    }
+}
+
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera)
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, spread = 0.0f, drawn = 0.0f;
-    uint32_t i;
+    float reuse, spread, drawn, middle[2] = {0.0f, 0.0f};
+    int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
+    terrimpi_tiled_enter(view, &resolved, middle, went);
+    if (went[0] || went[1])
+        terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
+    memcpy(frame.middle, middle, sizeof middle);
     if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
                                                           view->terrain->tree.node_count - 1u)) {
         terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
@@ -11171,8 +11489,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
         return TERRIMP_E_PAGE;
     }
-    TERRIMPI_TRY(terrimpi_view_cut(view, &frame));
-    view->frame = frame;
+    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
     view->cache.frame = frame.number;
     view->outdated = 0;
     terrimpi_view_cancel(view);
@@ -11182,8 +11499,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     if (!terrimpi_view_full(&view->desc))
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
-    for (i = 0; i < view->region_count; i++)
-        terrimpi_view_decide(view, &view->regions[i], &spread, &drawn);
     terrimpi_view_schedule(view, spread, drawn);
     terrimpi_view_list(view);
     terrimpi_view_count_frame(view);
@@ -11255,7 +11570,8 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
         command.clear = job->from == 0;
         command.complete = job->to == job->draw_count;
         terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
-                              &command, v->frame.camera.depth_zero_to_one, callbacks);
+                              v->frame.middle, &command, v->frame.camera.depth_zero_to_one,
+                              callbacks);
     }
     job->from = job->to;
     if (job->to < job->draw_count)
@@ -11298,6 +11614,16 @@ TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terr
     TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
     *stats = view->stats;
     return TERRIMP_OK;
+}
+
+TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms)
+{
+    float next = cost * terrimpi_clamp(target_ms / ms, 0.95f, 1.02f);
+    if (!terrimpi_finite2(ms, target_ms) || !terrimpi_finite2(cost, next) || !(ms > 0.0f) ||
+        !(target_ms > 0.0f) || !(cost > 0.0f) ||
+        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+        return cost;
+    return next;
 }
 
 #ifndef TERRIMP_NO_MALLOC
@@ -12207,14 +12533,10 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 
 TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
 {
-    float ratio = target_ms / ms, next;
-    if (!terrimpi_finite2(ms, target_ms) || !(ms > 0.0f) || !(target_ms > 0.0f) ||
-        terrimpi_within(ms, 0.97f * target_ms, 1.03f * target_ms))
+    float now = (float)(triangles ? triangles : 1u), next = terrimp_view_pace(now, ms, target_ms);
+    if (!(next > now || next < now) || next >= 4294967040.0f)
         return triangles;
-    next = (float)triangles * terrimpi_clamp(ratio, 0.95f, 1.02f);
-    if (next >= 4294967040.0f)
-        return triangles;
-    return ratio > 1.0f ? triangles + (uint32_t)(next - (float)triangles) + 1u : (uint32_t)next;
+    return next > now ? triangles + (uint32_t)(next - now) + 1u : (uint32_t)next;
 }
 
 /* The three texels of a line that are mixed at one of them: before, itself, after. At an end where
@@ -12416,14 +12738,16 @@ static float terrimpi_sorted_cross(const terrimpi_sorted_block *b, int i, int j,
     return (b->z[l] - b->z[j]) * b->x[i] - (b->x[k] - b->x[i]) * b->z[j];
 }
 
-static void terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t x, uint32_t z,
-                                        uint32_t *order)
+/* The order of a block's quads; *sides: those of it that are coarse. */
+static uint32_t terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t x, uint32_t z,
+                                            uint32_t *sides)
 {
     uint32_t last = b->out.quads - 2u, coarse = b->out.pattern;
     uint32_t right = b->x[1] < 0.0f ? 1u : 0u, below = b->z[1] < 0.0f ? 1u : 0u;
     uint32_t bits = right * 3u + below * 12u;
     coarse &= (z == 0 ? 1u : 0u) | (z == last ? 2u : 0u) | (x == 0 ? 4u : 0u) |
               (x == last ? 8u : 0u);
+    *sides = coarse;
     if (coarse & 9u) /* merged with the quad at the corner of +x, -z */
         right = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? 1u : 0u;
     if (coarse & 6u)
@@ -12432,23 +12756,29 @@ static void terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint32_t
     bits = coarse & 8u ? (bits & ~8u) | right << 3 : bits;
     bits = coarse & 2u ? (bits & ~2u) | below << 1 : bits;
     bits = coarse & 4u ? (bits & ~4u) | below << 2 : bits;
-    *order = terrimpi_sorted_quads[bits];
+    return terrimpi_sorted_quads[bits];
 }
 
 static void terrimpi_sorted_write_block(terrimpi_sorted_block *b, uint32_t x, uint32_t z)
 {
-    uint32_t order, k;
-    terrimpi_sorted_block_order(b, x, z, &order);
+    uint32_t k, sides, row = b->out.quads + 1u;
+    uint32_t order = terrimpi_sorted_block_order(b, x, z, &sides);
     for (k = 0; k < 4u; k++, order >>= 2) {
         uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz;
         int first = terrimpi_sorted_cross(b, (int)dx, (int)dz, (int)dx + 1, (int)dz + 1) < 0.0f;
         uint16_t v[4];
         if (i < b->part.x0 || i >= b->part.x1 || j < b->part.z0 || j >= b->part.z1)
             continue;
-        v[0] = terrimpi_mip_index(&b->out, i, j);
-        v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
-        v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
-        v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+        v[0] = (uint16_t)(j * row + i);
+        v[1] = (uint16_t)(v[0] + row);
+        v[2] = (uint16_t)(v[1] + 1u);
+        v[3] = (uint16_t)(v[0] + 1u);
+        if (sides) {
+            v[0] = terrimpi_mip_index(&b->out, i, j);
+            v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
+            v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
+            v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+        }
         if (first)
             terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
         terrimpi_mip_triangle(&b->out, v[0], v[2], v[3]);
@@ -14261,8 +14591,10 @@ TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper,
    error of 10.3, 7.2 and 5.5 % of the terrain's range; pictures in flight are best at 0.5. */
 #define TERRIMPI_RAISE_LEAST_HOLD 0.5f
 
-/* Passes of lowering. Each takes away about a third of what is too high. */
-#define TERRIMPI_RAISE_LOWER_PASSES 12
+/* Passes of lowering. Each takes away about a third of what is too high. 12 passes would make the
+   error of meshes 0.6 % less in rms and the same in the largest, and no picture better by more than
+   0.05 dB, for a fifth of the time of building. */
+#define TERRIMPI_RAISE_LOWER_PASSES 4
 
 /* Raise of a sample's free vertices, of weight `hold` together, that lifts the surface by `rest`,
    what is left of the sample's first shortfall. */
@@ -17104,31 +17436,20 @@ TERRIMP_API terrimp_result terrimp_layer_cull(const uint32_t *opaque, uint32_t w
 
 /* --- rectangles that hold all opaque texels --- */
 
-#define TERRIMPI_COVER_LINES 8u   /* a rectangle is cut along so many lines of a grid at once */
-#define TERRIMPI_COVER_SPANS 36u  /* from one of them to another */
-
-/* A rectangle that might be taken whole or in parts. */
+/* A rectangle that might be taken whole or in two parts. */
 typedef struct terrimpi_cover_node {
     terrimp_rect rect;
-    uint32_t cost, parts, part_count; /* where its parts stand; 0: none */
+    uint32_t cost, parts; /* where its parts stand, behind it; 0: none */
+    int kept;
 } terrimpi_cover_node;
-
-/* What lies in a span of columns and a span of rows of the grid, and the cheapest way to cover it
-   with cuts along the grid. Corners of the opaque texels, ends excluded; x1 is 0 for none. */
-typedef struct terrimpi_cover_span {
-    uint16_t x0, y0, x1, y1;
-    uint32_t cost;
-    uint8_t cut_x, cut_y; /* the line of the first cut, or 0: whole */
-} terrimpi_cover_span;
 
 typedef struct terrimpi_cover {
     terrimp_cover_desc desc;
     terrimpi_cover_node *nodes;
     uint32_t node_count, node_limit;
     uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
-    uint32_t *beyond;     /* cost of what lies at or beyond a cut there */
+    float *beyond;        /* squared area of what lies at or beyond a cut there */
     uint32_t *seen;       /* a row of bits */
-    terrimpi_cover_span (*spans)[TERRIMPI_COVER_SPANS]; /* [rows][columns], see cover_span */
 } terrimpi_cover;
 
 static uint32_t terrimpi_mask_bit_count(uint32_t bits)
@@ -17214,10 +17535,11 @@ static uint32_t terrimpi_cover_cost(const terrimpi_cover *c, uint32_t width, uin
     return (width + 2u * c->desc.gutter) * (height + 2u * c->desc.gutter) + c->desc.quad_cost;
 }
 
-/* Adds column or row i; returns what the rectangle of all so far costs. */
-static uint32_t terrimpi_cover_extent_add(const terrimpi_cover *c, terrimpi_cover_extent *e,
-                                          uint32_t i)
+/* Adds column or row i; returns the squared area of the rectangle of all so far. */
+static float terrimpi_cover_extent_add(const terrimpi_cover *c, terrimpi_cover_extent *e,
+                                       uint32_t i)
 {
+    float area;
     if (c->low[i] <= c->high[i]) {
         if (e->first > e->last) {
             e->first = e->last = i;
@@ -17229,24 +17551,27 @@ static uint32_t terrimpi_cover_extent_add(const terrimpi_cover *c, terrimpi_cove
         e->low = terrimpi_min_u32(e->low, c->low[i]);
         e->high = terrimpi_max_u32(e->high, c->high[i]);
     }
-    return e->first > e->last
-               ? 0u
-               : terrimpi_cover_cost(c, e->last - e->first + 1u, e->high - e->low + 1u);
+    if (e->first > e->last)
+        return 0.0f;
+    area = (float)(e->last - e->first + 1u) * (float)(e->high - e->low + 1u);
+    return area * area;
 }
 
-/* The cut between `count` columns or rows with the cheapest two parts; returns their cost. */
-static uint32_t terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
+/* The cut between `count` columns or rows whose two parts have the least sum of squared areas, and
+   that sum: so that it does not merely take a sliver off. */
+static float terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
 {
     terrimpi_cover_extent e = {1, 0, 0, 0};
-    uint32_t i, best = 0xffffffffu;
+    float best = TERRIMPI_FLOAT_MAX;
+    uint32_t i;
     for (i = count; i-- > 0;)
         c->beyond[i] = terrimpi_cover_extent_add(c, &e, i);
     e.first = 1;
     e.last = 0;
     for (i = 1; i < count; i++) {
-        uint32_t cost = terrimpi_cover_extent_add(c, &e, i - 1u) + c->beyond[i];
-        if (cost < best) {
-            best = cost;
+        float sum = terrimpi_cover_extent_add(c, &e, i - 1u) + c->beyond[i];
+        if (sum < best) {
+            best = sum;
             *at = i;
         }
     }
@@ -17266,149 +17591,12 @@ static uint32_t terrimpi_cover_tighten(terrimpi_cover *c, terrimp_rect *r)
     return opaque;
 }
 
-/* The number of the span from line a to line b > a: after those that it is made of. */
-static uint32_t terrimpi_cover_span_of(uint32_t a, uint32_t b)
-{
-    return b * (b - 1u) / 2u + b - 1u - a;
-}
-
-static void terrimpi_cover_unite(const terrimpi_cover_span *a, const terrimpi_cover_span *b,
-                                 terrimpi_cover_span *out)
-{
-    terrimpi_cover_span u = *a;
-    if (!a->x1)
-        u = *b;
-    else if (b->x1) {
-        u.x0 = a->x0 < b->x0 ? a->x0 : b->x0;
-        u.y0 = a->y0 < b->y0 ? a->y0 : b->y0;
-        u.x1 = a->x1 > b->x1 ? a->x1 : b->x1;
-        u.y1 = a->y1 > b->y1 ? a->y1 : b->y1;
-    }
-    *out = u;
-}
-
-/* The spans of single cells of a rectangle's grid: of the texels of each. */
-static void terrimpi_cover_cells(terrimpi_cover *c, const terrimp_rect *r)
-{
-    const uint32_t n = TERRIMPI_COVER_LINES;
-    uint32_t i, k;
-    for (k = 0; k < n; k++)
-        for (i = 0; i < n; i++) {
-            terrimpi_cover_span *s = &c->spans[terrimpi_cover_span_of(k, k + 1u)]
-                                              [terrimpi_cover_span_of(i, i + 1u)];
-            uint32_t x = r->x + i * r->width / n, y = r->y + k * r->height / n;
-            terrimp_rect cell = terrimpi_rect(x, y, r->x + (i + 1u) * r->width / n - x,
-                                              r->y + (k + 1u) * r->height / n - y);
-            memset(s, 0, sizeof *s);
-            if (!cell.width || !cell.height || !terrimpi_cover_tighten(c, &cell))
-                continue;
-            s->x0 = (uint16_t)cell.x;
-            s->y0 = (uint16_t)cell.y;
-            s->x1 = (uint16_t)(cell.x + cell.width);
-            s->y1 = (uint16_t)(cell.y + cell.height);
-        }
-}
-
-/* Lowers the cost of a span to that of its best cut. */
-static void terrimpi_cover_best(terrimpi_cover *c, uint32_t a, uint32_t b, uint32_t p, uint32_t q)
-{
-    uint32_t columns = terrimpi_cover_span_of(a, b), rows = terrimpi_cover_span_of(p, q), m;
-    terrimpi_cover_span *s = &c->spans[rows][columns];
-    s->cut_x = s->cut_y = 0;
-    s->cost = s->x1 ? terrimpi_cover_cost(c, (uint32_t)s->x1 - s->x0, (uint32_t)s->y1 - s->y0) : 0u;
-    for (m = a + 1u; m < b; m++) {
-        uint32_t cost = c->spans[rows][terrimpi_cover_span_of(a, m)].cost +
-                        c->spans[rows][terrimpi_cover_span_of(m, b)].cost;
-        if (cost < s->cost) {
-            s->cost = cost;
-            s->cut_x = (uint8_t)m;
-        }
-    }
-    for (m = p + 1u; m < q; m++) {
-        uint32_t cost = c->spans[terrimpi_cover_span_of(p, m)][columns].cost +
-                        c->spans[terrimpi_cover_span_of(m, q)][columns].cost;
-        if (cost < s->cost) {
-            s->cost = cost;
-            s->cut_x = 0;
-            s->cut_y = (uint8_t)m;
-        }
-    }
-}
-
-/* The cheapest ways to cover all spans of a rectangle's grid, the smaller ones first. */
-static void terrimpi_cover_solve(terrimpi_cover *c, const terrimp_rect *r)
-{
-    uint32_t a, b, p, q;
-    terrimpi_cover_cells(c, r);
-    for (q = 1; q <= TERRIMPI_COVER_LINES; q++)
-        for (p = q; p-- > 0;)
-            for (b = 1; b <= TERRIMPI_COVER_LINES; b++)
-                for (a = b; a-- > 0;) {
-                    uint32_t columns = terrimpi_cover_span_of(a, b);
-                    uint32_t rows = terrimpi_cover_span_of(p, q);
-                    terrimpi_cover_span *s = &c->spans[rows][columns];
-                    if (b - a > 1u)
-                        terrimpi_cover_unite(&c->spans[rows][terrimpi_cover_span_of(a, b - 1u)],
-                                             &c->spans[rows][terrimpi_cover_span_of(b - 1u, b)], s);
-                    else if (q - p > 1u)
-                        terrimpi_cover_unite(&c->spans[terrimpi_cover_span_of(p, q - 1u)][columns],
-                                             &c->spans[terrimpi_cover_span_of(q - 1u, q)][columns],
-                                             s);
-                    terrimpi_cover_best(c, a, b, p, q);
-                }
-}
-
-static int terrimpi_cover_add(terrimpi_cover *c, uint32_t node, const terrimp_rect *r)
-{
-    if (c->node_count == c->node_limit)
-        return 0;
-    c->nodes[node].part_count++;
-    c->nodes[c->node_count++].rect = *r;
-    return 1;
-}
-
-/* Makes parts of a node from the best cuts along its grid; returns 0 when there are none. */
-static int terrimpi_cover_by_grid(terrimpi_cover *c, uint32_t node)
-{
-    uint8_t stack[TERRIMPI_COVER_LINES * TERRIMPI_COVER_LINES][4];
-    uint32_t top = 1, k;
-    terrimpi_cover_solve(c, &c->nodes[node].rect);
-    memset(stack[0], 0, sizeof stack[0]);
-    stack[0][1] = stack[0][3] = TERRIMPI_COVER_LINES;
-    while (top) {
-        uint8_t *at = stack[--top];
-        const terrimpi_cover_span *s =
-            &c->spans[terrimpi_cover_span_of(at[2], at[3])][terrimpi_cover_span_of(at[0], at[1])];
-        uint8_t cut = s->cut_x ? s->cut_x : s->cut_y;
-        terrimp_rect r = terrimpi_rect(s->x0, s->y0, (uint32_t)s->x1 - s->x0,
-                                       (uint32_t)s->y1 - s->y0);
-        if (!cut && top == 0 && c->nodes[node].part_count == 0)
-            return 0;
-        if (!cut && s->x1 && !terrimpi_cover_add(c, node, &r)) {
-            c->node_count -= c->nodes[node].part_count;
-            c->nodes[node].part_count = 0;
-            return 0;
-        }
-        if (!cut)
-            continue;
-        k = s->cut_x ? 0 : 2;
-        memcpy(stack[top + 1u], at, sizeof stack[0]);
-        at[k] = cut; /* the part before the cut is the next one */
-        stack[top + 1u][k + 1u] = cut;
-        top += 2u;
-    }
-    return 1;
-}
-
-/* Makes two parts of a node, with the best cut between any two of its columns or rows. */
+/* Cuts a node in two, at the best place between any two of its columns or rows. */
 static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
 {
     terrimp_rect r = c->nodes[node].rect, part[2];
-    uint32_t x = 0, y = 0, by_y, k;
-    if (c->node_count + 2u > c->node_limit)
-        return;
-    terrimpi_cover_rows(c, &r);
-    by_y = terrimpi_cover_cut(c, r.height, &y);
+    uint32_t x = 0, y = 0, k;
+    float by_y = terrimpi_cover_cut(c, r.height, &y);
     terrimpi_cover_columns(c, &r);
     part[0] = part[1] = r;
     if (terrimpi_cover_cut(c, r.width, &x) < by_y) {
@@ -17420,9 +17608,10 @@ static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
         part[1].y += y;
         part[1].height -= y;
     }
+    c->nodes[node].parts = c->node_count;
     for (k = 0; k < 2u; k++) {
         terrimpi_cover_tighten(c, &part[k]);
-        terrimpi_cover_add(c, node, &part[k]);
+        c->nodes[c->node_count++].rect = part[k];
     }
 }
 
@@ -17432,10 +17621,9 @@ static void terrimpi_cover_split(terrimpi_cover *c, uint32_t node)
     terrimpi_cover_node *n = &c->nodes[node];
     uint32_t opaque = terrimpi_cover_rows(c, &n->rect);
     n->cost = terrimpi_cover_cost(c, n->rect.width, n->rect.height);
-    n->parts = c->node_count;
-    n->part_count = 0;
+    n->parts = 0;
     if (n->rect.width * n->rect.height - opaque > c->desc.quad_cost &&
-        !terrimpi_cover_by_grid(c, node))
+        c->node_count + 2u <= c->node_limit)
         terrimpi_cover_in_two(c, node);
 }
 
@@ -17446,16 +17634,11 @@ static float terrimpi_cover_gain(const terrimpi_cover *c, const terrimp_rect *r,
 {
     float gain = -(float)terrimpi_cover_cost(c, r->width, r->height);
     uint32_t i;
-    for (i = 0; i < count; i++) {
-        const terrimp_rect *o = &rects[i];
-        if (o->x >= r->x + r->width || r->x >= o->x + o->width || o->y >= r->y + r->height ||
-            r->y >= o->y + o->height)
-            continue;
-        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
-            o->y + o->height > r->y + r->height)
+    for (i = 0; i < count; i++)
+        if (terrimpi_atlas_contains(r, &rects[i]))
+            gain += (float)terrimpi_cover_cost(c, rects[i].width, rects[i].height);
+        else if (terrimpi_atlas_overlap(r, &rects[i]))
             return -1.0f;
-        gain += (float)terrimpi_cover_cost(c, o->width, o->height);
-    }
     return gain;
 }
 
@@ -17470,14 +17653,11 @@ static terrimp_rect terrimpi_cover_union(const terrimp_rect *a, const terrimp_re
 static uint32_t terrimpi_cover_swallow(const terrimp_rect *r, terrimp_rect *rects, uint32_t count)
 {
     uint32_t i, kept = 0, placed = 0;
-    for (i = 0; i < count; i++) {
-        const terrimp_rect *o = &rects[i];
-        if (o->x < r->x || o->y < r->y || o->x + o->width > r->x + r->width ||
-            o->y + o->height > r->y + r->height)
-            rects[kept++] = *o;
+    for (i = 0; i < count; i++)
+        if (!terrimpi_atlas_contains(r, &rects[i]))
+            rects[kept++] = rects[i];
         else if (!placed++)
             rects[kept++] = *r;
-    }
     return kept;
 }
 
@@ -17519,10 +17699,8 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
     c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
     c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
-    c->beyond = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->beyond);
+    c->beyond = (float *)terrimpi_take(&arena, longest, sizeof *c->beyond);
     c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
-    c->spans = (terrimpi_cover_span (*)[TERRIMPI_COVER_SPANS])terrimpi_take(
-        &arena, TERRIMPI_COVER_SPANS, sizeof *c->spans);
     c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
     *bytes = arena.bytes;
     return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
@@ -17536,28 +17714,23 @@ TERRIMP_API size_t terrimp_cover_scratch_bytes(const terrimp_cover_desc *desc, u
 }
 
 /* Takes back the cuts that did not pay, and writes the rectangles that are left while there is
-   room; returns how many they are. Parts stand behind what they are parts of. */
+   room; returns how many they are. */
 static uint32_t terrimpi_cover_prune(terrimpi_cover *c, terrimp_rect *rects, uint32_t capacity)
 {
     uint32_t i, kept = 0;
     for (i = c->node_count; i-- > 0;) {
-        terrimpi_cover_node *n = &c->nodes[i];
-        uint32_t sum = 0, k;
-        for (k = 0; k < n->part_count; k++)
-            sum += c->nodes[n->parts + k].cost;
-        if (n->part_count && sum < n->cost)
-            n->cost = sum;
+        terrimpi_cover_node *n = &c->nodes[i], *part = &c->nodes[n->parts];
+        n->kept = i == 0;
+        if (n->parts && part[0].cost + part[1].cost < n->cost)
+            n->cost = part[0].cost + part[1].cost;
         else
-            n->part_count = 0;
+            n->parts = 0;
     }
-    for (i = 0; i < c->node_count; i++)
-        c->nodes[i].cost = i == 0; /* from here on: whether it is left */
     for (i = 0; i < c->node_count; i++) {
         const terrimpi_cover_node *n = &c->nodes[i];
-        uint32_t k;
-        for (k = 0; n->cost && k < n->part_count; k++)
-            c->nodes[n->parts + k].cost = 1;
-        if (n->cost && !n->part_count && kept++ < capacity)
+        if (n->kept && n->parts)
+            c->nodes[n->parts].kept = c->nodes[n->parts + 1u].kept = 1;
+        else if (n->kept && kept++ < capacity)
             rects[kept - 1u] = n->rect;
     }
     return kept;
@@ -17855,7 +18028,6 @@ TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uin
     return TERRIMP_OK;
 }
 
-
 /* --- textured depth meshes --- */
 
 #define TERRIMPI_DEPTH_STAR 48u /* triangles round a vertex at most, or it stays */
@@ -17893,7 +18065,6 @@ typedef struct terrimpi_depth {
     float tolerance;
     terrimpi_depth_cell *cells;        /* sorted by row, column, layer */
     uint32_t *first_cell;              /* [height * width + 1] */
-    terrimpi_depth_cell *whole;        /* the same before runs are cut in two */
     uint32_t *beside;                  /* [4 * cells] the cells that they go on in, side by side */
     uint32_t *joined;                  /* [4 * cells] corners that are one, as trees */
     uint32_t *vertex_of;               /* [4 * cells] and where they stand in: */
@@ -17915,10 +18086,12 @@ static int terrimpi_depth_set(const terrimp_depth_mesh_desc *d, const uint32_t *
 }
 
 /* Finds the next run of opaque texels from layer k on, and how many of them can be seen; 0 when
-   there are no more. */
+   there are no more. Where some between are hidden it ends in their middle: there two surfaces pass
+   that only seem to be one. */
 static int terrimpi_depth_run(const terrimp_depth_mesh_desc *s, uint32_t x, uint32_t y, uint32_t k,
                               terrimpi_depth_cell *run, uint32_t *seen)
 {
+    uint32_t hidden = 0;
     while (k < s->layers && !terrimpi_depth_set(s, s->opaque, x, y, k))
         k++;
     run->x = (uint16_t)x;
@@ -17928,7 +18101,13 @@ static int terrimpi_depth_run(const terrimp_depth_mesh_desc *s, uint32_t x, uint
     if (k >= s->layers)
         return 0;
     for (*seen = 0; k < s->layers && terrimpi_depth_set(s, s->opaque, x, y, k); k++) {
-        *seen += (uint32_t)terrimpi_depth_set(s, s->visible, x, y, k);
+        int shows = terrimpi_depth_set(s, s->visible, x, y, k);
+        if (shows && *seen && hidden > 0) {
+            run->k1 = (uint16_t)(k - 1u - hidden / 2u);
+            break;
+        }
+        hidden = shows ? 0u : hidden + 1u;
+        *seen += (uint32_t)shows;
         run->k1 = (uint16_t)k;
     }
     return 1;
@@ -17948,7 +18127,7 @@ static void terrimpi_depth_cells(terrimpi_depth *d, int fill)
                 d->first_cell[y * s->width + x] = d->cell_count;
             for (k = 0; terrimpi_depth_run(s, x, y, k, &run, &seen); k = run.k1 + 1u) {
                 if (seen && fill)
-                    d->whole[d->cell_count] = run;
+                    d->cells[d->cell_count] = run;
                 d->cell_count += seen > 0;
                 d->point_count += seen;
             }
@@ -17988,70 +18167,6 @@ static uint32_t terrimpi_depth_texel(const terrimpi_depth *d, uint32_t x, uint32
     }
 }
 
-/* Where a surface turns back behind itself two surfaces share a run, and part in the next texel:
-   there two cells touch it. Returns the last layer of the closer one; or the run's own last one. */
-static uint16_t terrimpi_depth_fold(const terrimpi_depth *d, const terrimpi_depth_cell *c)
-{
-    uint32_t side, i;
-    for (side = 0; side < 4u; side++) {
-        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side), touching = 0;
-        uint16_t end = c->k1;
-        if (texel == TERRIMPI_DEPTH_END)
-            continue;
-        for (i = d->first_cell[texel]; i < d->first_cell[texel + 1u]; i++)
-            if (terrimpi_depth_touch(c, &d->whole[i]) && touching++ == 0)
-                end = d->whole[i].k1;
-        if (touching > 1u)
-            return end < c->k0 ? c->k0 : end;
-    }
-    return c->k1;
-}
-
-/* A run that goes no further itself, but reaches over both halves of one beside it, is cut like
-   that. */
-static uint16_t terrimpi_depth_fold_on(const terrimpi_depth *d, const terrimpi_depth_cell *c,
-                                       const uint16_t *folds)
-{
-    uint32_t side, i;
-    for (side = 0; side < 4u; side++) {
-        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
-        if (texel == TERRIMPI_DEPTH_END)
-            continue;
-        for (i = d->first_cell[texel]; i < d->first_cell[texel + 1u]; i++)
-            if (folds[i] < d->whole[i].k1 && c->k0 <= folds[i] + 1u && c->k1 > folds[i] + 1u)
-                return folds[i] < c->k0 ? c->k0 : folds[i];
-    }
-    return c->k1;
-}
-
-/* Cuts such runs in two cells that have that layer in common. */
-static void terrimpi_depth_unfold(terrimpi_depth *d)
-{
-    uint32_t texels = d->desc->width * d->desc->height, texel, i, end = 0, count = 0;
-    uint16_t *folds = (uint16_t *)d->vertex_of; /* [cells] these two are used later */
-    uint16_t *on = (uint16_t *)d->joined;       /* [cells] */
-    for (i = 0; i < d->cell_count; i++)
-        folds[i] = terrimpi_depth_fold(d, &d->whole[i]);
-    for (i = 0; i < d->cell_count; i++)
-        on[i] = folds[i] < d->whole[i].k1 ? folds[i]
-                                          : terrimpi_depth_fold_on(d, &d->whole[i], folds);
-    memcpy(folds, on, d->cell_count * sizeof *on);
-    for (texel = 0, i = 0; texel < texels; texel++) {
-        end = d->first_cell[texel + 1u];
-        d->first_cell[texel] = count;
-        for (; i < end; i++) {
-            terrimpi_depth_cell run = d->whole[i]; /* cells are written over runs that are done */
-            d->cells[count] = run;
-            d->cells[count++].k1 = folds[i];
-            if (folds[i] == run.k1)
-                continue;
-            d->cells[count] = run;
-            d->cells[count++].k0 = folds[i];
-        }
-    }
-    d->first_cell[texels] = d->cell_count = count;
-}
-
 /* Finds the cells that go on in each other, texel by texel: of those that touch, the closest with
    the closest. */
 static void terrimpi_depth_match(terrimpi_depth *d)
@@ -18079,39 +18194,6 @@ static void terrimpi_depth_match(terrimpi_depth *d)
     }
 }
 
-/* Whether a cell and the one behind it are a run that was cut in two. */
-static int terrimpi_depth_folded(const terrimpi_depth *d, uint32_t cell)
-{
-    const terrimpi_depth_cell *a = &d->cells[cell], *b = a + 1;
-    return cell + 1u < d->cell_count && a->x == b->x && a->y == b->y && a->k1 == b->k0;
-}
-
-/* At a side of such a run: 0 when neither of its halves goes on, 1 when they go on together, in the
-   halves of another one, or only one does; 2 when they part. */
-static int terrimpi_depth_parting(const terrimpi_depth *d, uint32_t cell, uint32_t side)
-{
-    uint32_t a = d->beside[4u * cell + side], b = d->beside[4u * (cell + 1u) + side];
-    if (a == TERRIMPI_DEPTH_END && b == TERRIMPI_DEPTH_END)
-        return 0;
-    return a == TERRIMPI_DEPTH_END || b == TERRIMPI_DEPTH_END ||
-                   (b == a + 1u && terrimpi_depth_folded(d, a))
-               ? 1
-               : 2;
-}
-
-/* Joins the halves of cut runs along the edge where the surface turns back. */
-static void terrimpi_depth_hem(terrimpi_depth *d)
-{
-    uint32_t i, k;
-    for (i = 0; i < d->cell_count; i++)
-        for (k = 0; terrimpi_depth_folded(d, i) && k < 4u; k++) {
-            int across = terrimpi_depth_parting(d, i, k & 1u ? 0 : 2);
-            int up = terrimpi_depth_parting(d, i, k & 2u ? 1 : 3);
-            if ((!across && up < 2) || (!up && across < 2))
-                terrimpi_depth_join(d->joined, 4u * i + k, 4u * (i + 1u) + k);
-        }
-}
-
 /* Makes one vertex of all corners that connected cells share, with the layers common to them. */
 static void terrimpi_depth_connect(terrimpi_depth *d)
 {
@@ -18125,7 +18207,6 @@ static void terrimpi_depth_connect(terrimpi_depth *d)
         for (k = 0; k < 2u && above != TERRIMPI_DEPTH_END; k++)
             terrimpi_depth_join(d->joined, 4u * i + 2u + k, 4u * above + k);
     }
-    terrimpi_depth_hem(d);
     d->corner_count = 0;
     for (i = 0; i < 4u * d->cell_count; i++) {
         const terrimpi_depth_cell *c = &d->cells[i / 4u];
@@ -18191,19 +18272,37 @@ static uint32_t terrimpi_depth_triangle_add(terrimpi_depth *d, uint32_t a, uint3
     return d->triangle_count++;
 }
 
-/* A cell of which no triangle would come near one end gets two more, along the line of sight. */
-static uint32_t terrimpi_depth_spine(terrimpi_depth *d, const terrimpi_depth_cell *c)
+/* A cell of which no triangle would come near one end gets two more, along the line of sight; if
+   the cell to the left or below has the same layers and such a pair, that is made longer. */
+static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
 {
-    uint32_t first = d->corner_count, k;
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    uint32_t *spines = d->joined, first = d->corner_count, level, k; /* [cells] first triangle */
+    for (k = 0; k < 2u; k++) {
+        uint32_t o = d->beside[4u * cell + k + 2u], *v;
+        if (o >= cell || spines[o] == TERRIMPI_DEPTH_END || d->cells[o].k0 != c->k0 ||
+            d->cells[o].k1 != c->k1)
+            continue;
+        v = d->triangles[spines[o] + 1u].corner; /* 2, 1, 3 */
+        if (d->corners[v[0]].at[k] < d->corners[v[2]].at[k]) {
+            d->corners[v[1]].at[k] += 1.0f;
+            d->corners[v[2]].at[k] += 1.0f;
+            spines[cell] = spines[o];
+            return;
+        }
+    }
+    k = d->beside[4u * cell + 1u];
+    level = k == TERRIMPI_DEPTH_END || d->cells[k].k0 != c->k0 || d->cells[k].k1 != c->k1;
     for (k = 0; k < 4u; k++) {
         terrimpi_depth_corner *v = &d->corners[d->corner_count];
         v->at[0] = (float)c->x + 0.5f;
-        v->at[1] = (float)(c->y + (k & 1u));
+        v->at[1] = (float)c->y + 0.5f;
+        v->at[1u - level] += k & 1u ? 0.5f : -0.5f;
         v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
         d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
     }
-    terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
-    return terrimpi_depth_triangle_add(d, first + 2u, first + 1u, first + 3u, c->sheet);
+    spines[cell] = terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
+    terrimpi_depth_triangle_add(d, first + 2u, first + 1u, first + 3u, c->sheet);
 }
 
 /* Squared distance from a point to a segment. */
@@ -18268,38 +18367,63 @@ static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t tria
     d->triangles[triangle].points = point;
 }
 
+/* The closer of a cell's two triangles to an opaque texel's middle, if that is closer than the one
+   that is known. */
+static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_point *p,
+                                  uint32_t cell, uint32_t *best, float *least)
+{
+    uint32_t t;
+    for (t = 2u * cell; t < 2u * cell + 2u; t++) {
+        float gap = terrimpi_depth_gap(d, p, d->triangles[t].corner);
+        if (gap < *least) {
+            *least = gap;
+            *best = t;
+        }
+    }
+}
+
+/* Finds a triangle for an opaque texel: of its own cell, else of those in the texels beside it,
+   else a spine. */
+static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point)
+{
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    float limit = d->tolerance * d->tolerance, least = TERRIMPI_FLOAT_MAX;
+    uint32_t best = 0, side, i;
+    terrimpi_depth_closer(d, &d->points[point], cell, &best, &least);
+    for (side = 0; side < 4u && least > limit; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+        for (i = texel == TERRIMPI_DEPTH_END ? 0u : d->first_cell[texel];
+             texel != TERRIMPI_DEPTH_END && i < d->first_cell[texel + 1u]; i++)
+            terrimpi_depth_closer(d, &d->points[point], i, &best, &least);
+    }
+    if (least > limit && d->joined[cell] == TERRIMPI_DEPTH_END)
+        terrimpi_depth_spine(d, cell);
+    terrimpi_depth_give(d, point, least > limit ? d->joined[cell] : best);
+}
+
 /* Two triangles for each cell, and the opaque texels that they stand for. */
 static void terrimpi_depth_first_mesh(terrimpi_depth *d)
 {
-    float limit = d->tolerance * d->tolerance;
     uint32_t i, k, point = 0;
     for (i = 0; i < d->cell_count; i++)
         terrimpi_depth_stretch(d, i);
     memset(d->at, 0xff, d->corner_count * sizeof *d->at);
+    memset(d->joined, 0xff, d->cell_count * sizeof *d->joined); /* from here on: its spine */
     d->triangle_count = 0;
     for (i = 0; i < d->cell_count; i++) {
-        const terrimpi_depth_cell *c = &d->cells[i];
         const uint32_t *v = d->vertex_of + 4u * i;
-        uint32_t a = terrimpi_depth_triangle_add(d, v[0], v[1], v[2], c->sheet);
-        uint32_t b = terrimpi_depth_triangle_add(d, v[3], v[2], v[1], c->sheet);
-        uint32_t spine = TERRIMPI_DEPTH_END;
-        for (k = c->k0; k <= c->k1; k++) {
-            terrimpi_depth_point *p = &d->points[point];
-            float to_a, to_b;
-            if (!terrimpi_depth_set(d->desc, d->desc->visible, c->x, c->y, k))
-                continue;
-            p->x = c->x;
-            p->y = c->y;
-            p->k = (uint16_t)k;
-            to_a = terrimpi_depth_gap(d, p, d->triangles[a].corner);
-            to_b = terrimpi_depth_gap(d, p, d->triangles[b].corner);
-            if (terrimpi_min(to_a, to_b) > limit && spine == TERRIMPI_DEPTH_END)
-                spine = terrimpi_depth_spine(d, c);
-            terrimpi_depth_give(d, point++, terrimpi_min(to_a, to_b) > limit ? spine
-                                            : to_a <= to_b                   ? a
-                                                                             : b);
-        }
+        terrimpi_depth_triangle_add(d, v[0], v[1], v[2], d->cells[i].sheet);
+        terrimpi_depth_triangle_add(d, v[3], v[2], v[1], d->cells[i].sheet);
     }
+    for (i = 0; i < d->cell_count; i++)
+        for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
+            terrimpi_depth_point *p = &d->points[point];
+            p->x = d->cells[i].x;
+            p->y = d->cells[i].y;
+            p->k = (uint16_t)k;
+            if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
+                terrimpi_depth_attach(d, i, point++);
+        }
 }
 
 /* Deals the cells out to sheets: each is what can be reached from its first cell over shared edges
@@ -18501,7 +18625,8 @@ static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s
     return 1;
 }
 
-/* Whether an edge of a star may collapse as far as its topology goes: borders and seams stay. */
+/* Whether an edge of a star may collapse as far as its topology goes: borders and seams move by no
+   more than the tolerance in the picture. */
 static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
                               uint32_t n, const terrimpi_depth_star *t)
 {
@@ -18513,13 +18638,15 @@ static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, u
             common += s->others[i] == t->others[k];
     if (common != s->shared[n])
         return 0;
-    for (i = 0; i < s->other_count; i++) /* the border may not be cut short */
+    for (i = 0; i < s->other_count; i++)
         if (s->open_count && s->open[i] && i != n) {
-            float bound = 0.75f * d->tolerance;
-            if (terrimpi_depth_to_edge(terrimpi_depth_at(d, from),
-                                       terrimpi_depth_at(d, s->others[n]),
-                                       terrimpi_depth_at(d, s->others[i])) > bound * bound)
-                return 0;
+            float flat[3][3];
+            memcpy(flat[0], terrimpi_depth_at(d, from), sizeof flat[0]);
+            memcpy(flat[1], terrimpi_depth_at(d, s->others[n]), sizeof flat[0]);
+            memcpy(flat[2], terrimpi_depth_at(d, s->others[i]), sizeof flat[0]);
+            flat[0][2] = flat[1][2] = flat[2][2] = 0.0f;
+            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <=
+                   d->tolerance * d->tolerance;
         }
     return 1;
 }
@@ -18679,8 +18806,11 @@ static void terrimpi_depth_write_sheets(terrimpi_depth *d, terrimp_depth_mesh *m
     for (i = 0; i < d->cell_count; i++) {
         const terrimpi_depth_cell *c = &d->cells[i];
         const terrimp_depth_sheet *s = &m->sheets[c->sheet];
+        uint32_t k = c->k0;
+        while (k < c->k1 && !terrimpi_depth_set(d->desc, d->desc->visible, c->x, c->y, k))
+            k++;
         m->texel_layers[s->first_texel + (c->y - s->texels.y) * s->texels.width + c->x -
-                        s->texels.x] = (uint16_t)((c->k0 + c->k1) / 2u);
+                        s->texels.x] = (uint16_t)k;
     }
 }
 
@@ -18702,13 +18832,12 @@ static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, 
 static size_t terrimpi_depth_layout(terrimpi_depth *d, void *base)
 {
     terrimpi_arena arena = terrimpi_arena_at(base);
-    size_t n = 2u * (size_t)d->cell_count, points = (size_t)d->point_count + d->cell_count;
+    size_t n = d->cell_count, points = (size_t)d->point_count + d->cell_count;
     size_t slots = (size_t)d->desc->width * d->desc->height;
     size_t most = terrimpi_mul(8, n, &arena.ok);
     size_t queue = most > points ? most : points;
     arena.ok &= n < 0x10000000u;
     d->cells = (terrimpi_depth_cell *)terrimpi_take(&arena, n, sizeof *d->cells);
-    d->whole = d->cells ? d->cells + d->cell_count : NULL;
     d->beside = (uint32_t *)terrimpi_take(&arena, most / 2u, sizeof *d->beside);
     d->first_cell = (uint32_t *)terrimpi_take(&arena, slots + 1u, sizeof *d->first_cell);
     d->joined = (uint32_t *)terrimpi_take(&arena, most / 2u + 2u, sizeof *d->joined);
@@ -18747,7 +18876,6 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
     needed = terrimpi_depth_layout(&d, scratch);
     TERRIMPI_REFUSE(!needed || bytes < needed, TERRIMP_E_MEMORY);
     terrimpi_depth_cells(&d, 1);
-    terrimpi_depth_unfold(&d);
     terrimpi_depth_match(&d);
     terrimpi_depth_connect(&d);
     terrimpi_depth_sheets(&d);
@@ -19084,26 +19212,23 @@ static void terrimpi_place_spares(terrimpi_place_work *p)
     }
 }
 
+static int terrimpi_place_smaller(const void *candidates, uint32_t a, uint32_t b)
+{
+    const terrimp_place_candidate *c = (const terrimp_place_candidate *)candidates;
+    return c[a].memory < c[b].memory;
+}
+
 /* Gives back what others can stand in for, the largest first. */
 static void terrimpi_place_give_back(terrimpi_place_work *p)
 {
-    uint32_t i;
+    uint32_t i, count = 0;
     terrimpi_place_spares(p);
-    p->heap_count = 0;
-    for (i = 0; i < p->desc->candidate_count; i++) {
-        p->scores[i] = p->desc->candidates[i].memory;
+    for (i = 0; i < p->desc->candidate_count; i++)
         if (p->made[i])
-            p->heap[p->heap_count++] = i;
-    }
-    for (i = p->heap_count / 2u; i-- > 0;)
-        terrimpi_place_sink(p, i);
-    while (p->heap_count) {
-        uint32_t largest = p->heap[0];
-        p->heap[0] = p->heap[--p->heap_count];
-        if (p->heap_count)
-            terrimpi_place_sink(p, 0);
-        terrimpi_place_drop(p, largest);
-    }
+            p->heap[count++] = i;
+    terrimpi_sort(p->heap, count, p->desc->candidates, terrimpi_place_smaller);
+    for (i = 0; i < count; i++)
+        terrimpi_place_drop(p, p->heap[i]);
 }
 
 static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
@@ -19221,7 +19346,6 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
             costs[desc->gains[i].view] -= desc->gains[i].saved;
     return TERRIMP_OK;
 }
-
 
 /* --- a prepared set for a terrain --- */
 

@@ -63,6 +63,25 @@ parallel_repeats() # threads
         grep -q "the same bytes" $work/parallel.txt
 }
 
+# ---- pages and stream: parts side by side are the whole, which is flown over from a slow disk
+
+pages_in_parts()
+{
+    rm -f $work/whole.pages $work/parts.pages
+    build/pages $work/whole.pages --made 500 --block 2 --threads 2 | grep -a ": ok, 500 x 500" &&
+        build/pages $work/parts.pages --made 500 --block 2 --part 1,2 > /dev/null &&
+        build/pages $work/parts.pages --made 500 --block 2 --part 0,2 > /dev/null &&
+        build/pages $work/parts.pages --made 500 --block 2 > /dev/null &&
+        cmp $work/whole.pages $work/parts.pages
+}
+
+stream_flies()
+{
+    build/stream $work/whole.pages --frames 60 --latency 5 --slots 60 > $work/stream.txt &&
+        grep "frames lacked a page" $work/stream.txt &&
+        awk '/slots full/ { n = $7 } END { exit !(n > 4) }' $work/stream.txt
+}
+
 # ---- bake: a picture file as a DEM, to a file and to C source that holds the same bytes
 
 bakes()
@@ -198,6 +217,8 @@ unknown_options()
 check "make builds every example" make -s all
 check "parallel_build makes the same bytes with 2 threads" parallel_repeats 2
 check "parallel_build makes the same bytes with 5 threads" parallel_repeats 5
+check "pages makes the same file in parts as at once" pages_in_parts
+check "stream flies over it with few slots and a slow disk" stream_flies
 check "bake makes a bake that opens, and C source" bakes
 check "bake writes C source that holds the bake" bake_source_holds_the_bake
 check "bake refuses an empty file, in one line" bake_refuses
@@ -206,6 +227,10 @@ if [ -x build/geomip ]; then
 fi
 check "software draws its frames without a GPU, close to the full mesh" host_runs software
 check "sorted draws the same frames without and with a depth buffer" host_runs sorted
+check "prepared draws pictures from memory, close to the full mesh" host_runs prepared
+if [ -x build/town ]; then
+    check "town keeps to its budget of triangles and shows no hole" host_runs town
+fi
 if [ -x build/fixed_function ]; then
     check "fixed_function draws its frames, close to the full mesh" host_runs fixed_function
     check "fixed_function calls nothing newer than OpenGL 1.1" \

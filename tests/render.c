@@ -65,7 +65,8 @@ typedef struct scene {
     int width, height;            /* of its pictures */
     size_t pixels;
     size_t vertex_bytes, mesh_bytes; /* of gl_terrain_desc */
-    int exact_depth;                 /* the same */
+    int exact_depth, relit;          /* the same */
+    uint8_t *normals;                /* the same, or NULL */
     uint8_t *lightmap;            /* made when OpenGL is first filled; edits leave it as it is */
     context context;
     gl_terrain gl;
@@ -104,6 +105,8 @@ static void scene_fill(scene *s, uint32_t atlas)
     desc.vertex_bytes = s->vertex_bytes;
     desc.mesh_bytes = s->mesh_bytes;
     desc.exact_depth = s->exact_depth;
+    desc.normals = s->normals;
+    desc.relit = s->relit;
     need(gl_terrain_open(&s->gl, &desc));
 }
 
@@ -124,6 +127,7 @@ static void scene_close(scene *s)
     terrimp_terrain_destroy(s->terrain);
     dem_free(&s->dem);
     free(s->lightmap);
+    free(s->normals);
     memset(s, 0, sizeof *s);
 }
 
@@ -1610,6 +1614,7 @@ static void frames_show_nothing_from_outside_of_the_slots(void)
 #include "render_hidden.h"
 #include "render_scene.h"
 #include "render_holes.h"
+#include "render_light.h"
 
 int main(int argc, char **argv)
 {
@@ -1625,6 +1630,8 @@ int main(int argc, char **argv)
     RUN(a_real_tile_looks_like_the_full_mesh);
     RUN(houses_and_seas_meet_the_terrain);
     RUN(what_ridges_hide_shows_no_pixel);
+    RUN(pictures_lit_when_drawn_are_like_new_ones);
+    RUN(renewed_light_does_not_pop);
     RUN(pictures_in_two_parts_show_what_ridges_hide);
     RUN(pictures_in_pieces_are_like_whole_ones);
     RUN(frames_change_no_more_than_those_of_the_full_mesh);

@@ -569,8 +569,45 @@ static void capture_split_stands_behind_what_hides(void)
     CHECK(memcmp(&more, &split, sizeof split) == 0);
 }
 
+/* Every code is that of its normal, and no normal is farther from that of its code than is said. */
+static void normals_fit_into_two_bytes(void)
+{
+    double worst = 0.0;
+    float normal[3], back[3];
+    uint32_t i, k;
+    uint8_t code[2], again[2];
+    for (i = 0; i < 65536u; i++) {
+        double wide[3];
+        code[0] = (uint8_t)(i & 255u);
+        code[1] = (uint8_t)(i >> 8);
+        terrimp_normal_decode(code, back);
+        oracle_widen(back, wide);
+        CHECK(back[1] >= 0.0f && fabs(oracle_dot(wide, wide) - 1.0) < 1e-6);
+        CHECK(terrimp_normal_encode(back, again) == TERRIMP_OK);
+        CHECK(again[0] == code[0] && again[1] == code[1]);
+    }
+    for (i = 0; i < check_rounds(300000, 3000000); i++) {
+        double a[3], b[3], sum = 0.0;
+        do
+            for (k = 0, sum = 0.0; k < 3u; k++) {
+                normal[k] = random_float(k == 1u ? 0.0f : -1.0f, 1.0f);
+                sum += (double)normal[k] * (double)normal[k];
+            }
+        while (sum > 1.0 || sum < 0.01);
+        CHECK(terrimp_normal_encode(normal, code) == TERRIMP_OK);
+        terrimp_normal_decode(code, back);
+        oracle_widen(normal, a);
+        oracle_widen(back, b);
+        worst = fmax(worst, acos(fmin(oracle_dot(a, b) / sqrt(sum) / oracle_length(b), 1.0)));
+    }
+    worst *= 57.29577951308232;
+    printf("  a normal in two bytes is at most %.3f degrees off\n", worst);
+    CHECK(worst > 0.4 && worst < 0.55);
+}
+
 static void impostor_tests(void)
 {
+    RUN(normals_fit_into_two_bytes);
     RUN(impostor_size_is_that_of_hess);
     RUN(impostor_size_keeps_its_limits_and_says_the_scale);
     RUN(capture_pad_adds_whole_texels_around_the_picture);

@@ -6,6 +6,7 @@
 #include "unit_terrain.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,7 +19,14 @@ static float not_a_number(void)
 /* ---- terrains and frames ---- */
 
 enum { SORTED_SIDE = 513, SORTED_MOST = 40000 };
-static float sorted_heights[SORTED_SIDE * SORTED_SIDE];
+#ifdef TERRIMP_FIXED /* see tests/compile/fixed.c */
+typedef int16_t sorted_sample;
+enum { SORTED_STEPS = 256, SORTED_FORMAT = TERRIMP_FORMAT_S16 };
+#else
+typedef float sorted_sample;
+enum { SORTED_STEPS = 1, SORTED_FORMAT = TERRIMP_FORMAT_F32 };
+#endif
+static sorted_sample sorted_heights[SORTED_SIDE * SORTED_SIDE];
 static terrimp_sorted_square sorted_squares[SORTED_MOST];
 static uint32_t sorted_count; /* of the squares of the frame that was made last */
 
@@ -34,7 +42,7 @@ static void sorted_make_hills(float height)
                 float b = (float)(z % 512 * (k * 2 + 1) % 512) * (6.2831853f / 512.0f);
                 h += sinf(a + 1.3f * (float)k + sinf(b)) * sinf(b + 0.7f * (float)k) / (float)k;
             }
-            sorted_heights[z * SORTED_SIDE + x] = height * h;
+            sorted_heights[z * SORTED_SIDE + x] = (sorted_sample)(height * h * SORTED_STEPS);
         }
 }
 
@@ -43,6 +51,8 @@ static terrimp_sorted_desc sorted_hills(void)
     terrimp_sorted_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.field.samples = sorted_heights;
+    desc.field.format = SORTED_FORMAT;
+    desc.field.height_scale = 1.0f / SORTED_STEPS;
     desc.field.width = desc.field.depth = SORTED_SIDE;
     desc.field.wrap = 1;
     return desc;
@@ -53,7 +63,7 @@ static terrimp_sorted_desc sorted_piece(void)
 {
     terrimp_sorted_desc desc = sorted_hills();
     desc.field.wrap = 0;
-    desc.field.row_bytes = SORTED_SIDE * sizeof(float);
+    desc.field.row_bytes = SORTED_SIDE * sizeof(sorted_sample);
     desc.field.width = random_range(2, 300);
     desc.field.depth = random_range(2, 300);
     desc.field.spacing_x = random_float(0.5f, 2.0f);
@@ -281,7 +291,7 @@ static void sorted_needs_no_depth_buffer_over_tile(const char *name)
     desc.field.format = TERRIMP_FORMAT_S16;
     desc.field.spacing_x = 68.3f, desc.field.spacing_z = 92.6f;
     CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
-    for (i = 0; i < 500; i++) {
+    for (i = 0; i < 1000; i++) {
         terrimp_camera camera = sorted_camera(&s.desc);
         float ground = 0.0f;
         (void)terrimp_heightfield_height(&desc.field, camera.eye[0], camera.eye[2], &ground);
@@ -293,7 +303,7 @@ static void sorted_needs_no_depth_buffer_over_tile(const char *name)
         faults += order_faults(&s, &camera, &seen);
     }
     CHECK(faults == 0);
-    CHECK(seen > 500 * ORDER_WIDE * ORDER_HIGH / 10);
+    CHECK(seen > 1000 * ORDER_WIDE * ORDER_HIGH / 10);
 }
 
 static void sorted_needs_no_depth_buffer_over_mountains(void)
@@ -311,6 +321,11 @@ static void sorted_needs_no_depth_buffer_over_hills(void)
 /* A host without a depth buffer. */
 typedef struct order_host {
     const land *l;
+    uint32_t hash;        /* of all commands, but for where the repetition of the eye is */
+    int32_t periods;      /* where that is, for the hash */
+    int captures_now, impostors_now;
+    int8_t levels[160][160]; /* 1 + level of the chunks of a terrain that wraps, from -40 on */
+    uint8_t patterns[160][160];
     order_picture screen, capture;
     const order_picture *target; /* NULL: of a capture that is not looked at */
     float xyz[3 * 129 * 129];
@@ -320,6 +335,43 @@ typedef struct order_host {
     int seen, faults, capture_seen, capture_faults;
     uint32_t circles, meshes;
 } order_host;
+
+/* Adds the offset of a command to vertices; returns the eye without it. */
+static const float *order_move(const order_host *h, const float offset[2], float *xyz,
+                               uint32_t vertices)
+{
+    static float eye[3];
+    uint32_t i;
+    memcpy(eye, h->target->eye, sizeof eye);
+    eye[0] -= offset[0];
+    eye[2] -= offset[1];
+    for (i = 0; i < vertices && (offset[0] != 0.0f || offset[1] != 0.0f); i++) {
+        xyz[3u * i] += offset[0];
+        xyz[3u * i + 2u] += offset[1];
+    }
+    return eye;
+}
+
+/* Takes a part of a command into the hash: words, and places less the periods. */
+static void order_hash(order_host *h, const void *words, size_t bytes)
+{
+    size_t i;
+    for (i = 0; i + 4u <= bytes; i += 4u) {
+        uint32_t word;
+        memcpy(&word, (const unsigned char *)words + i, 4);
+        h->hash = (h->hash ^ word) * 0x9e3779b1u;
+        h->hash ^= h->hash >> 15;
+    }
+}
+
+static void order_hash_offset(order_host *h, const float offset[2])
+{
+    const terrimp_heightfield *f = &h->l->desc.field;
+    float tiles[2];
+    tiles[0] = offset[0] / ((float)(f->width - 1u) * f->spacing_x) - (float)h->periods;
+    tiles[1] = offset[1] / ((float)(f->depth - 1u) * f->spacing_z) - (float)h->periods;
+    order_hash(h, tiles, sizeof tiles);
+}
 
 static void order_draw(order_host *h, const float *xyz, uint32_t count)
 {
@@ -332,13 +384,58 @@ static void order_draw(order_host *h, const float *xyz, uint32_t count)
     }
 }
 
+/* Notes the level and pattern of the chunks that a ground node covers. */
+static void order_note_chunks(order_host *h, const terrimp_ground_command *c)
+{
+    const terrimp_heightfield *f = &h->l->desc.field;
+    land_node n = land_place(h->l, c->node);
+    int i, j, k, side = 1 << n.level, quads = (int)h->l->info.chunk_quads;
+    int x = (int)n.x * side + (int)floorf(c->offset[0] / f->spacing_x / (float)quads + 0.5f) + 40;
+    int z = (int)n.z * side + (int)floorf(c->offset[1] / f->spacing_z / (float)quads + 0.5f) + 40;
+    uint32_t pattern = 0;
+    for (k = 0; k < (int)TERRIMP_PATTERN_COUNT; k++) {
+        terrimp_pattern p;
+        CHECK(terrimp_pattern_find((uint32_t)quads, TERRIMP_FORM_LIST, (uint32_t)k, &p) ==
+              TERRIMP_OK);
+        pattern = p.first_index == c->first_index ? (uint32_t)k : pattern;
+    }
+    for (j = z; j < z + side; j++)
+        for (i = x; i < x + side; i++)
+            if (i >= 0 && j >= 0 && i < 160 && j < 160) {
+                h->levels[j][i] = (int8_t)(n.level + 1u);
+                h->patterns[j][i] = (uint8_t)pattern;
+            }
+}
+
+/* Sides at which a chunk's node does not join that of the next chunk. */
+static int order_misfits(const order_host *h)
+{
+    static const int way[4][2] = {{0, -1}, {0, 1}, {-1, 0}, {1, 0}};
+    int x, z, k, count = 0;
+    for (z = 1; z < 159; z++)
+        for (x = 1; x < 159; x++)
+            for (k = 0; k < 4 && h->levels[z][x]; k++) {
+                int own = h->levels[z][x], other = h->levels[z + way[k][1]][x + way[k][0]];
+                int side = 1 << (own - 1), at = (k < 2 ? z : x) - 40 + 1024;
+                int border = k % 2 ? (at + 1) % side == 0 : at % side == 0;
+                if (other && border)
+                    count += other > own + 1 || (h->patterns[z][x] >> k & 1) != (other > own);
+            }
+    return count;
+}
+
 static void order_draw_ground(void *user, const terrimp_ground_command *c)
 {
     order_host *h = (order_host *)user;
     uint32_t count = 0, vertices = h->l->info.ground_vertex_count;
     terrimp_geomip_draw draw;
+    const float *eye;
+    order_hash(h, c, offsetof(terrimp_ground_command, offset));
+    order_hash_offset(h, c->offset);
     if (!h->target)
         return;
+    if (h->target == &h->screen)
+        order_note_chunks(h, c);
     memset(&draw, 0, sizeof draw);
     draw.morph = c->morph;
     memcpy(draw.side, c->side, sizeof draw.side);
@@ -347,7 +444,8 @@ static void order_draw_ground(void *user, const terrimp_ground_command *c)
     CHECK(terrimp_terrain_fill_morph(h->l->terrain, c->node, h->morph, vertices) == TERRIMP_OK);
     CHECK(terrimp_geomip_morph(h->l->info.chunk_quads, &draw, h->morph, h->xyz + 1, 3) ==
           TERRIMP_OK);
-    CHECK(terrimp_sorted_ground(h->l->terrain, c->node, c->first_index, h->target->eye, h->indices,
+    eye = order_move(h, c->offset, h->xyz, vertices);
+    CHECK(terrimp_sorted_ground(h->l->terrain, c->node, c->first_index, eye, h->indices,
                                 c->index_count, &count) == TERRIMP_OK);
     order_draw(h, h->xyz, count);
 }
@@ -356,6 +454,9 @@ static void order_draw_ground(void *user, const terrimp_ground_command *c)
 static void order_begin_capture(void *user, const terrimp_capture_command *c)
 {
     order_host *h = (order_host *)user;
+    order_hash(h, c, offsetof(terrimp_capture_command, view));
+    order_hash(h, c->projection, sizeof c->projection);
+    h->captures_now++;
     h->looked_at = h->captures++ % 10 == 0 && c->clear && c->complete;
     h->target = NULL;
     if (!h->looked_at)
@@ -380,18 +481,25 @@ static void order_end_capture(void *user, const terrimp_capture_command *c)
 static void order_draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     order_host *h = (order_host *)user;
-    const float *xyz = h->l->xyz + 3u * c->base_vertex;
     uint32_t circles = 0;
     terrimp_mesh_info mesh;
+    const float *eye;
+    order_hash(h, c, offsetof(terrimp_impostor_command, eye));
+    order_hash(h, c->texture_matrix, sizeof c->texture_matrix);
+    order_hash_offset(h, c->offset);
+    h->impostors_now++;
     if (c->alpha < 1.0f)
         return; /* its ground is drawn, too */
     CHECK(terrimp_terrain_get_mesh(h->l->terrain, c->node, &mesh) == TERRIMP_OK);
     memcpy(h->indices, h->l->indices + c->first_index, c->index_count * sizeof *h->indices);
-    CHECK(terrimp_sorted_mesh(xyz, mesh.vertex_count, h->screen.eye, h->indices, c->index_count,
-                              h->scratch, &circles) == TERRIMP_OK);
+    memcpy(h->xyz, h->l->xyz + 3u * c->base_vertex, mesh.vertex_count * 3u * sizeof(float));
+    eye = order_move(h, c->offset, h->xyz, mesh.vertex_count);
+    CHECK(terrimp_sorted_mesh(h->xyz, mesh.vertex_count, h->target->eye, h->indices,
+                              c->index_count, h->scratch, &circles) == TERRIMP_OK);
+    (void)eye;
     h->circles += circles;
     h->meshes++;
-    order_draw(h, xyz, c->index_count);
+    order_draw(h, h->xyz, c->index_count);
 }
 
 /* Flies at random and compares each frame with and without a depth buffer. */
@@ -492,6 +600,302 @@ static void pictures_are_made_in_painters_order(void)
     CHECK(h.capture_faults == 0 && h.capture_seen > 10000);
     CHECK(h.faults == 0);
     CHECK(h.circles == 0 && h.meshes > 1000u);
+}
+
+/* ---- terrains without end ---- */
+
+/* A terrain that wraps; and nine of it beside each other, the wrapping one in the middle. */
+static void order_tile(land *one, land *nine, int turn)
+{
+    uint32_t quads = turn % 2 ? 4 : 8, chunks = turn % 3 ? 4 : 6;
+    uint32_t side = quads * chunks, x, z;
+    land_prepare(one, side + 1u, side + 1u, TERRIMP_FORMAT_F32, LAND_HILLS);
+    land_prepare(nine, 3u * side + 1u, 3u * side + 1u, TERRIMP_FORMAT_F32, LAND_FLAT);
+    one->desc.chunk_quads = nine->desc.chunk_quads = quads;
+    one->desc.field.wrap = 1;
+    one->desc.field.height_scale = nine->desc.field.height_scale = 0.125f;
+    one->desc.field.spacing_x = nine->desc.field.spacing_x = 2.0f;
+    one->desc.field.spacing_z = nine->desc.field.spacing_z = 1.0f;
+    nine->desc.field.origin_x = -2.0f * (float)side;
+    nine->desc.field.origin_z = -(float)side;
+    for (x = 0; x <= side; x++)
+        one->samples[side * (side + 1u) + x] = one->samples[x];
+    for (z = 0; z <= side; z++)
+        one->samples[z * (side + 1u) + side] = one->samples[z * (side + 1u)];
+    for (z = 0; z <= 3u * side; z++)
+        for (x = 0; x <= 3u * side; x++)
+            nine->samples[z * (3u * side + 1u) + x] =
+                one->samples[z % side * (side + 1u) + x % side];
+}
+
+static void order_camera(order_host *h, terrimp_camera *camera)
+{
+    memcpy(h->screen.eye, camera->eye, sizeof camera->eye);
+    h->target = &h->screen;
+    h->captures_now = h->impostors_now = 0;
+    memset(h->levels, 0, sizeof h->levels);
+    CHECK(terrimp_camera_matrices(camera, h->screen.view, h->screen.projection) == TERRIMP_OK);
+    order_begin();
+}
+
+static terrimp_callbacks order_callbacks(order_host *h)
+{
+    terrimp_callbacks draw;
+    memset(&draw, 0, sizeof draw);
+    draw.user = h;
+    draw.begin_capture = order_begin_capture, draw.end_capture = order_end_capture;
+    draw.draw_ground = order_draw_ground, draw.draw_impostor = order_draw_impostor;
+    return draw;
+}
+
+/* The eye is over the tile in the middle, and sees as far as one more. */
+static void views_that_wrap_show_what_nine_terrains_show(void)
+{
+    static order_host h, plain;
+    static land one, nine;
+    static double wanted[ORDER_WIDE * ORDER_HIGH];
+    int turn, i, k, other = 0, seen = 0, faults = 0, misfits = 0, offsets = 0;
+    for (turn = 0; turn < 6; turn++) {
+        terrimp_view *view = NULL, *yardstick = NULL;
+        terrimp_view_desc d;
+        terrimp_callbacks draw = order_callbacks(&h), draw_plain = order_callbacks(&plain);
+        order_tile(&one, &nine, turn);
+        if (!land_build(&one) || !land_build(&nine))
+            return;
+        h.l = &one, plain.l = &nine;
+        memset(&d, 0, sizeof d);
+        d.sorted = 1;
+        d.mode = TERRIMP_MODE_FULL;
+        CHECK(terrimp_view_create(nine.terrain, &d, NULL, &yardstick) == TERRIMP_OK);
+        d.mode = turn % 2 ? TERRIMP_MODE_FULL : TERRIMP_MODE_GEOMIP;
+        d.tolerance_px = 0.05f;
+        CHECK(terrimp_view_create(one.terrain, &d, NULL, &view) == TERRIMP_OK);
+        for (i = 0; i < 40; i++) {
+            terrimp_sorted_desc place;
+            terrimp_camera camera;
+            memset(&place, 0, sizeof place);
+            place.field = one.desc.field;
+            camera = sorted_camera(&place);
+            camera.eye[1] = random_float(one.info.box.min[1], 2.0f * one.info.box.max[1]);
+            camera.z_far = 24.0f;
+            order_camera(&plain, &camera);
+            CHECK(terrimp_view_update(yardstick, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_render(yardstick, &draw_plain) == TERRIMP_OK);
+            memcpy(wanted, order_shown, sizeof wanted);
+            order_camera(&h, &camera);
+            CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
+            for (k = 0; k < ORDER_WIDE * ORDER_HIGH; k++)
+                if (wanted[k] * 23.0 > 1.0) /* beyond it either may be cut off */
+                    other += fabs(wanted[k] - order_shown[k]) > 0.02 * wanted[k];
+            faults += order_end(&seen);
+            misfits += order_misfits(&h);
+            offsets += h.screen.eye[0] < 0.0f;
+        }
+        terrimp_view_destroy(view), terrimp_view_destroy(yardstick);
+        land_free(&one), land_free(&nine);
+    }
+    CHECK(faults == 0 && misfits == 0 && offsets > 10);
+    CHECK(other * 1000 <= seen && seen > 100000);
+}
+
+/* A flight from the field on and the same some periods away: the same commands. Pictures live on
+   where it crosses the seam. */
+static void views_that_wrap_repeat_after_a_period(void)
+{
+    static order_host h[2];
+    static land one, nine;
+    int turn, i, k, at_seam = 0, seams = 0, impostors = 0;
+    for (turn = 0; turn < 6; turn++) {
+        terrimp_view *views[2] = {NULL, NULL};
+        terrimp_view_desc d;
+        order_tile(&one, &nine, turn);
+        if (!land_build(&one))
+            return;
+        memset(&d, 0, sizeof d);
+        d.sorted = 1;
+        d.wrap_tiles = 5;
+        d.ground_tolerance_px = 0.1f;
+        d.costs.capture = 5.0f;
+        d.costs.triangle = 4.0f;
+        d.costs.ground_px = d.costs.impostor_px = 0.02f;
+        d.mode = turn % 3 ? TERRIMP_MODE_AUTO : TERRIMP_MODE_GEOMIP;
+        for (k = 0; k < 2; k++) {
+            CHECK(terrimp_view_create(one.terrain, &d, NULL, &views[k]) == TERRIMP_OK);
+            h[k].l = &one;
+            h[k].hash = 1u;
+            h[k].periods = 5 * k;
+        }
+        for (i = 0; i < 120; i++) {
+            for (k = 0; k < 2; k++) {
+                const terrimp_heightfield *f = &one.desc.field;
+                terrimp_callbacks draw = order_callbacks(&h[k]);
+                terrimp_camera camera;
+                float period[2];
+                memset(&camera, 0, sizeof camera);
+                period[0] = (float)(f->width - 1u) * f->spacing_x;
+                period[1] = (float)(f->depth - 1u) * f->spacing_z;
+                camera.eye[0] = 8.0f + 0.25f * (float)i + (float)h[k].periods * period[0];
+                camera.eye[2] = 3.0f - 0.5f * (float)i + (float)h[k].periods * period[1];
+                camera.eye[1] = 40.0f;
+                camera.forward[0] = turn % 2 ? 1.0f : -1.0f, camera.forward[1] = -0.5f;
+                camera.forward[2] = 1.0f;
+                camera.width_px = 640, camera.height_px = 480;
+                camera.z_near = 0.05f, camera.z_far = 200.0f;
+                order_camera(&h[k], &camera);
+                CHECK(terrimp_view_update(views[k], &camera) == TERRIMP_OK);
+                CHECK(terrimp_view_render(views[k], &draw) == TERRIMP_OK);
+                if (k == 0 && i > 20 && turn % 3 &&
+                    floorf(camera.eye[2] / period[1]) !=
+                        floorf((camera.eye[2] + 0.5f) / period[1])) {
+                    seams++;
+                    at_seam += h[k].captures_now;
+                }
+                impostors += h[k].impostors_now;
+            }
+            CHECK(h[0].hash == h[1].hash);
+        }
+        terrimp_view_destroy(views[0]), terrimp_view_destroy(views[1]);
+        land_free(&one), free(nine.samples);
+    }
+    CHECK(seams > 3 && impostors > 1000 && at_seam * 5 < seams * impostors / (2 * 4 * 120));
+}
+
+/* ---- the pace of views ---- */
+
+static void pace_capture(void *user, const terrimp_capture_command *c) { (void)user, (void)c; }
+static void pace_ground(void *user, const terrimp_ground_command *c) { (void)user, (void)c; }
+static void pace_impostor(void *user, const terrimp_impostor_command *c) { (void)user, (void)c; }
+
+static int pace_compare(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* What the frames of a flight that looks round cost, and how far the tolerance goes in a frame;
+   then the eye rests. Returns 99 % over median. */
+static float pace_fly(const land *l, terrimp_view_desc *d, float *median, float *mean,
+                      float *most, int *rests)
+{
+    enum { FRAMES = 400 };
+    static float costs[FRAMES];
+    terrimp_view *view = NULL;
+    int i;
+    float tolerance = 0.0f;
+    CHECK(terrimp_view_create(l->terrain, d, NULL, &view) == TERRIMP_OK);
+    *rests = 1;
+    for (i = 0; i < 40 + FRAMES + 200; i++) {
+        float t = i < 40 + FRAMES ? 0.01f * (float)i : 0.01f * (float)(40 + FRAMES);
+        terrimp_camera camera;
+        terrimp_callbacks draw;
+        terrimp_stats stats;
+        memset(&draw, 0, sizeof draw);
+        draw.begin_capture = draw.end_capture = pace_capture;
+        draw.draw_ground = pace_ground, draw.draw_impostor = pace_impostor;
+        memset(&camera, 0, sizeof camera);
+        camera.eye[0] = l->info.box.min[0] + 20.0f + 25.0f * t;
+        camera.eye[2] = l->info.box.min[2] + 60.0f + 12.0f * sinf(t);
+        camera.eye[1] = l->info.box.max[1] + 6.0f + 4.0f * sinf(3.0f * t);
+        camera.forward[0] = 1.0f + cosf(2.0f * t), camera.forward[2] = sinf(2.0f * t);
+        camera.forward[1] = -0.3f - 0.2f * cosf(1.3f * t);
+        camera.width_px = 640, camera.height_px = 480;
+        camera.z_near = 0.5f, camera.z_far = 900.0f;
+        CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(view, &stats) == TERRIMP_OK);
+        CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
+        if (i >= 40 && i < 40 + FRAMES)
+            costs[i - 40] = stats.cost;
+        if (i > 40 + FRAMES + 150)
+            *rests &= fabsf(stats.ground_tolerance_px - tolerance) <= 0.0f;
+        tolerance = stats.ground_tolerance_px;
+    }
+    terrimp_view_destroy(view);
+    qsort(costs, FRAMES, sizeof *costs, pace_compare);
+    *median = costs[FRAMES / 2];
+    for (i = 0, *mean = 0.0f; i < FRAMES; i++)
+        *mean += costs[i] / (float)FRAMES;
+    *most = costs[FRAMES - 1];
+    return costs[FRAMES * 99 / 100] / *median;
+}
+
+static void views_keep_to_their_cost(void)
+{
+    static land l;
+    int mode, turn;
+    for (turn = 0; turn < 2; turn++)
+        for (mode = TERRIMP_MODE_GEOMIP; mode <= TERRIMP_MODE_AUTO; mode += 2) {
+            terrimp_view_desc d;
+            float median, mean, most, least, limited, free_ratio, ratio;
+            int rests;
+            land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
+            l.desc.field.height_scale = 0.125f;
+            l.desc.chunk_quads = turn ? 8 : 16;
+            if (!land_build(&l))
+                return;
+            memset(&d, 0, sizeof d);
+            d.mode = mode;
+            d.ground_tolerance_px = 0.25f;
+            d.costs.capture = 100.0f;
+            free_ratio = pace_fly(&l, &d, &median, &mean, &most, &rests);
+            d.max_cost = 0.9f * mean;
+            ratio = pace_fly(&l, &d, &least, &limited, &most, &rests);
+            /* A picture is made in pieces of whole nodes, which some frames have no room for. */
+            if (mode == TERRIMP_MODE_AUTO)
+                CHECK(ratio < 0.5f * free_ratio && limited < 1.02f * d.max_cost);
+            else
+                CHECK(ratio <= 1.2f && most <= 1.05f * d.max_cost && rests);
+            CHECK(median > d.max_cost * 0.5f && least > 0.8f * d.max_cost);
+            land_free(&l);
+        }
+}
+
+static void views_without_end_or_of_a_cost_refuse_bad_input(void)
+{
+    static const uint32_t tiles[] = {1, 2, 4, 16, 17};
+    static land one, nine;
+    terrimp_hider hider;
+    terrimp_view_desc d, out;
+    terrimp_view *view = NULL;
+    uint32_t i;
+    order_tile(&one, &nine, 1);
+    if (!land_build(&one))
+        return;
+    memset(&d, 0, sizeof d);
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_OK && out.wrap_tiles == 3);
+    CHECK(out.max_ground == 9u * land_chunks(&one) && !(out.max_cost > 0.0f));
+    CHECK(terrimp_view_create(one.terrain, &d, NULL, &view) == TERRIMP_OK);
+    d.wrap_tiles = 5;
+    CHECK(terrimp_view_set(view, &d) == TERRIMP_E_RANGE);
+    terrimp_view_destroy(view);
+    for (i = 0; i < 5u; i++) {
+        d.wrap_tiles = tiles[i];
+        CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+        CHECK(terrimp_view_bytes(one.terrain, &d) == 0);
+    }
+    memset(&d, 0, sizeof d);
+    memset(&hider, 0, sizeof hider);
+    d.hider = &hider;
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    d.hider = NULL;
+    d.max_cost = -1.0f;
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    d.max_cost = not_a_number();
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_NOT_FINITE);
+    land_free(&one), land_free(&nine);
+    order_tile(&one, &nine, 1);
+    one.desc.field.width -= 2u; /* no multiple of a chunk */
+    if (!land_build(&one))
+        return;
+    memset(&d, 0, sizeof d);
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    land_free(&one), land_free(&nine);
+    CHECK(terrimp_view_pace(100.0f, 10.0f, 10.2f) <= 100.0f);
+    CHECK(terrimp_view_pace(100.0f, 20.0f, 10.0f) <= 95.1f);
+    CHECK(terrimp_view_pace(100.0f, 5.0f, 10.0f) >= 101.9f);
+    CHECK(terrimp_view_pace(100.0f, 0.0f, 10.0f) >= 100.0f);
+    CHECK(terrimp_view_pace(100.0f, not_a_number(), 10.0f) >= 100.0f);
+    CHECK(terrimp_view_pace(-3.0f, 5.0f, 10.0f) <= -3.0f);
 }
 
 static int order_compare(const void *a, const void *b)
@@ -1449,6 +1853,10 @@ static void sorted_tests(void)
     RUN(sorted_needs_no_depth_buffer);
     RUN(views_in_painters_order_need_no_depth_buffer);
     RUN(pictures_are_made_in_painters_order);
+    RUN(views_keep_to_their_cost);
+    RUN(views_without_end_or_of_a_cost_refuse_bad_input);
+    RUN(views_that_wrap_show_what_nine_terrains_show);
+    RUN(views_that_wrap_repeat_after_a_period);
     RUN(painters_order_has_the_triangles_of_the_pattern);
     RUN(painters_order_refuses_bad_input);
     RUN(sorted_needs_no_depth_buffer_over_mountains);

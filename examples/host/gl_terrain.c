@@ -64,6 +64,33 @@ const char gl_morphing_vertex[] = VERTEX_HEAD
     "}\n"                                               \
     "void main() { colour = vec4(ground(), 1.0); }\n"
 
+/* Ground with normals: `lit` is the light on it. Pictures that are lit when they are drawn keep
+   what it would be given. */
+static const char lit_head[] =
+    "uniform vec3 sun, sun_colour, sky_colour;\n"
+    "vec3 lit(vec3 c, vec2 code) {\n"
+    "    vec2 e = 2.0 * code - 1.0;\n"
+    "    float y = 1.0 - max(abs(e.x), abs(e.y));\n"
+    "    float facing = dot(vec3(e, y), sun) * inversesqrt(0.5 * dot(e, e) + y * y);\n"
+    "    return c * (sky_colour + sun_colour * max(facing, 0.0));\n"
+    "}\n";
+
+static const char lit_main[] =
+    "uniform sampler2D normals;\n"
+    "#ifdef RELIT\n"
+    "layout(location = 1) out vec4 code;\n"
+    "#endif\n"
+    "void main() {\n"
+    "    vec3 c = shade(uv, place);\n"
+    "    vec2 n = texture(normals, uv).rg;\n"
+    "#ifdef RELIT\n"
+    "    code = vec4(n, 0.0, 1.0);\n"
+    "    if (on_screen == 0.0) { colour = vec4(c, 1.0); return; }\n"
+    "#endif\n"
+    "    c = lit(c, n);\n"
+    "    colour = vec4(on_screen > 0.0 ? shadow(c, place) : c, 1.0);\n"
+    "}\n";
+
 static const char fragment_head[] = FRAGMENT_HEAD, lightmap_alone[] = LIGHTMAP_ALONE,
                   ground_main[] = GROUND_MAIN;
 
@@ -83,21 +110,11 @@ static const char impostor_vertex[] = VERTEX_HEAD
     "}\n";
 
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
-   them; the division brings them back. Of a picture in two parts each keeps to its own depths. */
+   them; the division brings them back. Of a picture in two parts each keeps to its own depths. With
+   EXACT it has the depth of what it shows, which its capture left in the atlas; with RELIT it is
+   lit as the ground is. */
 static const char impostor_main[] =
-    "uniform sampler2D atlas;\n"
-    "uniform float alpha;\n"
-    "in vec4 strq;\n" GL_THRESHOLD
-    "void main() {\n"
-    "    if (alpha < 1.0 && threshold() >= alpha) discard;\n"
-    "    vec4 c = textureProj(atlas, strq.xyw);\n"
-    "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
-    "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
-    "}\n";
-
-/* The same with the depth of what the picture shows, which its capture left in the atlas. */
-static const char exact_main[] =
-    "uniform sampler2D atlas, atlas_depth;\n"
+    "uniform sampler2D atlas, atlas_depth, atlas_normals;\n"
     "uniform float alpha;\n"
     "uniform mat4 depth_matrix;\n"
     "in vec4 strq;\n" GL_THRESHOLD
@@ -106,9 +123,15 @@ static const char exact_main[] =
     "    vec2 st = strq.xy / strq.w;\n"
     "    vec4 c = texture(atlas, st);\n"
     "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
+    "    c.rgb /= c.a;\n"
+    "#ifdef EXACT\n"
     "    vec4 at = depth_matrix * vec4(st, texture(atlas_depth, st).r, 1.0);\n"
     "    gl_FragDepth = 0.5 * at.z / at.w + 0.5;\n"
-    "    colour = vec4(shadow(c.rgb / c.a, place), 1.0);\n"
+    "#endif\n"
+    "#ifdef RELIT\n"
+    "    c.rgb = lit(c.rgb, texture(atlas_normals, st).rg / c.a);\n"
+    "#endif\n"
+    "    colour = vec4(shadow(c.rgb, place), 1.0);\n"
     "}\n";
 
 const char gl_line_fragment[] = GL_SHADER_HEAD
@@ -159,6 +182,9 @@ static gl_program make_program(const char *vertex_source, const char *const *par
     p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
     p.depth_matrix = glGetUniformLocation(p.id, "depth_matrix");
+    p.sun = glGetUniformLocation(p.id, "sun");
+    p.sun_colour = glGetUniformLocation(p.id, "sun_colour");
+    p.sky_colour = glGetUniformLocation(p.id, "sky_colour");
     p.picture_eye = glGetUniformLocation(p.id, "picture_eye");
     p.tint = glGetUniformLocation(p.id, "tint");
     p.on_screen = glGetUniformLocation(p.id, "on_screen");
@@ -174,13 +200,19 @@ gl_program gl_program_make(const char *vertex_source, const char *fragment_sourc
 static gl_program make_shaded(const gl_terrain *g, const char *vertex_source,
                               const char *main_source)
 {
-    const char *parts[3];
+    const char *parts[6];
     gl_program p;
     parts[0] = fragment_head;
     parts[1] = g->shading;
-    parts[2] = main_source;
-    p = make_program(vertex_source, parts, 3);
+    parts[2] = g->normals ? lit_head : "";
+    parts[3] = g->exact_depth ? "#define EXACT\n" : "";
+    parts[4] = g->relit ? "#define RELIT\n" : "";
+    parts[5] = main_source;
+    p = make_program(vertex_source, parts, 6);
     glUseProgram(p.id);
+    glUniform1i(glGetUniformLocation(p.id, "atlas_depth"), GL_DEPTH_UNIT);
+    glUniform1i(glGetUniformLocation(p.id, "normals"), GL_NORMAL_UNIT);
+    glUniform1i(glGetUniformLocation(p.id, "atlas_normals"), GL_ATLAS_NORMAL_UNIT);
     glUniform4fv(p.field, 1, g->field);
     return p;
 }
@@ -411,7 +443,7 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
         return "no memory for the morph weights";
     terrimp_terrain_get_info(g->terrain, &info);
     terrimp_geomip_fill_weights(info.chunk_quads, weights);
-    g->morphing = make_shaded(g, gl_morphing_vertex, ground_main);
+    g->morphing = make_shaded(g, gl_morphing_vertex, g->normals ? lit_main : ground_main);
     glGenVertexArrays(1, &g->morphing_array);
     glBindVertexArray(g->morphing_array);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, p->indices);
@@ -511,6 +543,15 @@ static int make_atlas(gl_terrain *g, uint32_t i)
     else
         glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
                                   g->atlas_depth);
+    if (g->relit) {
+        static const GLenum both[2] = { GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1 };
+        g->atlas_normals[i] = make_texture(GL_LINEAR, GL_LINEAR);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RG8, g->atlas_size, g->atlas_size, 0, GL_RG,
+                     GL_UNSIGNED_BYTE, NULL);
+        glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, GL_TEXTURE_2D,
+                               g->atlas_normals[i], 0);
+        glDrawBuffers(2, both);
+    }
     glDisable(GL_SCISSOR_TEST);
     glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -538,12 +579,19 @@ static const char *fill(gl_terrain *g, const gl_terrain_desc *desc,
         return "the atlas is larger than OpenGL's largest texture";
     if (!make_lightmap(g, field, desc->lightmap, (uint32_t)limit))
         return "no memory for the lightmap";
+    if (desc->normals && (field->width > (uint32_t)limit || field->depth > (uint32_t)limit))
+        return "the normals are more than OpenGL's largest texture holds";
+    if (desc->normals) {
+        g->normals = make_texture(GL_LINEAR_MIPMAP_LINEAR, GL_LINEAR);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RG8, (GLsizei)field->width, (GLsizei)field->depth, 0,
+                     GL_RG, GL_UNSIGNED_BYTE, desc->normals);
+        glGenerateMipmap(GL_TEXTURE_2D);
+    }
     g->atlas_size = (GLsizei)desc->atlas_size;
     if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
-    g->ground = make_shaded(g, gl_ground_vertex, ground_main);
-    g->impostor = make_shaded(g, impostor_vertex, g->exact_depth ? exact_main : impostor_main);
-    glUniform1i(glGetUniformLocation(g->impostor.id, "atlas_depth"), GL_DEPTH_UNIT);
+    g->ground = make_shaded(g, gl_ground_vertex, g->normals ? lit_main : ground_main);
+    g->impostor = make_shaded(g, impostor_vertex, impostor_main);
     g->line = gl_program_make(gl_ground_vertex, gl_line_fragment);
     if (!g->ground.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
@@ -558,6 +606,7 @@ const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc)
     g->frame = desc->frame;
     g->terrain = desc->terrain;
     g->exact_depth = desc->exact_depth;
+    g->relit = desc->relit && desc->normals;
     g->shading = desc->shading ? desc->shading : lightmap_alone;
     g->target = GL_TO_NOTHING;
     if (terrimp_heightfield_resolve(desc->field, &resolved) != TERRIMP_OK)
@@ -582,6 +631,8 @@ void gl_terrain_close(gl_terrain *g)
     glDeleteFramebuffers(GL_ATLASES, g->atlas_frame);
     glDeleteRenderbuffers(1, &g->atlas_depth);
     glDeleteTextures(GL_ATLASES, g->atlas_depths);
+    glDeleteTextures(GL_ATLASES, g->atlas_normals);
+    glDeleteTextures(1, &g->normals);
     glDeleteProgram(g->morphing.id);
     free(g->xyz);
     free(g->indices);
@@ -743,6 +794,13 @@ static void draw_mesh(gl_terrain *g, GLuint texture, uint32_t slot, uint32_t ind
 
 static void draw_mesh_over(gl_terrain *g, const terrimp_impostor_command *c, uint32_t slot);
 
+static void bind_to(GLenum unit, GLuint texture)
+{
+    glActiveTexture(GL_TEXTURE0 + unit);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glActiveTexture(GL_TEXTURE0);
+}
+
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     gl_terrain *g = (gl_terrain *)user;
@@ -762,10 +820,10 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         float matrix[16];
         multiply(g->camera_matrix, c->place_matrix, matrix);
         glUniformMatrix4fv(p->depth_matrix, 1, GL_FALSE, matrix);
-        glActiveTexture(GL_TEXTURE0 + GL_DEPTH_UNIT);
-        glBindTexture(GL_TEXTURE_2D, g->atlas_depths[c->atlas]);
-        glActiveTexture(GL_TEXTURE0);
+        bind_to(GL_DEPTH_UNIT, g->atlas_depths[c->atlas]);
     }
+    if (g->relit)
+        bind_to(GL_ATLAS_NORMAL_UNIT, g->atlas_normals[c->atlas]);
     glUniform3fv(p->picture_eye, 1, c->eye);
     glDisable(GL_CULL_FACE);
     draw_mesh(g, g->atlas[c->atlas], slot, c->index_count);
@@ -860,6 +918,26 @@ int gl_terrain_relight(gl_terrain *g, const terrimp_heightfield *field, const ui
 }
 
 /* ---- A frame ------------------------------------------------------------ */
+
+static void use_light(const gl_terrain *g, const gl_program *p)
+{
+    if (!p->id || !g->normals)
+        return;
+    glUseProgram(p->id);
+    glUniform3f(p->sun, 0.5f * (g->light[0][0] + g->light[0][2]),
+                0.5f * (g->light[0][0] - g->light[0][2]), g->light[0][1]);
+    glUniform3fv(p->sun_colour, 1, g->light[1]);
+    glUniform3fv(p->sky_colour, 1, g->light[2]);
+}
+
+void gl_terrain_light(gl_terrain *g, const float light[3][3])
+{
+    memcpy(g->light, light, sizeof g->light);
+    use_light(g, &g->ground);
+    use_light(g, &g->morphing);
+    use_light(g, &g->impostor);
+    bind_to(GL_NORMAL_UNIT, g->normals);
+}
 
 terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,
                                 const uint8_t sky[3])

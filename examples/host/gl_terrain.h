@@ -14,6 +14,7 @@ typedef struct gl_program {
     GLint morph, side, side_coarse;  /* morphing ground */
     GLint texture_matrix, picture_eye; /* impostors */
     GLint depth_matrix;              /* impostors with exact depth */
+    GLint sun, sun_colour, sky_colour; /* ground with normals */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
     GLint on_screen;                 /* terrain: 0 in a capture, 1 on the screen */
 } gl_program;
@@ -44,7 +45,8 @@ void gl_relative_matrix(const float view[16], const float projection[16], float 
 /* Enables an attribute of the bound vertex array and points it into the bound buffer. */
 void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset);
 
-enum { GL_DEPTH_UNIT = 8 }; /* the texture unit of the depth of atlases */
+/* Texture units: of the depth of atlases, of the ground's normals, and of those in atlases. */
+enum { GL_DEPTH_UNIT = 8, GL_NORMAL_UNIT, GL_ATLAS_NORMAL_UNIT };
 
 enum { GL_TO_FRAME = -1, GL_TO_NOTHING = -2 };
 
@@ -92,6 +94,10 @@ typedef struct gl_terrain_desc {
     size_t vertex_bytes;              /* of graphics memory, for ground [Default 0 -> 400 MiB] */
     size_t mesh_bytes;                /* and for coarse meshes [Default 0 -> 16 MiB] */
     int exact_depth;                  /* as in the settings of the view */
+    const uint8_t *normals;           /* [depth][width][2] of terrimp_normal_encode: the ground is
+                                         lit by gl_terrain_light. NULL: as the lightmap is */
+    int relit;                        /* with normals: pictures keep colours without light, and
+                                         normals; they are lit when they are drawn */
     const char *shading;              /* GLSL that defines, beside `uniform sampler2D lightmap`:
                                          vec3 shade(vec2 uv, vec3 position)
                                            the colour of the ground, which pictures keep
@@ -112,12 +118,14 @@ typedef struct gl_terrain {
     float *xyz;                      /* of one node, to be sent, like the next two */
     uint16_t *indices;
     terrimp_geomip_vertex *morph;
-    GLuint lightmap;
+    GLuint lightmap, normals;
+    float light[3][3];               /* way to the sun, its colour, that of the sky */
     GLsizei atlas_size;
     GLuint atlas[GL_ATLASES], atlas_frame[GL_ATLASES]; /* made when they are first used */
     GLuint atlas_depth;              /* one depth buffer serves all; or, for exact depth, */
     GLuint atlas_depths[GL_ATLASES]; /* ... each has a texture of its own */
-    int exact_depth;
+    GLuint atlas_normals[GL_ATLASES]; /* of pictures that are lit when drawn */
+    int exact_depth, relit;
     gl_program ground, morphing, impostor, line;
     float camera_matrix[16], camera_eye[3];
     float field[4];                  /* x, z scale and offset of the lightmap coordinates */
@@ -144,6 +152,10 @@ terrimp_result gl_terrain_refill(gl_terrain *g, uint32_t node);
 /* Another lightmap of the same field. Returns 0 when memory runs out. Pictures keep the old light
    until terrimp_view_invalidate. */
 int gl_terrain_relight(gl_terrain *g, const terrimp_heightfield *field, const uint8_t *lightmap);
+
+/* With normals: the light of the frames that follow: [0] the unit vector towards the sun, [1] its
+   colour on ground that faces it, [2] what the sky gives all ground. */
+void gl_terrain_light(gl_terrain *g, const float light[3][3]);
 
 /* Starts a frame: clears it to the sky's colour and takes the camera's matrices. */
 terrimp_result gl_terrain_begin(gl_terrain *g, const terrimp_camera *camera,

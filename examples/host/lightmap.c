@@ -15,7 +15,8 @@ static const float north_west[3] = { -0.485f, 0.640f, -0.596f };
 /* Three rows of heights around the row that is baked, and the edge of the shadow over it. */
 typedef struct sweep {
     const terrimp_heightfield *field;
-    const float *sun;
+    const float *sun;              /* NULL: no light, but normals */
+    uint8_t *normals;              /* of the next texel */
     float low, high;               /* of all heights [wu] */
     const float *north, *here, *south; /* heights of rows z - 1, z, z + 1 */
     float *shadow, *next_shadow;   /* height of the shadow's edge over rows z and z + 1 */
@@ -72,17 +73,27 @@ static void slopes(const sweep *s, uint32_t x, float *along_x, float *along_z)
     *along_z = (s->south[x] - s->north[x]) / ((float)rows * s->field->spacing_z);
 }
 
-static void bake_texel(const sweep *s, uint32_t x, uint8_t *rgb)
+static void bake_texel(sweep *s, uint32_t x, uint8_t *rgb)
 {
     float along_x, along_z, upward, facing, shade, light, colour[3];
     float height = (s->here[x] - s->low) / (s->high - s->low);
     int i;
     slopes(s, x, &along_x, &along_z);
     upward = 1.0f / sqrtf(1.0f + along_x * along_x + along_z * along_z);
-    facing = (s->sun[1] - along_x * s->sun[0] - along_z * s->sun[2]) * upward;
-    shade = ramp(0.0f, s->softness, s->shadow[x] - s->here[x]);
-    light = AMBIENT + DIFFUSE * (facing > 0.0f ? facing : 0.0f) * (1.0f - SHADOW_DEPTH * shade);
     material(height, upward, colour);
+    if (s->sun) {
+        facing = (s->sun[1] - along_x * s->sun[0] - along_z * s->sun[2]) * upward;
+        shade = ramp(0.0f, s->softness, s->shadow[x] - s->here[x]);
+        light = AMBIENT + DIFFUSE * (facing > 0.0f ? facing : 0.0f) * (1.0f - SHADOW_DEPTH * shade);
+    } else {
+        float normal[3];
+        normal[0] = -along_x;
+        normal[1] = 1.0f;
+        normal[2] = -along_z;
+        terrimp_normal_encode(normal, s->normals);
+        s->normals += 2;
+        light = 1.0f;
+    }
     for (i = 0; i < 3; i++)
         rgb[i] = to_byte(colour[i] * light);
 }
@@ -138,7 +149,8 @@ static int bake_rows(sweep *s, uint8_t *rgb)
         s->south = row_of(s, z + 1 < depth ? z + 1 : z);
         for (x = 0; x < width; x++, rgb += 3)
             bake_texel(s, x, rgb);
-        sweep_shadow(s);
+        if (s->sun)
+            sweep_shadow(s);
     }
     return 1;
 }
@@ -163,17 +175,13 @@ static int sweep_begin(sweep *s, const terrimp_heightfield *field)
     return 1;
 }
 
-uint8_t *lightmap_bake(const terrimp_heightfield *field)
-{
-    return lightmap_bake_under(field, north_west);
-}
-
-uint8_t *lightmap_bake_under(const terrimp_heightfield *field, const float sun[3])
+static uint8_t *bake(const terrimp_heightfield *field, const float *sun, uint8_t *normals)
 {
     terrimp_heightfield resolved;
     uint8_t *rgb;
     sweep s;
     s.sun = sun;
+    s.normals = normals;
     if (terrimp_heightfield_resolve(field, &resolved) != TERRIMP_OK || !sweep_begin(&s, &resolved))
         return NULL;
     rgb = malloc((size_t)field->width * field->depth * 3);
@@ -182,5 +190,28 @@ uint8_t *lightmap_bake_under(const terrimp_heightfield *field, const float sun[3
         rgb = NULL;
     }
     free(s.memory);
+    return rgb;
+}
+
+uint8_t *lightmap_bake(const terrimp_heightfield *field)
+{
+    return bake(field, north_west, NULL);
+}
+
+uint8_t *lightmap_bake_under(const terrimp_heightfield *field, const float sun[3])
+{
+    return bake(field, sun, NULL);
+}
+
+uint8_t *lightmap_bake_unlit(const terrimp_heightfield *field, uint8_t **normals)
+{
+    uint8_t *rgb = NULL;
+    *normals = malloc((size_t)field->width * field->depth * 2);
+    if (*normals)
+        rgb = bake(field, NULL, *normals);
+    if (!rgb) {
+        free(*normals);
+        *normals = NULL;
+    }
     return rgb;
 }

@@ -15,4 +15,8 @@ uint8_t *lightmap_bake(const terrimp_heightfield *field);
 /* The same under another sun: the unit vector towards it. [Limits: y > 0, z < 0] */
 uint8_t *lightmap_bake_under(const terrimp_heightfield *field, const float sun[3]);
 
+/* The same without light, for ground that is lit when it is drawn: colours as they are; and
+   *normals[depth][width][2], to be freed too, the codes of terrimp_normal_encode. */
+uint8_t *lightmap_bake_unlit(const terrimp_heightfield *field, uint8_t **normals);
+
 #endif

@@ -86,6 +86,8 @@ compilers clang clang++
 
 for compiler in gcc clang; do
     if command -v $compiler > /dev/null; then
+        check "$compiler: Sorted without floats keeps its laws" \
+            builds_and_runs "$compiler -O1 -std=c99 -Wno-unused-function" fixed.c
         check "$compiler -ffast-math: NaN and infinity are found" \
             builds_and_runs "$compiler -O2 -ffast-math" fast_math.c
     fi
