@@ -79,7 +79,7 @@ stream_flies()
 {
     build/stream $work/whole.pages --frames 60 --latency 5 --slots 60 > $work/stream.txt &&
         grep "frames lacked a page" $work/stream.txt &&
-        awk '/slots full/ { n = $6 } END { exit !(n > 4) }' $work/stream.txt
+        awk '/slots full/ { n = $7 } END { exit !(n > 4) }' $work/stream.txt
 }
 
 # ---- bake: a picture file as a DEM, to a file and to C source that holds the same bytes

@@ -28,6 +28,9 @@ for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24; do
     seed functions $i "$(noise $i 400)"
     seed terrain $i "$(noise $((100 + i)) 240)"
 done
+for i in 1 2 3 4 5 6 7 8; do
+    seed pages $i "$(noise $((700 + i)) $((200 * i)))"
+done
 # Each call of tests/fuzz_functions.c again and again, after a field, a camera and a box.
 call=0
 while [ $call -lt 17 ]; do
