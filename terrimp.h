@@ -7022,11 +7022,6 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
 
 /* ---- edits ---- */
 
-static uint32_t terrimpi_terrain_stale_words(const terrimp_terrain *t)
-{
-    return t->tree.node_count / 32u + 1u;
-}
-
 static int terrimpi_terrain_stale(const terrimp_terrain *t, uint32_t node)
 {
     return t->stale && (t->stale[node / 32u] >> node % 32u & 1u) != 0;
@@ -16613,6 +16608,11 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
 
 /* ---- all nodes ---- */
 
+static uint32_t terrimpi_build_stale_words(const terrimp_terrain *t)
+{
+    return t->tree.node_count / 32u + 1u;
+}
+
 TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
 {
     terrimp_terrain t;
@@ -16623,7 +16623,7 @@ TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
     arrays = terrimpi_terrain_layout(&t, NULL);
     terrimpi_place(&at, 1, sizeof t, &ok);
     at = terrimpi_add(at, arrays, &ok);
-    at = terrimpi_add(at, terrimpi_terrain_stale_words(&t) * sizeof *t.stale, &ok);
+    at = terrimpi_add(at, terrimpi_build_stale_words(&t) * sizeof *t.stale, &ok);
     return ok && arrays ? at : 0;
 }
 
@@ -16905,7 +16905,7 @@ TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint
 static int terrimpi_build_any_stale(const terrimp_terrain *t)
 {
     uint32_t i, any = 0;
-    for (i = 0; t->stale && i < terrimpi_terrain_stale_words(t); i++)
+    for (i = 0; t->stale && i < terrimpi_build_stale_words(t); i++)
         any |= t->stale[i];
     return any != 0;
 }
