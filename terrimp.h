@@ -7024,6 +7024,7 @@ TERRIMP_API terrimp_result terrimp_terrain_get_mesh(const terrimp_terrain *terra
 
 static int terrimpi_terrain_stale(const terrimp_terrain *t, uint32_t node)
 {
+    node = terrimpi_real_node(t, node);
     return t->stale && (t->stale[node / 32u] >> node % 32u & 1u) != 0;
 }
 
@@ -10046,7 +10047,7 @@ static int terrimpi_cache_shows(const terrimpi_cache_picture *picture, uint32_t 
    of the mean square, which 95 of 100 samples keep to. */
 static float terrimpi_view_mesh_error(const terrimpi_frame *f, uint32_t node)
 {
-    const terrimpi_mesh *mesh = &f->terrain->meshes[node];
+    const terrimpi_mesh *mesh = terrimpi_mesh_of(f->terrain, node);
     return f->desc->ground_rule == TERRIMP_GEOMIP_PICTURE
                ? terrimpi_min(mesh->error, 2.0f * mesh->error_rms)
                : mesh->error;
@@ -11958,9 +11959,7 @@ static int terrimpi_view_over(const terrimpi_frame *f)
     result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
     if (result == TERRIMP_E_MISS)
         return terrimpi_view_inside(f, &box, eye);
-    return result ==
-               TERRIMP_OK &&
-           eye[1] - f->camera.reach >= ground;
+    return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
 }
 
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
