@@ -7395,7 +7395,7 @@ TERRIMP_API terrimp_result terrimp_terrain_open(const terrimp_heightfield *field
 
 #define TERRIMPI_WALL_TOPS 4u      /* along a node's side: squares of which the height is kept */
 #define TERRIMPI_WALL_FINE 20.0f   /* quads of distance for each quad between walls */
-#define TERRIMPI_STAND_CLIPPED 16u /* [quads] that z_near may clip at most: else all is seen */
+#define TERRIMPI_STAND_CLIPPED 16.0f /* [quads] that z_near may clip at most: else all is seen */
 #define TERRIMPI_HORIZON_NONE -1e30f
 #define TERRIMPI_HORIZON_ALL 1e30f
 #define TERRIMPI_HORIZON_CLOSEST 0.25f /* [quads] of a wall: closer by, places are too rough */
@@ -7417,11 +7417,11 @@ static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *
     float top = TERRIMPI_HORIZON_NONE;
     for (k = 0; k < 2u; k++) {
         uint32_t last = terrimpi_stand_last(tree, k) - 1u;
-        uint32_t wide = terrimpi_ceil_u32(terrimpi_min(reach[k] + s->rounding, 1e6f));
+        float wide = reach[k] + s->rounding, beyond = terrimpi_max(wide - s->within[k], 0.0f);
         if (wide > TERRIMPI_STAND_CLIPPED)
             return TERRIMPI_HORIZON_ALL;
-        from[k] = s->quad[k] - terrimpi_min_u32(wide, s->quad[k]);
-        to[k] = terrimpi_min_u32(s->quad[k] + wide, last);
+        from[k] = s->quad[k] - terrimpi_min_u32(terrimpi_ceil_u32(beyond), s->quad[k]);
+        to[k] = terrimpi_min_u32(s->quad[k] + (uint32_t)(s->within[k] + wide), last);
     }
     for (j = from[1]; j <= to[1]; j++)
         for (i = from[0]; i <= to[0]; i++) {

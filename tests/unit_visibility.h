@@ -585,6 +585,40 @@ static void visibility_of_a_wall(void)
     free(walls);
 }
 
+/* Who walks over steep ground in large quads has a horizon: only what z_near may really clip, which
+   is closer than that, can take it away. */
+static void walkers_on_steep_ground_have_a_horizon(void)
+{
+    static terrimp_horizon h;
+    uint32_t round, eye, k, blind = 0;
+    for (round = 0; round < 20; round++) {
+        visible_scene s;
+        visible_make(&s, 70, 60, 8);
+        s.tree.field.spacing_x = s.tree.field.spacing_z = 20.0f;
+        CHECK(terrimp_horizon_init(&h, &s.tree, s.walls) == TERRIMP_OK);
+        for (eye = 0; eye < 50; eye++) {
+            terrimp_camera c = visible_camera(&s);
+            float ground = 0.0f, over;
+            int clear = terrimp_heightfield_height(&s.tree.field, c.eye[0], c.eye[2], &ground) ==
+                        TERRIMP_OK;
+            c.eye[1] = ground + 2.0f;
+            c.fov_y_rad = 1.0f;
+            c.width_px = c.height_px = 500;
+            c.z_near = 0.1f;
+            CHECK(terrimp_horizon_begin(&h, &c, 0.0f, 0.0f) == TERRIMP_OK);
+            for (k = 0; k < 9; k++) /* within 0.4 it is flat or far enough below */
+                clear = clear && terrimp_heightfield_height(
+                                     &s.tree.field, c.eye[0] + 0.4f * ((float)(k % 3u) - 1.0f),
+                                     c.eye[2] + 0.4f * ((float)(k / 3u) - 1.0f), &over) ==
+                                     TERRIMP_OK && over < c.eye[1];
+            CHECK(!clear || !h.blind);
+            blind += !clear;
+        }
+        visible_free(&s);
+    }
+    CHECK(blind < 300);
+}
+
 /* ---- in a view ---- */
 
 /* The ground nodes that a view draws. */
@@ -847,6 +881,7 @@ static void visibility_tests(void)
     RUN(culled_draws_are_behind_those_that_are_left);
     RUN(walls_are_rebuilt_where_samples_change);
     RUN(visibility_of_a_wall);
+    RUN(walkers_on_steep_ground_have_a_horizon);
     RUN(views_leave_out_what_is_hidden);
     RUN(masks_have_the_materials_that_lie_on_a_node);
     RUN(visibility_refuses_what_makes_no_sense);
