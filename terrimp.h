@@ -10442,10 +10442,11 @@ typedef struct terrimpi_region {
     uint32_t node;
     float closest;
     uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
-    uint32_t first_candidate, candidate_count; /* none: ground is all it can be */
-    float pixels;                        /* that the candidates cover, about */
+    uint32_t first_candidate;
+    uint16_t candidate_count;            /* none: ground is all it can be */
     uint8_t fits;                        /* there are some, and a camera fits round each */
     uint8_t kind;                        /* that shows it */
+    float pixels;                        /* that the candidates cover, about */
 } terrimpi_region;
 
 /* What a kind would cost a region. */
@@ -11163,7 +11164,7 @@ static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_
     region->ground_count = v->ground.draws_needed - region->first_ground;
     if (region->ground_count == 0 || v->candidate_count > v->desc.max_impostors)
         v->candidate_count = first;
-    region->candidate_count = v->candidate_count - first;
+    region->candidate_count = (uint16_t)(v->candidate_count - first);
     v->region_count += region->ground_count > 0 ? 1u : 0u;
 }
 
