@@ -10761,6 +10761,8 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     way[1] = (float)z * terrimpi_field_period(&t->desc.field, 1);
     v->frame.camera.eye[0] -= way[0];
     v->frame.camera.eye[2] -= way[1];
+    v->frame.eye[0] -= way[0];
+    v->frame.eye[2] -= way[1];
     v->outdated = 1; /* its draws are of nodes that are elsewhere now */
     terrimpi_view_cancel(v);
     if (v->open)
@@ -11458,6 +11460,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
+    float eye[3];
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
@@ -11474,6 +11477,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     memcpy(command.eye, picture->eye, sizeof command.eye);
     if (v->frame.camera.orthographic)
         terrimpi_capture_origin(v->terrain, &picture->node, command.eye);
+    memcpy(eye, command.eye, sizeof eye);
     command.eye[0] += v->frame.middle[0];
     command.eye[2] += v->frame.middle[1];
     picture->drawn_count++;
@@ -11486,7 +11490,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_impostor_place_from(command.place_matrix, command.eye, v->frame.camera.eye);
+            terrimpi_impostor_place_from(command.place_matrix, eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }

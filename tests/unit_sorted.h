@@ -486,6 +486,7 @@ static void order_draw_impostor(void *user, const terrimp_impostor_command *c)
     const float *eye;
     order_hash(h, c, offsetof(terrimp_impostor_command, eye));
     order_hash(h, c->texture_matrix, sizeof c->texture_matrix);
+    order_hash(h, c->place_matrix, sizeof c->place_matrix);
     order_hash_offset(h, c->offset);
     h->impostors_now++;
     if (c->alpha < 1.0f)
@@ -715,6 +716,7 @@ static void views_that_wrap_repeat_after_a_period(void)
         memset(&d, 0, sizeof d);
         d.sorted = 1;
         d.wrap_tiles = 5;
+        d.exact_depth = turn % 2;
         d.ground_tolerance_px = 0.1f;
         d.costs.capture = 5.0f;
         d.costs.triangle = 4.0f;
