@@ -64,6 +64,7 @@ static uint32_t check_camera_frame(scene *s, terrimp_view *view, terrimp_view *f
     terrimp_stats stats;
     uint64_t hash = 0;
     int right;
+    memset(&stats, 0, sizeof stats);
     need_ok(terrimp_view_update(view, &camera));
     need_ok(terrimp_view_get_stats(view, &stats));
     for (right = 0; right < (way == 3 ? 2 : 1); right++) {
