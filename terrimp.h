@@ -8701,9 +8701,10 @@ static int terrimpi_record_ok(const terrimpi_record *r)
 static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terrimp_terrain *t,
                                           terrimpi_pages_head *head)
 {
-    const unsigned char *lows = (const unsigned char *)header + sizeof *head;
+    const unsigned char *lows;
     uint32_t i;
     TERRIMPI_REFUSE(!header, TERRIMP_E_NULL);
+    lows = (const unsigned char *)header + sizeof *head;
     TERRIMPI_REFUSE(bytes < TERRIMP_PAGES_HEADER_BYTES, TERRIMP_E_BAKE);
     memcpy(head, header, sizeof *head);
     TERRIMPI_REFUSE(head->bake.magic == TERRIMPI_PAGES_MAGIC_SWAPPED, TERRIMP_E_ORDER);

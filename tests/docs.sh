@@ -151,7 +151,7 @@ unknown_targets()
 
 dead_links()
 {
-    for page in README.md tests/results/README.md; do
+    for page in README.md examples/README.md tests/results/README.md; do
         grep -oE '(\]\(|src=")[^)"#:]+[)"]' $page | sed 's/^](//; s/^src="//; s/[)"]$//' |
             while read -r path; do
                 [ -e "$(dirname $page)/$path" ] || echo "$page: no $path"

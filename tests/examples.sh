@@ -209,7 +209,8 @@ says_that_nothing_is_in_sight()
 # Options that README.md speaks of and flyover does not know.
 unknown_options()
 {
-    build/flyover --help | grep -oE -e '--[a-z][a-z-]+' | sort -u > $work/options
+    { build/flyover --help; cat examples/pages.c examples/stream.c; } |
+        grep -oE -e '--[a-z][a-z-]+' | sort -u > $work/options
     grep -oE -e '(^|[^-a-z])--[a-z][a-z-]+' README.md | sed 's/^[^-]//' | sort -u |
         comm -23 - $work/options
 }
@@ -254,7 +255,7 @@ if [ -x build/flyover ]; then
     check "flyover ends with a summary" says_key_value_lines
     head -c 100 Makefile > $work/short.hgt
     : > $work/empty.pgm
-    check "README.md names options that flyover has" prints_nothing unknown_options
+    check "README.md names options that the programs have" prints_nothing unknown_options
     check "flyover says which options do nothing" says_what_is_ignored
     check "flyover says when there is nothing to see" says_that_nothing_is_in_sight
     printf 'ncols 2\nnrows 2\n1 2 3' > $work/short.asc

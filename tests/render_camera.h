@@ -61,7 +61,7 @@ static uint32_t check_camera_frame(scene *s, terrimp_view *view, terrimp_view *f
                                    int frame, uint8_t *rgb, uint8_t *truth, double *least)
 {
     terrimp_camera camera = camera_of(s, way, frame);
-    terrimp_stats stats;
+    terrimp_stats stats = {0};
     uint64_t hash = 0;
     int right;
     memset(&stats, 0, sizeof stats);

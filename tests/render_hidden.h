@@ -72,8 +72,10 @@ static void check_hidden(scene *s)
                s->name, i % 2 ? "sets" : "horizon", modes[i / 2], (unsigned)c.hidden,
                (unsigned)c.different, c.likeness[0], c.likeness[1]);
         CHECK(c.hidden > (i % 2 ? 0 : 20)); /* coarse ground hides less for certain */
-        CHECK(modes[i / 2] == TERRIMP_MODE_AUTO ? c.likeness[1] > c.likeness[0] - 1.0
-                                            : c.different == 0);
+        /* AUTO makes its pictures in other frames then, from other places; from 60 dB on that is
+           rounding, and a node that shows and is not drawn costs far more */
+        CHECK(modes[i / 2] == TERRIMP_MODE_AUTO
+                  ? c.likeness[1] > fmin(c.likeness[0] - 1.0, 60.0) : c.different == 0);
     }
     free(sets.codes);
     free(walls);

