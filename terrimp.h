@@ -176,8 +176,8 @@
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 30 KB of code at -Os on
-       a Cortex-M4, 27 KB without the three options that follow it above, if its linker drops
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 39 KB of code at -Os on
+       a Cortex-M4, 36 KB without the three options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -2368,7 +2368,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void 
    Errors     E_RANGE for a rectangle outside of the limits or a height outside of the range;
               E_VOID, E_NOT_FINITE for such a sample; E_STATE before build_finish and for a terrain
               that uses a bake. Nothing has changed then
-   Cost       however large the terrain, about 0.5 ms for 16 x 16 samples */
+   Cost       of 16 x 16 samples 0.1 ms in a terrain of 1025 x 1025, 1.5 ms in one of 8193 x 8193 */
 TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
                                                 const terrimp_rect *samples);
 

@@ -541,6 +541,16 @@ static void check_touched(const land *l, const terrimp_rect *rect, const host_co
     free(nodes[1]);
 }
 
+/* A terrain of width, depth and chunk whose heights may be edited within a named range. */
+static int land_to_edit(land *l, const uint32_t size[3])
+{
+    land_prepare(l, size[0], size[1], TERRIMP_FORMAT_F32, LAND_HILLS);
+    l->desc.chunk_quads = size[2];
+    l->desc.height_low = -10.0f;
+    l->desc.height_high = 300.0f;
+    return land_build(l);
+}
+
 /* After edits a terrain is, byte for byte, the one that is built of the new samples. */
 static void rebuilt_terrains_equal_those_built_anew(void)
 {
@@ -551,11 +561,7 @@ static void rebuilt_terrains_equal_those_built_anew(void)
         int edit;
         void *scratch;
         size_t scratch_bytes, bytes;
-        land_prepare(&l, sizes[i][0], sizes[i][1], TERRIMP_FORMAT_F32, LAND_HILLS);
-        l.desc.chunk_quads = sizes[i][2];
-        l.desc.height_low = -10.0f;
-        l.desc.height_high = 300.0f;
-        if (!land_build(&l)) {
+        if (!land_to_edit(&l, sizes[i])) {
             land_free(&l);
             continue;
         }
@@ -653,11 +659,7 @@ static void edits_in_slices_end_as_what_is_built_anew(void)
         uint32_t slice, done = 0, nodes[7], most = 0;
         unsigned char *block[2];
         terrimp_terrain *anew = NULL;
-        land_prepare(&l, sizes[i][0], sizes[i][1], TERRIMP_FORMAT_F32, LAND_HILLS);
-        l.desc.chunk_quads = sizes[i][2];
-        l.desc.height_low = -10.0f;
-        l.desc.height_high = 300.0f;
-        if (!land_build(&l)) {
+        if (!land_to_edit(&l, sizes[i])) {
             land_free(&l);
             continue;
         }
