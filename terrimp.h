@@ -2295,20 +2295,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_fill_voids(const terrimp_heightfi
 
 /* --- heights and errors of the ground --- */
 
-/* Finds heights, error and rms of one node, from samples alone: different nodes may be
-   built at the same time by threads with scratch arrays of their own.
+/* Finds heights, error and rms of all nodes; parents hold what their children hold.
 
    scratch    [field.width + 2 * chunk_quads + 2]
-   Errors     at level 0 E_VOID, E_NOT_FINITE for such a sample
-   Cost       O(samples of the node) */
-TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
-                                                     float *scratch);
-
-/* Ends the building: parents hold what their children hold. */
-TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree);
-
-/* Builds all nodes and finishes.
-   Cost: O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
+   Errors     E_VOID, E_NOT_FINITE for such a sample
+   Cost       O(samples * levels); about 2.5 s for 4097 x 4097 samples in chunks of 64 */
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch);
 
 /* --- terrain --- */
@@ -3383,25 +3374,26 @@ static float terrimpi_field_sample(const terrimp_heightfield *field, uint32_t x,
     return terrimpi_field_world_height(field, terrimpi_field_raw(field, x, z));
 }
 
-/* Reads out[cols] raw values of row z from column x on; columns beyond the last repeat it. */
-static void terrimpi_field_raw_row(const terrimp_heightfield *field, uint32_t x, uint32_t z,
-                                   uint32_t cols, uint32_t stride, float *out)
+/* Reads out[cols] samples of row z from column x on, as offset + scale * raw value; columns beyond
+   the last repeat it. */
+static void terrimpi_field_read_row(const terrimp_heightfield *field, uint32_t x, uint32_t z,
+                                    uint32_t cols, uint32_t stride, float offset, float scale,
+                                    float *out)
 {
     const uint32_t last = field->width - 1u;
     const uint32_t first = x < last ? x : last;
     const uint32_t steps = (last - first) / stride;
     const uint32_t inside = steps < cols ? steps + 1u : cols;
     const void *row = terrimpi_field_row(field, z);
-    float edge;
     uint32_t c;
     /* Two loops, for the one of stride 1 turns into vector instructions. */
-#define TERRIMPI_FIELD_COPY(type)                          \
-    if (stride == 1u)                                      \
-        for (c = 0; c < inside; ++c)                       \
-            out[c] = (float)((const type *)row)[first + c]; \
-    else                                                   \
-        for (c = 0; c < inside; ++c)                       \
-            out[c] = (float)((const type *)row)[first + c * stride]
+#define TERRIMPI_FIELD_COPY(type)                                            \
+    if (stride == 1u)                                                        \
+        for (c = 0; c < inside; ++c)                                         \
+            out[c] = offset + scale * (float)((const type *)row)[first + c]; \
+    else                                                                     \
+        for (c = 0; c < inside; ++c)                                         \
+            out[c] = offset + scale * (float)((const type *)row)[first + c * stride]
 
     switch (field->format) {
     case TERRIMP_FORMAT_U8: TERRIMPI_FIELD_COPY(uint8_t); break;
@@ -3411,11 +3403,8 @@ static void terrimpi_field_raw_row(const terrimp_heightfield *field, uint32_t x,
     }
 #undef TERRIMPI_FIELD_COPY
 
-    if (inside < cols) {
-        edge = terrimpi_field_raw(field, last, z);
-        for (c = inside; c < cols; ++c)
-            out[c] = edge;
-    }
+    for (c = inside; c < cols; ++c)
+        out[c] = offset + scale * terrimpi_field_raw(field, last, z);
 }
 
 /* from + steps * stride, not beyond last. */
@@ -3429,17 +3418,12 @@ static uint32_t terrimpi_field_step(uint32_t from, uint32_t last, uint32_t steps
 static void terrimpi_field_tile(const terrimp_heightfield *field, uint32_t x, uint32_t z,
                                 uint32_t cols, uint32_t rows, uint32_t stride, float *out)
 {
-    const float scale = field->height_scale, offset = field->height_offset;
     const uint32_t last = field->depth - 1u;
-    uint32_t r, c;
+    uint32_t r;
     z = z < last ? z : last;
-    for (r = 0; r < rows; ++r) {
-        terrimpi_field_raw_row(field, x, terrimpi_field_step(z, last, r, stride), cols, stride,
-                               out);
-        for (c = 0; c < cols; ++c)
-            out[c] = offset + scale * out[c];
-        out += cols;
-    }
+    for (r = 0; r < rows; ++r, out += cols)
+        terrimpi_field_read_row(field, x, terrimpi_field_step(z, last, r, stride), cols, stride,
+                                field->height_offset, field->height_scale, out);
 }
 
 /* The result of a look at every sample of a tile. */
@@ -3494,7 +3478,7 @@ static terrimp_result terrimpi_field_scan_tile(const terrimp_heightfield *field,
         for (c = 0; c < cols; c += count) {
             at = terrimpi_field_step(x, last_x, c, stride);
             count = cols - c < 256u ? cols - c : 256u;
-            terrimpi_field_raw_row(field, at, row, count, stride, raw);
+            terrimpi_field_read_row(field, at, row, count, stride, 0.0f, 1.0f, raw);
             result = terrimpi_field_scan_values(field, raw, count, &bad, scan);
             if (result != TERRIMP_OK) {
                 scan->x = terrimpi_field_step(at, last_x, bad, stride);
@@ -15475,7 +15459,8 @@ static void terrimpi_raise_triangle(const float *heights, int32_t cols, const te
     terrimp_mesh_vertex v[3];
     terrimpi_simp_span span;
     float slope_x[3], slope_z[3], gx, gz, to[3];
-    float limit; /* from which on a sample takes nothing away, as no weight is above 1 */
+    float limit; /* how far above a sample the surface is when that changes nothing; no weight is
+                    above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
         to[k] = change[t[k]];
@@ -15491,12 +15476,12 @@ static void terrimpi_raise_triangle(const float *heights, int32_t cols, const te
         v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
     terrimpi_simp_find_span(v, &span);
     terrimpi_raise_plane(v, &gx, &gz);
-    limit = 3.001f * terrimpi_largest(to);
+    limit = lowering ? 3.001f * terrimpi_largest(to) : 0.0f;
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
             float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
             float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
-            if (lowering && over >= limit)
+            if (over >= limit)
                 continue;
             for (k = 0; k < 3; k++)
                 w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
@@ -15640,7 +15625,7 @@ static void terrimpi_fill_load(const terrimp_heightfield *field, const terrimpi_
     float *value = fill->level[0].value + first;
     uint8_t *known = fill->level[0].known + first;
     uint32_t x;
-    terrimpi_field_raw_row(field, 0, z, field->width, 1, value);
+    terrimpi_field_read_row(field, 0, z, field->width, 1, 0.0f, 1.0f, value);
     for (x = 0; x < field->width; ++x)
         known[x] = (uint8_t)(value[x] != field->no_data && value[x] == value[x]);
 }
@@ -15981,7 +15966,7 @@ static void terrimpi_build_residual_border(const terrimp_quadtree *t, terrimp_no
     }
 }
 
-static terrimp_result terrimpi_build_geomip_leaf(const terrimp_quadtree *t, terrimp_node p)
+static terrimp_result terrimpi_build_ground_leaf(const terrimp_quadtree *t, terrimp_node p)
 {
     terrimp_geomip_node *node = &t->nodes[p.number];
     uint32_t quads = t->chunk_quads;
@@ -15991,17 +15976,15 @@ static terrimp_result terrimpi_build_geomip_leaf(const terrimp_quadtree *t, terr
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tree, uint32_t node,
-                                                     float *scratch)
+/* Finds heights, error and rms of one node, from samples alone. */
+static terrimp_result terrimpi_build_ground(const terrimp_quadtree *tree, uint32_t node,
+                                            float *scratch)
 {
-    terrimp_node p, beyond;
+    terrimp_node p = terrimpi_tree_node(tree, node), beyond;
     terrimpi_build_residual misses;
     int side;
-    TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
-    p = terrimpi_tree_node(tree, node);
     if (p.level == 0)
-        return terrimpi_build_geomip_leaf(tree, p);
+        return terrimpi_build_ground_leaf(tree, p);
     memset(&misses, 0, sizeof misses);
     terrimpi_build_residual_inner(tree, p, scratch, &misses);
     misses.low = misses.high = terrimpi_field_sample(
@@ -16017,26 +16000,24 @@ TERRIMP_API terrimp_result terrimp_geomip_build_node(const terrimp_quadtree *tre
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_geomip_build_finish(const terrimp_quadtree *tree)
+/* Notes that a node holds what another one holds. */
+static void terrimpi_build_hold_ground(terrimp_geomip_node *node, const terrimp_geomip_node *held)
 {
-    uint32_t i;
-    TERRIMPI_REFUSE(!tree || !tree->nodes, TERRIMP_E_NULL);
-    for (i = 0; i + 1u < tree->node_count; i++) {
-        const terrimp_geomip_node *child = &tree->nodes[i];
-        terrimp_geomip_node *node = &tree->nodes[terrimpi_tree_parent_number(tree, i)];
-        node->low = terrimpi_min(node->low, child->low);
-        node->high = terrimpi_max(node->high, child->high);
-        node->error = terrimpi_max(node->error, child->error);
-    }
-    return TERRIMP_OK;
+    node->low = terrimpi_min(node->low, held->low);
+    node->high = terrimpi_max(node->high, held->high);
+    node->error = terrimpi_max(node->error, held->error);
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_build(const terrimp_quadtree *tree, float *scratch)
 {
-    uint32_t node;
-    for (node = 0; node < tree->node_count; node++)
-        TERRIMPI_TRY(terrimp_geomip_build_node(tree, node, scratch));
-    return terrimp_geomip_build_finish(tree);
+    uint32_t i;
+    TERRIMPI_REFUSE(!tree || !scratch || !tree->nodes, TERRIMP_E_NULL);
+    for (i = 0; i < tree->node_count; i++)
+        TERRIMPI_TRY(terrimpi_build_ground(tree, i, scratch));
+    for (i = 0; i + 1u < tree->node_count; i++)
+        terrimpi_build_hold_ground(&tree->nodes[terrimpi_tree_parent_number(tree, i)],
+                                   &tree->nodes[i]);
+    return TERRIMP_OK;
 }
 
 /* ---- the survey of a mesh by all samples of its node ---- */
@@ -16701,7 +16682,7 @@ TERRIMP_API terrimp_result terrimp_terrain_build_node(terrimp_terrain *terrain, 
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
                                       terrimpi_build_layout(&terrain->desc, scratch, &build)));
     TERRIMPI_REFUSE(!terrain->begun, TERRIMP_E_STATE);
-    TERRIMPI_TRY(terrimp_geomip_build_node(&terrain->tree, node, build.row));
+    TERRIMPI_TRY(terrimpi_build_ground(&terrain->tree, node, build.row));
     TERRIMPI_REFUSE(node < terrain->tree.level_first[1] &&
                     (terrain->tree.nodes[node].low < terrain->sample_low ||
                      terrain->tree.nodes[node].high > terrain->sample_high), TERRIMP_E_RANGE);
@@ -16715,6 +16696,13 @@ static void terrimpi_build_hold(terrimpi_mesh *mesh, float low, float high)
     mesh->high = terrimpi_max(mesh->high, high);
 }
 
+/* Notes that a node and its coarse mesh hold what another one holds. */
+static void terrimpi_build_hold_node(terrimp_terrain *t, uint32_t node, uint32_t held)
+{
+    terrimpi_build_hold_ground(&t->tree.nodes[node], &t->tree.nodes[held]);
+    terrimpi_build_hold(&t->meshes[node], t->meshes[held].low, t->meshes[held].high);
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain)
 {
     const terrimp_quadtree *tree;
@@ -16724,15 +16712,13 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
     tree = &terrain->tree;
     for (node = 0; node < tree->node_count; node++)
         TERRIMPI_REFUSE(terrimpi_mesh_vertices(&terrain->meshes[node]) == 0, TERRIMP_E_STATE);
-    terrimp_geomip_build_finish(tree);
     terrain->mesh_triangle_count = 0;
     for (node = 0; node < tree->node_count; node++) {
         terrimpi_build_hold(&terrain->meshes[node], tree->nodes[node].low, tree->nodes[node].high);
         terrain->mesh_triangle_count += terrimpi_mesh_triangles(&terrain->meshes[node]);
+        if (node + 1u < tree->node_count)
+            terrimpi_build_hold_node(terrain, terrimpi_tree_parent_number(tree, node), node);
     }
-    for (node = 0; node + 1u < tree->node_count; node++)
-        terrimpi_build_hold(&terrain->meshes[terrimpi_tree_parent_number(tree, node)],
-                            terrain->meshes[node].low, terrain->meshes[node].high);
     terrain->built = 1;
     return TERRIMP_OK;
 }
@@ -16847,17 +16833,6 @@ TERRIMP_API terrimp_result terrimp_terrain_edit(terrimp_terrain *terrain,
             }
     }
     return TERRIMP_OK;
-}
-
-/* Notes that a node and its coarse mesh hold what another one holds. */
-static void terrimpi_build_hold_node(terrimp_terrain *t, uint32_t node, uint32_t held)
-{
-    terrimp_geomip_node *n = &t->tree.nodes[node];
-    const terrimp_geomip_node *h = &t->tree.nodes[held];
-    n->low = terrimpi_min(n->low, h->low);
-    n->high = terrimpi_max(n->high, h->high);
-    n->error = terrimpi_max(n->error, h->error);
-    terrimpi_build_hold(&t->meshes[node], t->meshes[held].low, t->meshes[held].high);
 }
 
 /* Builds a node anew whose children are as they should be. Those above it are wide enough until it

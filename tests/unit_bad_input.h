@@ -1290,7 +1290,7 @@ static void geomip_functions_refuse(void)
     REFUSES(TERRIMP_E_RANGE, out, terrimp_quadtree_init(&bad, 4, &out));
     REFUSES(TERRIMP_E_NULL, box, terrimp_geomip_box(NULL, 0, &box));
     REFUSES(TERRIMP_E_RANGE, box, terrimp_geomip_box(&s.tree, s.tree.node_count, &box));
-    GIVES(TERRIMP_E_NULL, terrimp_geomip_build_finish(NULL));
+    GIVES(TERRIMP_E_NULL, terrimp_geomip_build(NULL, heights));
     mip_random_camera(&s, &camera);
     for (i = 0; i < 9; i++) {
         terrimp_geomip_view view = s.view;
