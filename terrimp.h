@@ -4934,6 +4934,7 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 static void terrimpi_mip_box(const terrimp_quadtree *t, const terrimp_node *n, terrimp_box *box)
 {
     const terrimp_geomip_node *kept = terrimpi_tree_kept(t, n->number);
+    TERRIMP_ASSERT(kept);
     terrimpi_tree_box(t, n, kept->low, kept->high, box);
 }
 
@@ -8309,7 +8310,7 @@ static void terrimpi_horizon_empty(terrimp_horizon *h, uint32_t quarter, const f
             continue;
         memset(b, 0, sizeof *b);
         for (k = 0; k < TERRIMP_HORIZON_KEPT; k++)
-            b->slope[k] = before & behind ? TERRIMPI_HORIZON_ALL : TERRIMPI_HORIZON_NONE;
+            b->slope[k] = (before & behind) ? TERRIMPI_HORIZON_ALL : TERRIMPI_HORIZON_NONE;
         seen |= !(before & behind);
     }
     h->step_count[quarter] = 0;
