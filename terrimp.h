@@ -4528,6 +4528,17 @@ static int terrimpi_tree_beyond(const terrimp_quadtree *t, const terrimp_node *n
     return 1;
 }
 
+/* The child of a node in its quarter i, along x, then z. Returns 0 when there is none. */
+static int terrimpi_tree_quarter(const terrimp_quadtree *t, const terrimp_node *n, uint32_t i,
+                                 terrimp_node *child)
+{
+    uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+    if (n->level == 0 || !terrimpi_tree_has(t, n->level - 1u, x, z))
+        return 0;
+    *child = terrimpi_tree_at(t, n->level - 1u, x, z);
+    return 1;
+}
+
 /* ---- where it lies ---- */
 
 /* Column and row of lattice position (i, j) of a level. */
@@ -8586,6 +8597,17 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
     return (bytes + 15u) / 16u * 16u;
 }
 
+/* The checksum of a page: of all but its first word. */
+static uint32_t terrimpi_page_hash(const unsigned char *page, uint32_t bytes)
+{
+    uint32_t at, hash = 2166136261u, word;
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    return hash;
+}
+
 /* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
    its top down, and on each level four children side by side ---- */
 
@@ -8601,25 +8623,31 @@ static uint32_t terrimpi_page_interleave(uint32_t x, uint32_t z)
     return out;
 }
 
-/* Pages above the blocks. */
-static uint32_t terrimpi_page_upper(const terrimp_quadtree *t, uint32_t block_level)
+/* Where a block's pages begin, counted in pages: those above the blocks come first and. */
+static uint64_t terrimpi_page_first(const terrimp_quadtree *t, uint32_t block_level, uint32_t block)
 {
-    return t->node_count - t->level_first[block_level + 1u];
+    return t->node_count - t->level_first[block_level + 1u] +
+           (uint64_t)block * terrimpi_page_full(block_level + 1u);
+}
+
+/* Where all pages end, counted the same way. */
+static uint64_t terrimpi_page_end(const terrimp_quadtree *t, uint32_t level)
+{
+    return terrimpi_page_first(t, level, t->level_x[level] * t->level_z[level]);
 }
 
 static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_level,
                                      const terrimp_node *n)
 {
     const terrimp_quadtree *tree = &t->tree;
-    uint32_t index = n->number - tree->level_first[block_level + 1u];
+    uint64_t index = n->number - tree->level_first[block_level + 1u];
     if (n->level <= block_level) {
         uint32_t up = block_level - n->level, mask = (1u << up) - 1u;
-        index = terrimpi_page_upper(tree, block_level) +
-                ((n->z >> up) * tree->level_x[block_level] + (n->x >> up)) *
-                    terrimpi_page_full(block_level + 1u) +
-                terrimpi_page_full(up) + terrimpi_page_interleave(n->x & mask, n->z & mask);
+        uint32_t block = (n->z >> up) * tree->level_x[block_level] + (n->x >> up);
+        index = terrimpi_page_first(tree, block_level, block) + terrimpi_page_full(up) +
+                terrimpi_page_interleave(n->x & mask, n->z & mask);
     }
-    return TERRIMP_PAGES_HEADER_BYTES + (uint64_t)index * terrimpi_page_bytes(t);
+    return TERRIMP_PAGES_HEADER_BYTES + index * terrimpi_page_bytes(t);
 }
 
 /* ---- the header ---- */
@@ -8655,10 +8683,7 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
                     t->desc.field.format == TERRIMP_FORMAT_F32 ||
                     head->block_level >= t->tree.level_count ||
-                    terrimpi_page_upper(&t->tree, head->block_level) +
-                        (uint64_t)t->tree.level_x[head->block_level] *
-                            t->tree.level_z[head->block_level] *
-                            terrimpi_page_full(head->block_level + 1u) > 0xffffffffu ||
+                    terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
     for (i = 0; i < terrimpi_floor_of(t).ground_vertices + terrimpi_floor_of(t).wall_points; i++) {
         float height;
@@ -8673,20 +8698,13 @@ TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
 {
     terrimp_terrain t;
     terrimpi_pages_head head;
-    terrimp_node last;
-    uint32_t edge;
     TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
     if (!info)
         return TERRIMP_OK;
-    edge = (1u << head.block_level) - 1u;
-    last = terrimpi_tree_at(&t.tree, head.block_level, t.tree.level_x[head.block_level] - 1u,
-                            t.tree.level_z[head.block_level] - 1u);
-    last.level = 0; /* the last node of a block, whether there is one or not */
-    last.x = (last.x << head.block_level) + edge;
-    last.z = (last.z << head.block_level) + edge;
     memset(info, 0, sizeof *info);
     info->page_bytes = terrimpi_page_bytes(&t);
-    info->bytes = terrimpi_page_offset(&t, head.block_level, &last) + info->page_bytes;
+    info->bytes = TERRIMP_PAGES_HEADER_BYTES +
+                  terrimpi_page_end(&t.tree, head.block_level) * info->page_bytes;
     info->width = t.desc.field.width;
     info->depth = t.desc.field.depth;
     info->chunk_quads = t.desc.chunk_quads;
@@ -8865,22 +8883,24 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     return TERRIMP_OK;
 }
 
-/* The slot of a page that has been begun; NULL: it has not. */
-static terrimpi_page_slot *terrimpi_page_begun(const terrimp_terrain *t, uint32_t node)
+/* The slot of a page that has been begun. */
+static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t node,
+                                          terrimpi_page_slot **slot)
 {
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(t->tree.pages, node);
-    return slot && !slot->is_here ? slot : NULL;
+    TERRIMPI_TRY(terrimpi_page_check(t, node, t));
+    *slot = terrimpi_page_slot_of(t->tree.pages, node);
+    return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
 /* Whether the records of a node's children are held by its own. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
 {
+    terrimp_node child;
     uint32_t i;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+    for (i = 0; i < 4u; i++) {
         terrimpi_record r;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
         memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
                        i * TERRIMPI_PAGE_RECORD, sizeof r);
@@ -8903,13 +8923,9 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     terrimpi_field_scan scan;
     terrimp_heightfield f = terrimpi_page_field(t, node);
     terrimp_node n = terrimpi_tree_node(&t->tree, node);
-    uint32_t at, hash = 2166136261u, word;
     memcpy(&head, page, sizeof head);
-    for (at = 4u; at < p->page_bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
-    if (head.checksum != hash || head.stamp != p->stamp || head.node != node ||
+    if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
+        head.node != node ||
         memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
@@ -8922,9 +8938,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
-    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
-    slot = terrimpi_page_begun(terrain, node);
-    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
     if (terrimpi_page_ok(terrain, node))
@@ -8936,9 +8950,7 @@ TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t n
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
-    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
-    slot = terrimpi_page_begun(terrain, node);
-    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_OK;
 }
@@ -8979,11 +8991,23 @@ static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
         slot->used = t->pages->frame;
 }
 
+/* As terrimpi_tree_quarter, of a child in sight; the node's page is here. */
+static int terrimpi_page_quarter(const terrimp_terrain *t, const terrimp_node *node, uint32_t i,
+                                 const terrimp_frustum *frustum, terrimp_node *child)
+{
+    terrimp_box box;
+    if (!terrimpi_tree_quarter(&t->tree, node, i, child))
+        return 0;
+    terrimpi_terrain_node_box(t, child, &box);
+    return terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE;
+}
+
 /* Whether a node may be left for its children: its page is here, and of these each in sight. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum)
 {
     const terrimp_quadtree *tree = &t->tree;
+    terrimp_node child;
     uint32_t i;
     int all = 1;
     if (!tree->pages)
@@ -8991,41 +9015,25 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     if (!terrimpi_page_of(tree->pages, node->number))
         return 0;
     terrimpi_page_use(tree, node->number);
-    for (i = 0; i < 4u && node->level > 0; i++) {
-        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
-        terrimp_node child;
-        terrimp_box box;
-        if (!terrimpi_tree_has(tree, node->level - 1u, x, z))
-            continue;
-        child = terrimpi_tree_at(tree, node->level - 1u, x, z);
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        terrimpi_page_use(tree, child.number);
-        all &= terrimpi_page_of(tree->pages, child.number) != NULL;
-    }
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_page_quarter(t, node, i, frustum, &child)) {
+            terrimpi_page_use(tree, child.number);
+            all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+        }
     return all;
 }
 
 /* ---- heights and rays ---- */
 
-/* The finest page that is here at a position. */
-static terrimp_node terrimpi_page_at(const terrimp_terrain *t, float x, float z)
+/* The finest node at a position whose page is here. */
+static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z, terrimp_node *n)
 {
-    const terrimp_quadtree *tree = &t->tree;
-    terrimp_node n = terrimpi_tree_root(tree);
-    while (n.level > 0) {
-        uint32_t level = n.level - 1u, quads = tree->chunk_quads, i, j;
-        terrimp_node child;
-        i = 2u * n.x + (x >= terrimpi_tree_x(tree, level, (2u * n.x + 1u) * quads) ? 1u : 0u);
-        j = 2u * n.z + (z >= terrimpi_tree_z(tree, level, (2u * n.z + 1u) * quads) ? 1u : 0u);
-        child = terrimpi_tree_at(tree, level, terrimpi_min_u32(i, tree->level_x[level] - 1u),
-                                 terrimpi_min_u32(j, tree->level_z[level] - 1u));
-        if (!terrimpi_page_of(tree->pages, child.number))
-            break;
-        n = child;
+    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, n));
+    while (!terrimpi_page_of(t->pages, n->number)) {
+        TERRIMPI_REFUSE(n->level + 1u == t->level_count, TERRIMP_E_PAGE);
+        *n = terrimpi_tree_parent(t, n);
     }
-    return n;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
@@ -9038,14 +9046,8 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
     f = terrain->desc.field;
     memset(&n, 0, sizeof n);
     if (terrain->tree.pages) {
-        const terrimp_quadtree *tree = &terrain->tree;
-        TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
-        TERRIMPI_REFUSE(!terrimpi_within(x, f.origin_x, terrimpi_tree_x(tree, 0, f.width - 1u)) ||
-                        !terrimpi_within(z, f.origin_z, terrimpi_tree_z(tree, 0, f.depth - 1u)),
-                        TERRIMP_E_MISS);
-        n = terrimpi_page_at(terrain, x, z);
-        TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, n.number) || (n.level > 0 && !level),
-                        TERRIMP_E_PAGE);
+        TERRIMPI_TRY(terrimpi_page_at(&terrain->tree, x, z, &n));
+        TERRIMPI_REFUSE(n.level > 0 && !level, TERRIMP_E_PAGE);
         f = terrimpi_page_field(terrain, n.number);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
@@ -10923,28 +10925,25 @@ static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int re
         *worst = want;
 }
 
-/* The same for the children of a node that are in sight, and the node itself. */
-static void terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
-                                        const terrimp_node *node, int reason, float urgency)
+/* The same for a node and its children in sight. Returns whether all of them are here. */
+static int terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
+                                       const terrimp_node *node, int reason, float urgency)
 {
     const terrimp_quadtree *t = &v->terrain->tree;
+    terrimp_node child;
     uint32_t i;
+    int all = 1;
     if (!t->pages)
-        return;
+        return 1;
     terrimpi_view_want(v, node, reason, urgency);
     if (!terrimpi_page_of(t->pages, node->number))
-        return;
-    for (i = 0; i < 4u && node->level > 0; i++) {
-        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
-        terrimp_node child;
-        terrimp_box box;
-        if (!terrimpi_tree_has(t, node->level - 1u, x, z))
-            continue;
-        child = terrimpi_tree_at(t, node->level - 1u, x, z);
-        terrimpi_terrain_node_box(v->terrain, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+        return 0;
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_page_quarter(v->terrain, node, i, frustum, &child)) {
             terrimpi_view_want(v, &child, reason, urgency);
-    }
+            all &= terrimpi_page_of(t->pages, child.number) != NULL;
+        }
+    return all;
 }
 
 /* Whether the nodes exist that have to beside and above one that is split. */
@@ -10981,10 +10980,9 @@ static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
             terrimp_node node = terrimpi_tree_node(t, number);
             if (mark->measure < 1.0f)
                 continue;
-            terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
-                                        TERRIMP_SQRTF(mark->measure));
-            if (terrimpi_view_has_around(mip, &node) &&
-                terrimpi_page_divides(v->terrain, &node, &f->frustum))
+            if (terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
+                                            TERRIMP_SQRTF(mark->measure)) &&
+                terrimpi_view_has_around(mip, &node))
                 continue;
             mark->measure = 0.0f;
             v->late++;
@@ -17122,16 +17120,15 @@ TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, u
     terrimp_pages_desc d;
     terrimpi_paging w;
     const terrimp_quadtree *t = &w.whole.tree;
-    uint32_t all;
-    uint64_t block_bytes;
+    uint32_t all, page_bytes;
     TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
     all = t->level_x[d.block_level] * t->level_z[d.block_level];
     TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
-    block_bytes = (uint64_t)terrimpi_page_full(d.block_level + 1u) * terrimpi_page_bytes(&w.whole);
-    *offset = TERRIMP_PAGES_HEADER_BYTES + block_bytes * first_block +
-              (uint64_t)terrimpi_page_upper(t, d.block_level) * terrimpi_page_bytes(&w.whole);
-    *bytes = block_bytes * block_count;
+    page_bytes = terrimpi_page_bytes(&w.whole);
+    *offset = TERRIMP_PAGES_HEADER_BYTES +
+              terrimpi_page_first(t, d.block_level, first_block) * page_bytes;
+    *bytes = (uint64_t)block_count * terrimpi_page_full(d.block_level + 1u) * page_bytes;
     return TERRIMP_OK;
 }
 
@@ -17175,16 +17172,15 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     terrimp_geomip_node *ground = &t->tree.nodes[n->number];
     terrimpi_mesh *mesh = &t->meshes[n->number];
     float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
+    terrimp_node child;
     uint32_t i;
     TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
     w->held[n->number] = *missed = *squares = 0.0f;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
-        *missed = terrimpi_max(*missed, w->missed[child]);
-        *squares += w->squares[child];
+        *missed = terrimpi_max(*missed, w->missed[child.number]);
+        *squares += w->squares[child.number];
         count += 1.0f;
     }
     if (w->level > 0) {
@@ -17195,16 +17191,14 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
         mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
     }
     w->held[n->number] = ground->rms;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
-        ground->low = terrimpi_min(ground->low, t->tree.nodes[child].low);
-        ground->high = terrimpi_max(ground->high, t->tree.nodes[child].high);
-        ground->error = terrimpi_max(ground->error, t->tree.nodes[child].error);
-        terrimpi_build_hold(mesh, t->meshes[child].low, t->meshes[child].high);
-        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child]);
+        ground->low = terrimpi_min(ground->low, t->tree.nodes[child.number].low);
+        ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
+        ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
+        terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
+        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child.number]);
     }
     terrimpi_build_hold(mesh, ground->low, ground->high);
     return TERRIMP_OK;
@@ -17248,18 +17242,18 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
 {
     const terrimp_terrain *t = w->part;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN, word;
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN;
     terrimpi_page_head head;
     memset(w->page, 0, bytes);
     head.stamp = w->stamp;
     head.node = whole.number;
     head.record = terrimpi_paging_record(w, n->number);
     for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimp_node child;
         terrimpi_record r;
-        if (n->level == 0 || !terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        r = terrimpi_paging_record(w, terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number);
+        r = terrimpi_paging_record(w, child.number);
         memcpy(w->page + at, &r, sizeof r);
     }
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
@@ -17267,11 +17261,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
     terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
     memcpy(w->page, &head, sizeof head);
-    head.checksum = 2166136261u;
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, w->page + at, sizeof word);
-        head.checksum = terrimpi_bake_hash_word(head.checksum, word);
-    }
+    head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
     return w->desc->store(w->desc->user,
                           terrimpi_page_offset(&w->whole, w->desc->block_level, &whole), w->page,
@@ -17325,17 +17315,13 @@ TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *d
 static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terrimp_node *n,
                                            unsigned char *page, terrimpi_page_head *head)
 {
-    uint32_t bytes = terrimpi_page_bytes(&w->whole), at, word, hash = 2166136261u;
+    uint32_t bytes = terrimpi_page_bytes(&w->whole);
     TERRIMPI_REFUSE(!w->desc->load(w->desc->user,
                                    terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
                                    bytes), TERRIMP_E_PAGE);
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
     memcpy(head, page, sizeof *head);
-    return head->checksum == hash && head->stamp == w->stamp && head->node == n->number
-               ? TERRIMP_OK : TERRIMP_E_BAKE;
+    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->stamp &&
+                   head->node == n->number ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
