@@ -6692,31 +6692,21 @@ TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc 
 
 #endif /* TERRIMP_NO_TROUBLE */
 
-/* Vertices and indices of the floor, and of its ground alone. */
-static uint32_t terrimpi_floor_ground_vertices(const terrimp_terrain *t)
-{
-    return (t->tree.level_x[t->floor_level] + 1u) * (t->tree.level_z[t->floor_level] + 1u);
-}
+/* How many vertices, indices and points of the walls the floor has. */
+typedef struct terrimpi_floor {
+    uint32_t ground_vertices, ground_indices, wall_points, vertices, indices;
+} terrimpi_floor;
 
-static uint32_t terrimpi_floor_ground_indices(const terrimp_terrain *t)
+static terrimpi_floor terrimpi_floor_of(const terrimp_terrain *t)
 {
-    return t->tree.level_x[t->floor_level] * t->tree.level_z[t->floor_level] * 6u;
-}
-
-static uint32_t terrimpi_floor_wall_points(const terrimp_terrain *t)
-{
-    return 2u * TERRIMPI_FLOOR_WALL_POINTS *
-           (t->tree.level_x[t->floor_level] + t->tree.level_z[t->floor_level]);
-}
-
-static uint32_t terrimpi_floor_vertices(const terrimp_terrain *t)
-{
-    return terrimpi_floor_ground_vertices(t) + 2u * terrimpi_floor_wall_points(t);
-}
-
-static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
-{
-    return terrimpi_floor_ground_indices(t) + 6u * terrimpi_floor_wall_points(t);
+    uint32_t wide = t->tree.level_x[t->floor_level], deep = t->tree.level_z[t->floor_level];
+    terrimpi_floor f;
+    f.ground_vertices = (wide + 1u) * (deep + 1u);
+    f.ground_indices = 6u * wide * deep;
+    f.wall_points = 2u * TERRIMPI_FLOOR_WALL_POINTS * (wide + deep);
+    f.vertices = f.ground_vertices + 2u * f.wall_points;
+    f.indices = f.ground_indices + 6u * f.wall_points;
+    return f;
 }
 
 /* Inner points that a border keeps: those of 64 quads are the simplifier's default, and a budget
@@ -7171,8 +7161,8 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->ground_index_count = terrimpi_terrain_pattern_of(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
-    info->floor_vertex_count = terrimpi_floor_vertices(terrain);
-    info->floor_index_count = terrimpi_floor_indices(terrain);
+    info->floor_vertex_count = terrimpi_floor_of(terrain).vertices;
+    info->floor_index_count = terrimpi_floor_of(terrain).indices;
     info->mesh_vertex_count =
         terrimpi_mesh_places(terrain) * terrain->vertex_stride + info->floor_vertex_count;
     info->mesh_index_count =
@@ -7330,10 +7320,9 @@ static float terrimpi_terrain_lowest(const terrimp_terrain *t, const uint32_t a[
    floor up to the lowest samples between the points beside, so nowhere over the border. */
 static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t *indices)
 {
-    uint32_t ground = terrimpi_floor_ground_vertices(t), i, k, points;
-    uint32_t first = terrimpi_floor_ground_indices(t);
+    terrimpi_floor f = terrimpi_floor_of(t);
+    uint32_t ground = f.ground_vertices, first = f.ground_indices, points = f.wall_points, i, k;
     terrimp_node root = terrimpi_tree_root(&t->tree);
-    points = terrimpi_floor_wall_points(t);
     terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
@@ -7350,7 +7339,7 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
                                               terrimpi_terrain_lowest(t, at, after));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
-    for (i = first; i < terrimpi_floor_indices(t); i++)
+    for (i = first; i < f.indices; i++)
         indices[i] = (uint16_t)(indices[i] + ground);
 }
 
@@ -7417,8 +7406,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     TERRIMPI_REFUSE(node > terrain->tree.node_count, TERRIMP_E_RANGE);
     is_floor = node == terrain->tree.node_count;
     TERRIMPI_REFUSE(!is_floor && !terrimpi_tree_opens(&terrain->tree, node), TERRIMP_E_PAGE);
-    vertices = is_floor ? terrimpi_floor_vertices(terrain) : terrain->vertex_stride;
-    index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
+    vertices = is_floor ? terrimpi_floor_of(terrain).vertices : terrain->vertex_stride;
+    index_count = is_floor ? terrimpi_floor_of(terrain).indices : terrain->index_stride;
     TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
                     index_capacity < index_count, TERRIMP_E_CAPACITY);
     if (is_floor)
@@ -7440,8 +7429,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
     vertex_stride = terrain->vertex_stride;
     index_stride = terrain->index_stride;
     node = terrain->tree.node_count;
-    if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_vertices(terrain) ||
-        index_capacity < node * index_stride + terrimpi_floor_indices(terrain))
+    if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_of(terrain).vertices ||
+        index_capacity < node * index_stride + terrimpi_floor_of(terrain).indices)
         return TERRIMP_E_CAPACITY;
     terrimpi_floor_write(terrain, xyz + 3u * node * vertex_stride, indices + node * index_stride);
     while (node-- > 0)
@@ -8696,7 +8685,7 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     head->block_level >= t->tree.level_count ||
                     terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
-    for (i = 0; i < terrimpi_floor_ground_vertices(t) + terrimpi_floor_wall_points(t); i++) {
+    for (i = 0; i < terrimpi_floor_of(t).ground_vertices + terrimpi_floor_of(t).wall_points; i++) {
         float height;
         memcpy(&height, lows + i * sizeof height, sizeof height);
         TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_BAKE);
@@ -11456,7 +11445,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
     memset(&command, 0, sizeof command);
     command.base_vertex = terrimpi_mesh_places(v->built) * v->terrain->vertex_stride;
     command.first_index = terrimpi_mesh_places(v->built) * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_indices(v->built);
+    command.index_count = terrimpi_floor_of(v->built).indices;
     if (v->terrain->real) { /* its first chunk says of which repetition */
         uint32_t tiles = v->terrain->tiles;
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
@@ -11958,7 +11947,7 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
         s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
     } else {
         s->draws++;
-        s->triangles += terrimpi_floor_indices(v->built) / 3u;
+        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
     }
 }
 
@@ -14594,17 +14583,6 @@ typedef struct terrimpi_simp_chain {
     int32_t first, step, count, wrap;
 } terrimpi_simp_chain;
 
-static terrimpi_simp_chain terrimpi_simp_make_chain(int32_t first, int32_t step, int32_t count,
-                                                    int32_t wrap)
-{
-    terrimpi_simp_chain chain;
-    chain.first = first;
-    chain.step = step;
-    chain.count = count;
-    chain.wrap = wrap;
-    return chain;
-}
-
 static int32_t terrimpi_simp_chain_at(const terrimpi_simp_chain *chain, int32_t i)
 {
     int32_t v = chain->first + i * chain->step;
@@ -14730,13 +14708,33 @@ static void terrimpi_simp_join(terrimpi_simplifier *s)
         }
 }
 
+/* Fills what lies between the border, whose sides begin at side[], and a lattice of cols x rows
+   vertices; without one, the strip from one long side to the other, which runs the other way. */
+static void terrimpi_simp_zip_border(terrimpi_simplifier *s, const int32_t side[5], int32_t cols,
+                                     int32_t rows)
+{
+    int32_t v = s->border_count, end = s->vertex_count, i = s->cols > 2 ? 1 : 0;
+    const terrimpi_simp_chain lattice[4] = {{v, cols, rows, end},
+                                            {v + cols * (rows - 1), 1, cols, end},
+                                            {end - 1, -cols, rows, end},
+                                            {v + cols - 1, -1, cols, end}};
+    const terrimpi_simp_chain border[4] = {{side[0], 1, side[1] - side[0] + 1, v},
+                                           {side[1], 1, side[2] - side[1] + 1, v},
+                                           {side[2], 1, side[3] - side[2] + 1, v},
+                                           {side[3], 1, side[4] - side[3] + 1, v}};
+    const terrimpi_simp_chain across = {side[i + 3], -1, border[i + 2].count, v};
+    if (cols == 0)
+        terrimpi_simp_zip(s, &border[i], &across);
+    for (i = 0; i < 4 && cols > 0; i++)
+        terrimpi_simp_zip(s, &border[i], &lattice[i]);
+}
+
 /* Builds the start mesh: the border polylines round a regular lattice of samples, or round nothing
    where the tile has no inside. Returns whether the lattice holds every inner sample. */
 static int terrimpi_simp_start(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
                                int32_t lattice_limit, terrimp_mesh_vertex *loop)
 {
     int32_t w = s->cols - 1, h = s->rows - 1, side[5], cols = 0, rows = 0, i, j, v;
-    terrimpi_simp_chain outer[4], inner[4];
     terrimpi_simp_place_border(s, desc->borders, loop, side);
     if (w > 1 && h > 1)
         terrimpi_simp_lattice_size(w - 1, h - 1, lattice_limit, &cols, &rows);
@@ -14749,21 +14747,8 @@ static int terrimpi_simp_start(terrimpi_simplifier *s, const terrimp_simplify_de
         }
     s->vertex_count = v;
     s->half_edge_end = s->triangle_count = 0;
-    for (i = 0; i < 4; i++)
-        outer[i] = terrimpi_simp_make_chain(side[i], 1, side[i + 1] - side[i] + 1, s->border_count);
+    terrimpi_simp_zip_border(s, side, cols, rows);
     v = s->border_count;
-    if (cols > 0) {
-        inner[0] = terrimpi_simp_make_chain(v, cols, rows, s->vertex_count);
-        inner[1] = terrimpi_simp_make_chain(v + cols * (rows - 1), 1, cols, s->vertex_count);
-        inner[2] = terrimpi_simp_make_chain(s->vertex_count - 1, -cols, rows, s->vertex_count);
-        inner[3] = terrimpi_simp_make_chain(v + cols - 1, -1, cols, s->vertex_count);
-        for (i = 0; i < 4; i++)
-            terrimpi_simp_zip(s, outer + i, inner + i);
-    } else { /* one strip from one long side to the other, which runs the other way */
-        i = w > 1 ? 1 : 0;
-        inner[0] = terrimpi_simp_make_chain(side[i + 3], -1, outer[i + 2].count, v);
-        terrimpi_simp_zip(s, outer + i, inner);
-    }
     for (j = 0; j + 1 < rows; j++)
         for (i = 0; i + 1 < cols; i++) {
             int32_t a = v + j * cols + i;
@@ -15895,6 +15880,14 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     return terrimpi_build_layout_tile(side, side, longest, desc->triangle_budget, base, build);
 }
 
+/* Whether a block of scratch will do for a terrain. */
+static terrimp_result terrimpi_build_check(const terrimp_terrain *t, const void *scratch,
+                                           size_t bytes)
+{
+    terrimpi_build build;
+    return terrimpi_check_block(scratch, bytes, terrimpi_build_layout(&t->desc, NULL, &build));
+}
+
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
 static void terrimpi_build_add_edge(const terrimpi_terrain_tile *p, const terrimp_mesh_vertex *from,
                                     const terrimp_mesh_vertex *to, terrimpi_build_triangle *facet)
@@ -16629,11 +16622,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
 TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void *scratch,
                                                  size_t bytes)
 {
-    terrimpi_build build;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_build_check(terrain, scratch, bytes));
     TERRIMPI_TRY(terrimp_terrain_build_begin(terrain));
     for (node = 0; node < terrain->tree.node_count; node++)
         TERRIMPI_TRY(terrimp_terrain_build_node(terrain, node, scratch, bytes));
@@ -16764,12 +16755,10 @@ TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint
                                                   uint32_t count, uint32_t *done, void *scratch,
                                                   size_t bytes)
 {
-    terrimpi_build build;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain || !done, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built || terrain->baked, TERRIMP_E_STATE);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_build_check(terrain, scratch, bytes));
     *done = 0;
     terrain->tree.edits++;
     for (node = 0; node < terrain->tree.node_count && *done < count; node++) {
@@ -16797,12 +16786,10 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, void *scratch,
                                                    size_t bytes)
 {
-    terrimpi_build build;
     uint32_t done;
     TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_build_check(terrain, scratch, bytes));
     TERRIMPI_TRY(terrimp_terrain_edit(terrain, samples));
     return terrimp_terrain_refine(terrain, NULL, terrain->tree.node_count, &done, scratch, bytes);
 }
@@ -17411,9 +17398,9 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
 {
     const terrimp_terrain *t = &w->whole;
     uint32_t level = t->floor_level, wide = t->tree.level_x[level], deep = t->tree.level_z[level];
-    uint32_t i, k, x, z, points = terrimpi_floor_wall_points(t);
+    uint32_t i, k, x, z, points = terrimpi_floor_of(t).wall_points;
     terrimpi_page_head head;
-    for (i = 0; i < terrimpi_floor_ground_vertices(t) + points; i++)
+    for (i = 0; i < terrimpi_floor_of(t).ground_vertices + points; i++)
         lows[i] = TERRIMPI_FLOAT_MAX;
     for (z = 0; z < deep; z++)
         for (x = 0; x < wide; x++) {
@@ -17424,7 +17411,7 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
                 *corner = terrimpi_min(*corner, head.record.ground.low);
             }
         }
-    lows += terrimpi_floor_ground_vertices(t);
+    lows += terrimpi_floor_of(t).ground_vertices;
     for (k = 0; k < points; k++) {
         uint32_t before[2], at[2], after[2];
         terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
