@@ -960,7 +960,6 @@ static void bad_geomip_input_is_refused(void)
     CHECK(terrimp_quadtree_init(&s.tree.field, 8, NULL) == TERRIMP_E_NULL);
     CHECK(terrimp_quadtree_init(&s.tree.field, 8, &tree) == TERRIMP_OK && tree.nodes == NULL);
     CHECK(terrimp_geomip_build(&tree, s.scratch) == TERRIMP_E_NULL);
-    CHECK(terrimp_geomip_build_node(&s.tree, s.tree.node_count, s.scratch) == TERRIMP_E_RANGE);
     CHECK(terrimp_geomip_fill_vertices(&s.tree, s.tree.node_count, xyz, NULL) == TERRIMP_E_RANGE);
     CHECK(terrimp_geomip_fill_vertices(&s.tree, 0, NULL, NULL) == TERRIMP_E_NULL);
     s.heights[70] = sqrtf(-1.0f);
