@@ -504,23 +504,6 @@ typedef struct terrimp_capture {
 TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
                                                terrimp_capture *capture);
 
-/* Fits an orthographic frustum around a box's eight corners.
-
-   eye, forward   what its sides and places are relative to; where it looks, any length > 0
-   Errors         E_RANGE as above */
-TERRIMP_API terrimp_result terrimp_capture_fit_along(const terrimp_box *box, const float eye[3],
-                                                     const float forward[3],
-                                                     terrimp_capture *capture);
-
-/* Narrows a fitted capture to points, for instance the vertices that its picture is drawn on: its
-   sides touch their projections. The clip distances stay.
-
-   xyz, count   [count][3] points in front of the eye [Limits: count >= 1]
-   Errors       E_BEHIND when a point is not in front of the eye: the capture is unchanged
-   Cost         O(count) */
-TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
-                                                   uint32_t count);
-
 /* Matrices of a capture, as terrimp_camera_matrices gives those of a camera. */
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
@@ -676,16 +659,6 @@ typedef struct terrimp_geomip_view {
     float distances_for[5];       /* private: what distances was made for */
     uint32_t frame;               /* private */
 } terrimp_geomip_view;
-
-/* The bytes of a block for the arrays of a view, 0 for bad arguments; and a view whose arrays lie
-   in such a block: set what is to be other than the default, and select.
-
-   draw_capacity   [Limits: >= 1] the chunks of level 0 are enough
-   memory          [bytes] aligned to 8 bytes */
-TERRIMP_API size_t terrimp_geomip_view_bytes(const terrimp_quadtree *tree, uint32_t draw_capacity);
-TERRIMP_API terrimp_result terrimp_geomip_view_init(const terrimp_quadtree *tree,
-                                                    uint32_t draw_capacity, void *memory,
-                                                    size_t bytes, terrimp_geomip_view *view);
 
 /* Selects the nodes of a frame: they tile the terrain without overlap, sides differ by at most one
    level, those outside of the camera's view are left out.
@@ -4041,16 +4014,11 @@ static terrimp_result terrimpi_camera_try(const void *context, void *desc)
 TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
 {
     static const terrimpi_trouble_field fields[] = {
-        TERRIMPI_TROUBLE(terrimp_camera, eye),
-        TERRIMPI_TROUBLE(terrimp_camera, forward),
-        TERRIMPI_TROUBLE(terrimp_camera, up),
-        TERRIMPI_TROUBLE(terrimp_camera, fov_y_rad),
-        TERRIMPI_TROUBLE(terrimp_camera, width_px),
-        TERRIMPI_TROUBLE(terrimp_camera, height_px),
-        TERRIMPI_TROUBLE(terrimp_camera, z_near),
-        TERRIMPI_TROUBLE(terrimp_camera, z_far),
-        TERRIMPI_TROUBLE(terrimp_camera, orthographic),
-        TERRIMPI_TROUBLE(terrimp_camera, sides),
+        TERRIMPI_TROUBLE(terrimp_camera, eye), TERRIMPI_TROUBLE(terrimp_camera, forward),
+        TERRIMPI_TROUBLE(terrimp_camera, up), TERRIMPI_TROUBLE(terrimp_camera, fov_y_rad),
+        TERRIMPI_TROUBLE(terrimp_camera, width_px), TERRIMPI_TROUBLE(terrimp_camera, height_px),
+        TERRIMPI_TROUBLE(terrimp_camera, z_near), TERRIMPI_TROUBLE(terrimp_camera, z_far),
+        TERRIMPI_TROUBLE(terrimp_camera, orthographic), TERRIMPI_TROUBLE(terrimp_camera, sides),
         TERRIMPI_TROUBLE(terrimp_camera, reach)
     };
     terrimp_camera good, bad;
@@ -4141,29 +4109,22 @@ TERRIMP_API terrimp_result terrimp_camera_pixel_factor(const terrimp_camera *cam
    beside it. */
 static void terrimpi_camera_frustum(const terrimp_camera *camera, terrimp_frustum *frustum)
 {
-    terrimp_capture c;
-    float sides[4], along;
+    float sides[4], right[3], along = camera->orthographic ? 0.0f : 1.0f;
     int i, k;
-    terrimpi_camera_capture(camera, &c);
     terrimpi_camera_sides(camera, sides);
-    memset(frustum, 0, sizeof *frustum);
-    along = c.orthographic ? 0.0f : 1.0f;
-    for (i = 0; i < 3; i++) {
-        frustum->eye[i] = c.eye[i];
-        frustum->plane[4][i] = c.forward[i];
-        frustum->plane[5][i] = -c.forward[i];
-    }
-    frustum->plane[4][3] = -c.z_near;
-    frustum->plane[5][3] = c.z_far;
-    for (k = 0; k < 4; k++) {
-        const float *axis = k < 2 ? c.right : c.up;
+    terrimpi_cross(camera->forward, camera->up, right);
+    memcpy(frustum->eye, camera->eye, sizeof frustum->eye);
+    for (k = 0; k < 6; k++) {
+        const float *axis = k < 2 ? right : camera->up;
         float sign = k & 1 ? -1.0f : 1.0f, *plane = frustum->plane[k];
         for (i = 0; i < 3; i++)
-            plane[i] = sign * (axis[i] - c.forward[i] * (along * sides[k]));
-        plane[3] = (along - 1.0f) * sign * sides[k];
+            plane[i] = sign * (k < 4 ? axis[i] - camera->forward[i] * (along * sides[k])
+                                     : camera->forward[i]);
+        plane[3] = k < 4 ? (along - 1.0f) * sign * sides[k]
+                         : -sign * (k == 4 ? camera->z_near : camera->z_far);
+        if (camera->reach > 0.0f)
+            plane[3] += camera->reach * terrimpi_length(plane);
     }
-    for (k = 0; k < 6 && camera->reach > 0.0f; k++)
-        frustum->plane[k][3] += camera->reach * terrimpi_length(frustum->plane[k]);
 }
 
 /* Where decisions about a resolved camera's picture of a box are made from; returns K there. About
@@ -4313,8 +4274,8 @@ static int terrimpi_camera_fit_sides(terrimp_capture *c, const float *xyz, uint3
     return 1;
 }
 
-/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error; orthographic,
-   as terrimp_capture_fit_along, where forward is not NULL. */
+/* As terrimp_capture_fit, but unchecked, and it may leave anything in *c on an error; orthographic
+   and along forward where that is not NULL: then the eye is what its places are relative to. */
 static terrimp_result terrimpi_camera_fit(const terrimp_box *box, const float eye[3],
                                           const float forward[3], terrimp_capture *c)
 {
@@ -4338,38 +4299,23 @@ static terrimp_result terrimpi_camera_fit(const terrimp_box *box, const float ey
     return terrimpi_camera_fit_sides(c, corners[0], 8, 0.001f) ? TERRIMP_OK : TERRIMP_E_BEHIND;
 }
 
-static terrimp_result terrimpi_capture_fit_checked(const terrimp_box *box, const float eye[3],
-                                                   const float forward[3],
-                                                   terrimp_capture *capture)
+TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
+                                               terrimp_capture *capture)
 {
     terrimp_capture c;
     TERRIMPI_REFUSE(!box || !eye || !capture, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-                    !terrimpi_finite3(eye) || (forward && !terrimpi_finite3(forward)),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(box->min[0] > box->max[0] || box->min[1] > box->max[1] ||
                     box->min[2] > box->max[2] || terrimpi_largest(eye) > TERRIMPI_CAMERA_FARTHEST ||
                     terrimp_box_farthest(box, eye) > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
-    TERRIMPI_TRY(terrimpi_camera_fit(box, eye, forward, &c));
+    TERRIMPI_TRY(terrimpi_camera_fit(box, eye, NULL, &c));
     *capture = c;
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_fit(const terrimp_box *box, const float eye[3],
-                                               terrimp_capture *capture)
-{
-    return terrimpi_capture_fit_checked(box, eye, NULL, capture);
-}
-
-TERRIMP_API terrimp_result terrimp_capture_fit_along(const terrimp_box *box, const float eye[3],
-                                                     const float forward[3],
-                                                     terrimp_capture *capture)
-{
-    TERRIMPI_REFUSE(!forward, TERRIMP_E_NULL);
-    return terrimpi_capture_fit_checked(box, eye, forward, capture);
-}
-
-/* Fits the sides alone. */
+/* Narrows a fitted capture to points, as the vertices that its picture is drawn on: its sides touch
+   their projections, its clip distances stay. Returns 0 when a point is not in front of the eye. */
 static int terrimpi_camera_tighten(terrimp_capture *c, const float *xyz, uint32_t count)
 {
     float z_near = c->z_near, z_far = c->z_far;
@@ -4379,24 +4325,12 @@ static int terrimpi_camera_tighten(terrimp_capture *c, const float *xyz, uint32_
     return fits;
 }
 
-TERRIMP_API terrimp_result terrimp_capture_tighten(terrimp_capture *capture, const float *xyz,
-                                                   uint32_t count)
-{
-    terrimp_capture c;
-    TERRIMPI_REFUSE(!capture || !xyz, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(count == 0, TERRIMP_E_RANGE);
-    c = *capture;
-    TERRIMPI_REFUSE(!terrimpi_camera_tighten(&c, xyz, count), TERRIMP_E_BEHIND);
-    *capture = c;
-    return TERRIMP_OK;
-}
-
 TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *capture,
                                                     int depth_zero_to_one, float view[16],
                                                     float projection[16])
 {
     const terrimp_capture *c = capture;
-    float width, height, depth;
+    float width, height, depth, range; /* of clip depth */
     int i;
     TERRIMPI_REFUSE(!c || !view || !projection, TERRIMP_E_NULL);
     for (i = 0; i < 3; i++) {
@@ -4412,11 +4346,12 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     width = c->tan_right - c->tan_left;
     height = c->tan_up - c->tan_down;
     depth = c->z_far - c->z_near;
+    range = depth_zero_to_one ? 1.0f : 2.0f;
     memset(projection, 0, 16 * sizeof *projection);
     projection[0] = 2.0f / width;
     projection[5] = 2.0f / height;
     if (c->orthographic) {
-        projection[10] = (depth_zero_to_one ? -1.0f : -2.0f) / depth;
+        projection[10] = -range / depth;
         projection[12] = -(c->tan_right + c->tan_left) / width;
         projection[13] = -(c->tan_up + c->tan_down) / height;
         projection[14] = -(depth_zero_to_one ? c->z_near : c->z_far + c->z_near) / depth;
@@ -4425,14 +4360,13 @@ TERRIMP_API terrimp_result terrimp_capture_matrices(const terrimp_capture *captu
     }
     projection[8] = (c->tan_right + c->tan_left) / width;
     projection[9] = (c->tan_up + c->tan_down) / height;
-    projection[10] = -(depth_zero_to_one ? c->z_far : c->z_far + c->z_near) / depth;
+    projection[10] = -1.0f; /* without a far plane */
     projection[11] = -1.0f;
-    if (c->z_far > TERRIMPI_CAMERA_FARTHEST) { /* without a far plane */
-        projection[10] = -1.0f;
-        projection[14] = (depth_zero_to_one ? -1.0f : -2.0f) * c->z_near;
-        return TERRIMP_OK;
+    projection[14] = -range * c->z_near;
+    if (c->z_far <= TERRIMPI_CAMERA_FARTHEST) {
+        projection[10] = -(depth_zero_to_one ? c->z_far : c->z_far + c->z_near) / depth;
+        projection[14] = -range * c->z_far * c->z_near / depth;
     }
-    projection[14] = (depth_zero_to_one ? -c->z_far : -2.0f * c->z_far) * c->z_near / depth;
     return TERRIMP_OK;
 }
 
@@ -4982,64 +4916,10 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
     return u < v ? a + v * (c - a) + u * (d - c) : a + u * (b - a) + v * (d - b);
 }
 
-/* ---- distances ---- */
-
-/* D of one node, squared, before its children have a say. */
-static float terrimpi_mip_distance(const terrimp_quadtree *t, uint32_t level, uint32_t node,
-                                   int rule, float tolerance_px, float pixel_factor)
-{
-    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
-    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
-    if (level == 0)
-        return 0.0f;
-    if (rule == TERRIMP_GEOMIP_BOUND || rule == TERRIMP_GEOMIP_DISTANCE) {
-        /* Rounding of heights and of the error itself, so that the bound is one. */
-        float size = terrimpi_max(terrimpi_abs(n->low), terrimpi_abs(n->high));
-        d = n->error > 0.0f ? n->error + 5e-7f * size : 0.0f;
-        d *= pixel_factor / tolerance_px;
-        d *= d;
-    } else {
-        /* The picture's error is its area times the square of the displacement. All nodes cost the
-           same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
-           is equal over all nodes where rms * quad / d^2 is. */
-        float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
-        d = rms * pixel_factor * (quad * pixel_factor) /
-            (tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
-    }
-    return d < TERRIMPI_MIP_MOST ? d : TERRIMPI_MIP_MOST;
-}
-
 static int terrimpi_mip_rule_fits(int rule)
 {
     return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT &&
            (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
-}
-
-static terrimp_result terrimpi_mip_check(const terrimp_quadtree *t, int rule, float tolerance_px,
-                                         float morph_ratio)
-{
-    TERRIMPI_REFUSE(!t || !terrimpi_tree_is_built(t), TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite2(tolerance_px, morph_ratio), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(rule) ||
-                    !terrimpi_within(tolerance_px, 0.01f, 1000.0f) ||
-                    !terrimpi_within(morph_ratio, 1.0f, TERRIMPI_MIP_MORPH_MOST), TERRIMP_E_RANGE);
-    return TERRIMP_OK;
-}
-
-/* The distances of all nodes; a parent's are at least what its children ask for. */
-static void terrimpi_mip_distances(const terrimp_quadtree *tree, int rule, float tolerance_px,
-                                   float morph_ratio, float pixel_factor, float *distances)
-{
-    uint32_t level, node;
-    for (level = 0; level < tree->level_count; level++)
-        for (node = tree->level_first[level]; node < tree->level_first[level + 1u]; node++)
-            distances[node] =
-                terrimpi_mip_distance(tree, level, node, rule, tolerance_px, pixel_factor);
-    for (node = 0; node + 1u < tree->node_count; node++) {
-        float least = distances[node] * morph_ratio * morph_ratio;
-        float *d = &distances[terrimpi_tree_parent_number(tree, node)];
-        *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
-    }
 }
 
 /* ---- selection ---- */
@@ -5157,6 +5037,31 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
     return (a * a + b) / z2 * 1.00001f; /* more than all rounding here */
 }
 
+/* D of one node, squared, before its children have a say. */
+static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, uint32_t node)
+{
+    const terrimp_quadtree *t = f->tree;
+    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
+    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
+    if (level == 0)
+        return 0.0f;
+    if (f->view->rule != TERRIMP_GEOMIP_PICTURE) {
+        /* Rounding of heights and of the error itself, so that the bound is one. */
+        float size = terrimpi_max(terrimpi_abs(n->low), terrimpi_abs(n->high));
+        d = n->error > 0.0f ? n->error + 5e-7f * size : 0.0f;
+        d *= f->factor / f->view->tolerance_px;
+        d *= d;
+    } else {
+        /* The picture's error is its area times the square of the displacement. All nodes cost the
+           same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
+           is equal over all nodes where rms * quad / d^2 is. */
+        float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
+        d = rms * f->factor * (quad * f->factor) /
+            (f->view->tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
+    }
+    return terrimpi_min(d, TERRIMPI_MIP_MOST);
+}
+
 /* Square of a node's error over the tolerance, when it is drawn as it is; 0 when it is out of view.
    *planes: those to test against, and those that are left for its parts. */
 static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp_node *node,
@@ -5164,10 +5069,8 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
 {
     float d2, measure, split2;
     terrimp_box box;
-    split2 = !f->tree->pages ? f->view->distances[node->number]
-                             : terrimpi_mip_distance(f->tree, node->level, node->number,
-                                                     f->view->rule, f->view->tolerance_px,
-                                                     f->factor);
+    split2 = f->tree->pages ? terrimpi_mip_distance(f, node->level, node->number)
+                            : f->view->distances[node->number];
     if (!(split2 > 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
@@ -5333,10 +5236,12 @@ static void terrimpi_mip_collect(terrimpi_mip_frame *f)
     }
 }
 
-/* Remakes the distances when what they depend on has changed. */
+/* Remakes the distances when what they depend on has changed; a parent's are at least what its
+   children ask for. */
 static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
 {
     terrimp_geomip_view *v = f->view;
+    terrimp_node n;
     float wanted[5];
     wanted[0] = (float)v->rule;
     wanted[1] = v->tolerance_px;
@@ -5344,47 +5249,18 @@ static void terrimpi_mip_refresh(terrimpi_mip_frame *f, float pixel_factor)
     wanted[3] = v->rule == TERRIMP_GEOMIP_DISTANCE ? pixel_factor / f->cos2 : pixel_factor;
     wanted[4] = 1.0f + (float)(f->tree->edits & 0xffffffu);
     f->factor = wanted[3];
-    if (f->tree->pages) /* they say what those below ask of them */
-        return;
-    if (memcmp(wanted, v->distances_for, sizeof wanted) == 0)
+    if (f->tree->pages || /* they say what those below ask of them */
+        memcmp(wanted, v->distances_for, sizeof wanted) == 0)
         return;
     memcpy(v->distances_for, wanted, sizeof wanted);
-    terrimpi_mip_distances(f->tree, v->rule, v->tolerance_px, v->morph_ratio, wanted[3],
-                           v->distances);
-}
-
-/* The one description of a view's block. */
-static size_t terrimpi_mip_layout(const terrimp_quadtree *tree, uint32_t draw_capacity,
-                                  unsigned char *base, terrimp_geomip_view *view)
-{
-    terrimpi_arena a = terrimpi_arena_at(base);
-    size_t count = tree->node_count;
-    memset(view, 0, sizeof *view);
-    view->draw_capacity = draw_capacity;
-    view->distances = (float *)terrimpi_take(&a, count, sizeof *view->distances);
-    view->marks = (terrimp_geomip_mark *)terrimpi_take(&a, count, sizeof *view->marks);
-    view->draws = (terrimp_geomip_draw *)terrimpi_take(&a, draw_capacity, sizeof *view->draws);
-    return a.ok ? a.bytes : 0;
-}
-
-TERRIMP_API size_t terrimp_geomip_view_bytes(const terrimp_quadtree *tree, uint32_t draw_capacity)
-{
-    terrimp_geomip_view view;
-    return tree && draw_capacity ? terrimpi_mip_layout(tree, draw_capacity, NULL, &view) : 0;
-}
-
-TERRIMP_API terrimp_result terrimp_geomip_view_init(const terrimp_quadtree *tree,
-                                                    uint32_t draw_capacity, void *memory,
-                                                    size_t bytes, terrimp_geomip_view *view)
-{
-    size_t needed = terrimp_geomip_view_bytes(tree, draw_capacity);
-    TERRIMPI_REFUSE(!tree || !view, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(draw_capacity == 0, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
-    TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
-    memset(memory, 0, needed);
-    terrimpi_mip_layout(tree, draw_capacity, (unsigned char *)memory, view);
-    return TERRIMP_OK;
+    for (n.level = n.number = 0; n.level < f->tree->level_count; n.level++)
+        for (; n.number < f->tree->level_first[n.level + 1u]; n.number++)
+            v->distances[n.number] = terrimpi_mip_distance(f, n.level, n.number);
+    for (n.number = 0; n.number + 1u < f->tree->node_count; n.number++) {
+        float least = v->distances[n.number] * v->morph_ratio * v->morph_ratio;
+        float *d = &v->distances[terrimpi_tree_parent_number(f->tree, n.number)];
+        *d = terrimpi_max(*d, terrimpi_min(least, TERRIMPI_MIP_MOST));
+    }
 }
 
 /* Fills in a view's defaults, in a copy, and checks it. */
@@ -5394,10 +5270,15 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
     TERRIMPI_DEFAULT(view->rule, TERRIMP_GEOMIP_PICTURE);
     TERRIMPI_DEFAULT(view->tolerance_px, 1.0f);
     TERRIMPI_DEFAULT(view->morph_ratio, 1.0f);
-    TERRIMPI_REFUSE(!view->distances || !view->marks || !view->draws, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!terrimpi_within(view->hysteresis, 0.0f, 1.0f), TERRIMP_E_RANGE);
-    return terrimpi_mip_check(tree, view->rule, view->tolerance_px, view->morph_ratio);
+    TERRIMPI_REFUSE(!view->distances || !view->marks || !view->draws ||
+                    !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite2(view->tolerance_px, view->morph_ratio) ||
+                    !terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(view->rule) ||
+                    !terrimpi_within(view->tolerance_px, 0.01f, 1000.0f) ||
+                    !terrimpi_within(view->morph_ratio, 1.0f, TERRIMPI_MIP_MORPH_MOST) ||
+                    !terrimpi_within(view->hysteresis, 0.0f, 1.0f), TERRIMP_E_RANGE);
+    return TERRIMP_OK;
 }
 
 /* Decides which nodes are split, at a tolerance that is `scale` times as large as the view's: the

@@ -587,7 +587,7 @@ static void capture_tighten_touches_the_points_and_keeps_the_rest(void)
                 most[k] = n == 0 || at[k] > most[k] ? at[k] : most[k];
             }
         }
-        CHECK(terrimp_capture_tighten(&c, points[0], (uint32_t)count) == TERRIMP_OK);
+        CHECK(terrimpi_camera_tighten(&c, points[0], (uint32_t)count));
         CHECK(least[0] >= (double)c.tan_left && most[0] <= (double)c.tan_right);
         CHECK(least[1] >= (double)c.tan_down && most[1] <= (double)c.tan_up);
         CHECK(c.tan_right > c.tan_left && c.tan_up > c.tan_down);

@@ -700,32 +700,6 @@ static void mip_move_within_reach(mip_scene *s, terrimp_camera *camera)
     free(alone);
 }
 
-/* A view in one block selects what one of separate arrays does. */
-static void a_view_in_one_block_selects_the_same(void)
-{
-    terrimp_geomip_view view;
-    terrimp_camera camera;
-    mip_scene s;
-    size_t bytes;
-    void *memory;
-    mip_make(&s, 193, 161, 8);
-    mip_random_camera(&s, &camera);
-    bytes = terrimp_geomip_view_bytes(&s.tree, s.view.draw_capacity);
-    memory = malloc(bytes);
-    memset(memory, 0x5a, bytes);
-    CHECK(terrimp_geomip_view_bytes(&s.tree, 0) == 0 && terrimp_geomip_view_bytes(NULL, 9) == 0);
-    CHECK(terrimp_geomip_view_init(&s.tree, s.view.draw_capacity, memory, bytes - 1u, &view) ==
-          TERRIMP_E_MEMORY);
-    CHECK(terrimp_geomip_view_init(&s.tree, s.view.draw_capacity, memory, bytes, &view) ==
-          TERRIMP_OK);
-    CHECK(terrimp_geomip_select(&s.tree, &view, &camera) == TERRIMP_OK);
-    CHECK(terrimp_geomip_select(&s.tree, &s.view, &camera) == TERRIMP_OK);
-    CHECK(view.draw_count == s.view.draw_count && view.triangle_count == s.view.triangle_count);
-    CHECK(memcmp(view.draws, s.view.draws, view.draw_count * sizeof *view.draws) == 0);
-    free(memory);
-    mip_free(&s);
-}
-
 /* The node of a position holds it; beside the field there is none. */
 static void the_node_of_a_position_holds_it(void)
 {
@@ -1327,7 +1301,6 @@ static void geomipmap_tests(void)
     RUN(patterns_refuse_bad_sizes);
     RUN(a_node_knows_its_largest_error_and_that_of_finer_neighbours_beside_it);
     RUN(selections_tile_the_view_and_neighbours_fit);
-    RUN(a_view_in_one_block_selects_the_same);
     RUN(the_node_of_a_position_holds_it);
     RUN(no_sample_in_view_is_further_off_than_predicted);
     RUN(a_real_tile_keeps_within_a_pixel);
