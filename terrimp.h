@@ -2213,7 +2213,7 @@ TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t 
    triangle_budget  [Limits: 6..TERRIMP_MAX_TRIANGLES] [Default 0 -> TERRIMP_TRIANGLE_BUDGET]
    max_error        [wu] above 0: as few triangles as are found to keep every sample within it; all
                     of the budget when that is not enough [Limits: >= 0]
-   scratch          [bytes] as for terrimp_simplify
+   scratch          [bytes] aligned to 8 bytes
    mesh             in: arrays, as terrimp_mesh_capacity says; out: in samples of the rectangle
    error            out: [wu] the largest vertical distance of a sample; NULL: not wanted
    Errors           E_VOID for a sample without data
@@ -2238,32 +2238,6 @@ TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *fie
    Errors  E_STATE when the mesh has no surface yet
    Source  Hess 2010, section 4.2 */
 TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
-
-/* --- standing proud (Hess 6.1) --- */
-
-typedef struct terrimp_raise_desc {
-    const float *heights; /* (required) [rows][cols] of the tile that the mesh was made from */
-    uint32_t cols;        /* (required) as then */
-    uint32_t rows;        /* (required) as then */
-    float amount;         /* 0: not at all; 1: until no sample is above [Limits: 0..1] */
-} terrimp_raise_desc;
-
-/* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
-   surface but for rounding, except beside vertices that may not be raised: a sample whose weight
-   hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
-   Corners stay where they are, since four tiles share them; border vertices follow from the samples
-   of their border alone, so that neighbours still meet. Starts from every vertex raised by the
-   largest shortfall round it and lowers them together as far as the samples let it.
-
-   desc    how far
-   mesh    in: a mesh of that tile without skirts; out: its heights
-   work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
-   Errors  E_STATE when the mesh has no surface or has skirts
-   Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
-   Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
-TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
-                                              float *work);
-
 
 /* ==== Builder ============================================================ >>builder */
 
@@ -4554,6 +4528,17 @@ static int terrimpi_tree_beyond(const terrimp_quadtree *t, const terrimp_node *n
     return 1;
 }
 
+/* The child of a node in its quarter i, along x, then z. Returns 0 when there is none. */
+static int terrimpi_tree_quarter(const terrimp_quadtree *t, const terrimp_node *n, uint32_t i,
+                                 terrimp_node *child)
+{
+    uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+    if (n->level == 0 || !terrimpi_tree_has(t, n->level - 1u, x, z))
+        return 0;
+    *child = terrimpi_tree_at(t, n->level - 1u, x, z);
+    return 1;
+}
+
 /* ---- where it lies ---- */
 
 /* Column and row of lattice position (i, j) of a level. */
@@ -4934,6 +4919,7 @@ TERRIMP_API terrimp_result terrimp_pattern_fill(uint32_t chunk_quads, int form, 
 static void terrimpi_mip_box(const terrimp_quadtree *t, const terrimp_node *n, terrimp_box *box)
 {
     const terrimp_geomip_node *kept = terrimpi_tree_kept(t, n->number);
+    TERRIMP_ASSERT(kept);
     terrimpi_tree_box(t, n, kept->low, kept->high, box);
 }
 
@@ -6474,12 +6460,14 @@ static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const
     return best;
 }
 
-/* terrimp_live_atlas_alloc of checked arguments. */
-static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                           uint32_t height, uint32_t *slot)
+TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, uint32_t *slot)
 {
     uint32_t spot, handle;
     terrimp_rect taken, whole;
+    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
     spot = terrimpi_atlas_find(atlas, width, height);
     handle = atlas->unused;
     if (spot == atlas->free_count || handle == atlas->desc.max_slots) {
@@ -6497,15 +6485,6 @@ static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t w
     terrimpi_atlas_free_cut(atlas, 0, &taken, &whole);
     *slot = handle;
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, uint32_t *slot)
-{
-    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
-    return terrimpi_atlas_alloc(atlas, width, height, slot);
 }
 
 /* Adds the free rectangles that overlap `freed`, which is no slot any more. They replace those
@@ -6547,11 +6526,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
     return TERRIMP_OK;
 }
 
-/* terrimp_live_atlas_room of checked arguments. */
-static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
-                                uint32_t size[2])
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < atlas->free_count; i++) {
         const terrimp_rect *spot = &atlas->free_rects[i];
         uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
@@ -6573,16 +6555,6 @@ static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
         best_x = best_y = 0;
     size[0] = best_x;
     size[1] = best_y;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2])
-{
-    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
-                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
-    terrimpi_atlas_room(atlas, width, height, size);
     return TERRIMP_OK;
 }
 
@@ -7532,7 +7504,8 @@ typedef struct terrimpi_bake {
     uint32_t magic, version;
     uint32_t bytes;         /* in all */
     uint32_t checksum;      /* of everything behind it */
-    uint32_t width, depth, format;
+    uint32_t width, depth;
+    int32_t format;
     uint32_t chunk_quads, triangle_budget, flags;
     uint32_t node_count, vertex_limit, index_limit, mesh_triangle_count;
     uint32_t samples;       /* checksum of the heightfield's samples */
@@ -7540,6 +7513,27 @@ typedef struct terrimpi_bake {
     float height_low, height_high, sample_low, sample_high;
     float range_low, range_step, proud;
 } terrimpi_bake;
+
+/* What a header repeats of a terrain: X(its own field, that of the terrain). */
+#define TERRIMPI_BAKE_FIELDS(X)                 \
+    X(width, desc.field.width)                  \
+    X(depth, desc.field.depth)                  \
+    X(format, desc.field.format)                \
+    X(chunk_quads, desc.chunk_quads)            \
+    X(triangle_budget, desc.triangle_budget)    \
+    X(node_count, tree.node_count)              \
+    X(vertex_limit, vertex_limit)               \
+    X(index_limit, index_limit)                 \
+    X(mesh_triangle_count, mesh_triangle_count) \
+    X(height_scale, desc.field.height_scale)    \
+    X(height_offset, desc.field.height_offset)  \
+    X(height_low, desc.height_low)              \
+    X(height_high, desc.height_high)            \
+    X(sample_low, sample_low)                   \
+    X(sample_high, sample_high)                 \
+    X(range_low, range_low)                     \
+    X(range_step, range_step)                   \
+    X(proud, desc.proud)
 
 /* Fowler, Noll and Vo's hash, a word at a time: no changed word goes unseen, nor two that are
    exchanged. */
@@ -7587,36 +7581,21 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
 static int terrimpi_bake_header(const terrimpi_bake *bake, uint32_t version, terrimp_terrain *t)
 {
     static const float any = 0.0f; /* stands for the samples: they are not looked at */
-    terrimp_terrain_desc desc;
     memset(t, 0, sizeof *t);
-    memset(&desc, 0, sizeof desc);
-    if (bake->version != version || bake->format == 0 ||
-        bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
+    if (bake->version != version || bake->format == 0 || bake->chunk_quads == 0 ||
         bake->triangle_budget == 0 || bake->flags > 3u)
         return 0;
-    desc.field.samples = &any;
-    desc.field.width = bake->width;
-    desc.field.depth = bake->depth;
-    desc.field.format = (int)bake->format;
-    desc.field.height_scale = bake->height_scale;
-    desc.field.height_offset = bake->height_offset;
-    desc.chunk_quads = bake->chunk_quads;
-    desc.triangle_budget = bake->triangle_budget;
-    desc.proud = bake->proud;
-    desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
-    desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
-    desc.height_low = bake->height_low;
-    desc.height_high = bake->height_high;
-    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK || !terrimpi_terrain_count(t))
+#define TERRIMPI_X(own, of) t->of = bake->own;
+    TERRIMPI_BAKE_FIELDS(TERRIMPI_X)
+#undef TERRIMPI_X
+    t->desc.field.samples = &any;
+    t->desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
+    t->desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
+    if (terrimp_terrain_desc_resolve(&t->desc, &t->desc) != TERRIMP_OK ||
+        !terrimpi_terrain_count(t))
         return 0;
-    t->mesh_triangle_count = bake->mesh_triangle_count;
-    t->sample_low = bake->sample_low;
-    t->sample_high = bake->sample_high;
-    t->range_low = bake->range_low;
-    t->range_step = bake->range_step;
     return bake->node_count == t->tree.node_count && bake->vertex_limit == t->vertex_limit &&
-           bake->index_limit == t->index_limit && terrimpi_finite(t->sample_low) &&
-           terrimpi_finite(t->sample_high) &&
+           bake->index_limit == t->index_limit && terrimpi_finite2(t->sample_low, t->sample_high) &&
            terrimpi_terrain_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
@@ -7790,7 +7769,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
     info->bytes = bake.bytes;
     info->width = bake.width;
     info->depth = bake.depth;
-    info->format = (int)bake.format;
+    info->format = bake.format;
     info->height_scale = t.desc.field.height_scale;
     info->height_offset = bake.height_offset;
     info->chunk_quads = bake.chunk_quads;
@@ -8309,7 +8288,7 @@ static void terrimpi_horizon_empty(terrimp_horizon *h, uint32_t quarter, const f
             continue;
         memset(b, 0, sizeof *b);
         for (k = 0; k < TERRIMP_HORIZON_KEPT; k++)
-            b->slope[k] = before & behind ? TERRIMPI_HORIZON_ALL : TERRIMPI_HORIZON_NONE;
+            b->slope[k] = (before & behind) ? TERRIMPI_HORIZON_ALL : TERRIMPI_HORIZON_NONE;
         seen |= !(before & behind);
     }
     h->step_count[quarter] = 0;
@@ -8629,6 +8608,17 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
     return (bytes + 15u) / 16u * 16u;
 }
 
+/* The checksum of a page: of all but its first word. */
+static uint32_t terrimpi_page_hash(const unsigned char *page, uint32_t bytes)
+{
+    uint32_t at, hash = 2166136261u, word;
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    return hash;
+}
+
 /* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
    its top down, and on each level four children side by side ---- */
 
@@ -8644,25 +8634,31 @@ static uint32_t terrimpi_page_interleave(uint32_t x, uint32_t z)
     return out;
 }
 
-/* Pages above the blocks. */
-static uint32_t terrimpi_page_upper(const terrimp_quadtree *t, uint32_t block_level)
+/* Where a block's pages begin, counted in pages: those above the blocks come first and. */
+static uint64_t terrimpi_page_first(const terrimp_quadtree *t, uint32_t block_level, uint32_t block)
 {
-    return t->node_count - t->level_first[block_level + 1u];
+    return t->node_count - t->level_first[block_level + 1u] +
+           (uint64_t)block * terrimpi_page_full(block_level + 1u);
+}
+
+/* Where all pages end, counted the same way. */
+static uint64_t terrimpi_page_end(const terrimp_quadtree *t, uint32_t level)
+{
+    return terrimpi_page_first(t, level, t->level_x[level] * t->level_z[level]);
 }
 
 static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_level,
                                      const terrimp_node *n)
 {
     const terrimp_quadtree *tree = &t->tree;
-    uint32_t index = n->number - tree->level_first[block_level + 1u];
+    uint64_t index = n->number - tree->level_first[block_level + 1u];
     if (n->level <= block_level) {
         uint32_t up = block_level - n->level, mask = (1u << up) - 1u;
-        index = terrimpi_page_upper(tree, block_level) +
-                ((n->z >> up) * tree->level_x[block_level] + (n->x >> up)) *
-                    terrimpi_page_full(block_level + 1u) +
-                terrimpi_page_full(up) + terrimpi_page_interleave(n->x & mask, n->z & mask);
+        uint32_t block = (n->z >> up) * tree->level_x[block_level] + (n->x >> up);
+        index = terrimpi_page_first(tree, block_level, block) + terrimpi_page_full(up) +
+                terrimpi_page_interleave(n->x & mask, n->z & mask);
     }
-    return TERRIMP_PAGES_HEADER_BYTES + (uint64_t)index * terrimpi_page_bytes(t);
+    return TERRIMP_PAGES_HEADER_BYTES + index * terrimpi_page_bytes(t);
 }
 
 /* ---- the header ---- */
@@ -8698,10 +8694,7 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
                     t->desc.field.format == TERRIMP_FORMAT_F32 ||
                     head->block_level >= t->tree.level_count ||
-                    terrimpi_page_upper(&t->tree, head->block_level) +
-                        (uint64_t)t->tree.level_x[head->block_level] *
-                            t->tree.level_z[head->block_level] *
-                            terrimpi_page_full(head->block_level + 1u) > 0xffffffffu ||
+                    terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
     for (i = 0; i < terrimpi_floor_ground_vertices(t) + terrimpi_floor_wall_points(t); i++) {
         float height;
@@ -8716,20 +8709,13 @@ TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
 {
     terrimp_terrain t;
     terrimpi_pages_head head;
-    terrimp_node last;
-    uint32_t edge;
     TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
     if (!info)
         return TERRIMP_OK;
-    edge = (1u << head.block_level) - 1u;
-    last = terrimpi_tree_at(&t.tree, head.block_level, t.tree.level_x[head.block_level] - 1u,
-                            t.tree.level_z[head.block_level] - 1u);
-    last.level = 0; /* the last node of a block, whether there is one or not */
-    last.x = (last.x << head.block_level) + edge;
-    last.z = (last.z << head.block_level) + edge;
     memset(info, 0, sizeof *info);
     info->page_bytes = terrimpi_page_bytes(&t);
-    info->bytes = terrimpi_page_offset(&t, head.block_level, &last) + info->page_bytes;
+    info->bytes = TERRIMP_PAGES_HEADER_BYTES +
+                  terrimpi_page_end(&t.tree, head.block_level) * info->page_bytes;
     info->width = t.desc.field.width;
     info->depth = t.desc.field.depth;
     info->chunk_quads = t.desc.chunk_quads;
@@ -8908,22 +8894,24 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     return TERRIMP_OK;
 }
 
-/* The slot of a page that has been begun; NULL: it has not. */
-static terrimpi_page_slot *terrimpi_page_begun(const terrimp_terrain *t, uint32_t node)
+/* The slot of a page that has been begun. */
+static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t node,
+                                          terrimpi_page_slot **slot)
 {
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(t->tree.pages, node);
-    return slot && !slot->is_here ? slot : NULL;
+    TERRIMPI_TRY(terrimpi_page_check(t, node, t));
+    *slot = terrimpi_page_slot_of(t->tree.pages, node);
+    return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
 /* Whether the records of a node's children are held by its own. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
 {
+    terrimp_node child;
     uint32_t i;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+    for (i = 0; i < 4u; i++) {
         terrimpi_record r;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
         memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
                        i * TERRIMPI_PAGE_RECORD, sizeof r);
@@ -8946,13 +8934,9 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     terrimpi_field_scan scan;
     terrimp_heightfield f = terrimpi_page_field(t, node);
     terrimp_node n = terrimpi_tree_node(&t->tree, node);
-    uint32_t at, hash = 2166136261u, word;
     memcpy(&head, page, sizeof head);
-    for (at = 4u; at < p->page_bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
-    if (head.checksum != hash || head.stamp != p->stamp || head.node != node ||
+    if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
+        head.node != node ||
         memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
@@ -8965,9 +8949,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
-    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
-    slot = terrimpi_page_begun(terrain, node);
-    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
     if (terrimpi_page_ok(terrain, node))
@@ -8979,9 +8961,7 @@ TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t n
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
-    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
-    slot = terrimpi_page_begun(terrain, node);
-    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_OK;
 }
@@ -9022,11 +9002,23 @@ static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
         slot->used = t->pages->frame;
 }
 
+/* As terrimpi_tree_quarter, of a child in sight; the node's page is here. */
+static int terrimpi_page_quarter(const terrimp_terrain *t, const terrimp_node *node, uint32_t i,
+                                 const terrimp_frustum *frustum, terrimp_node *child)
+{
+    terrimp_box box;
+    if (!terrimpi_tree_quarter(&t->tree, node, i, child))
+        return 0;
+    terrimpi_terrain_node_box(t, child, &box);
+    return terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE;
+}
+
 /* Whether a node may be left for its children: its page is here, and of these each in sight. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum)
 {
     const terrimp_quadtree *tree = &t->tree;
+    terrimp_node child;
     uint32_t i;
     int all = 1;
     if (!tree->pages)
@@ -9034,41 +9026,25 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     if (!terrimpi_page_of(tree->pages, node->number))
         return 0;
     terrimpi_page_use(tree, node->number);
-    for (i = 0; i < 4u && node->level > 0; i++) {
-        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
-        terrimp_node child;
-        terrimp_box box;
-        if (!terrimpi_tree_has(tree, node->level - 1u, x, z))
-            continue;
-        child = terrimpi_tree_at(tree, node->level - 1u, x, z);
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        terrimpi_page_use(tree, child.number);
-        all &= terrimpi_page_of(tree->pages, child.number) != NULL;
-    }
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_page_quarter(t, node, i, frustum, &child)) {
+            terrimpi_page_use(tree, child.number);
+            all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+        }
     return all;
 }
 
 /* ---- heights and rays ---- */
 
-/* The finest page that is here at a position. */
-static terrimp_node terrimpi_page_at(const terrimp_terrain *t, float x, float z)
+/* The finest node at a position whose page is here. */
+static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z, terrimp_node *n)
 {
-    const terrimp_quadtree *tree = &t->tree;
-    terrimp_node n = terrimpi_tree_root(tree);
-    while (n.level > 0) {
-        uint32_t level = n.level - 1u, quads = tree->chunk_quads, i, j;
-        terrimp_node child;
-        i = 2u * n.x + (x >= terrimpi_tree_x(tree, level, (2u * n.x + 1u) * quads) ? 1u : 0u);
-        j = 2u * n.z + (z >= terrimpi_tree_z(tree, level, (2u * n.z + 1u) * quads) ? 1u : 0u);
-        child = terrimpi_tree_at(tree, level, terrimpi_min_u32(i, tree->level_x[level] - 1u),
-                                 terrimpi_min_u32(j, tree->level_z[level] - 1u));
-        if (!terrimpi_page_of(tree->pages, child.number))
-            break;
-        n = child;
+    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, n));
+    while (!terrimpi_page_of(t->pages, n->number)) {
+        TERRIMPI_REFUSE(n->level + 1u == t->level_count, TERRIMP_E_PAGE);
+        *n = terrimpi_tree_parent(t, n);
     }
-    return n;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
@@ -9081,14 +9057,8 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
     f = terrain->desc.field;
     memset(&n, 0, sizeof n);
     if (terrain->tree.pages) {
-        const terrimp_quadtree *tree = &terrain->tree;
-        TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
-        TERRIMPI_REFUSE(!terrimpi_within(x, f.origin_x, terrimpi_tree_x(tree, 0, f.width - 1u)) ||
-                        !terrimpi_within(z, f.origin_z, terrimpi_tree_z(tree, 0, f.depth - 1u)),
-                        TERRIMP_E_MISS);
-        n = terrimpi_page_at(terrain, x, z);
-        TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, n.number) || (n.level > 0 && !level),
-                        TERRIMP_E_PAGE);
+        TERRIMPI_TRY(terrimpi_page_at(&terrain->tree, x, z, &n));
+        TERRIMPI_REFUSE(n.level > 0 && !level, TERRIMP_E_PAGE);
         f = terrimpi_page_field(terrain, n.number);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
@@ -9961,17 +9931,17 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
     uint32_t room[2];
     do {
         for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
-            if (terrimpi_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
+            if (terrimp_live_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
                 TERRIMP_OK)
                 return 1;
     } while (terrimpi_cache_evict(c));
     c->failures++;
     for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++) {
         terrimp_live_atlas *atlas = &c->atlases[slot->atlas];
-        terrimpi_atlas_room(atlas, size[0], size[1], room);
+        terrimp_live_atlas_room(atlas, size[0], size[1], room);
         if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
             room[0] > 2u * TERRIMPI_CAPTURE_MARGIN && room[1] > 2u * TERRIMPI_CAPTURE_MARGIN)
-            return terrimpi_atlas_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
+            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
     }
     return 0;
 }
@@ -11028,28 +10998,25 @@ static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int re
         *worst = want;
 }
 
-/* The same for the children of a node that are in sight, and the node itself. */
-static void terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
-                                        const terrimp_node *node, int reason, float urgency)
+/* The same for a node and its children in sight. Returns whether all of them are here. */
+static int terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
+                                       const terrimp_node *node, int reason, float urgency)
 {
     const terrimp_quadtree *t = &v->terrain->tree;
+    terrimp_node child;
     uint32_t i;
+    int all = 1;
     if (!t->pages)
-        return;
+        return 1;
     terrimpi_view_want(v, node, reason, urgency);
     if (!terrimpi_page_of(t->pages, node->number))
-        return;
-    for (i = 0; i < 4u && node->level > 0; i++) {
-        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
-        terrimp_node child;
-        terrimp_box box;
-        if (!terrimpi_tree_has(t, node->level - 1u, x, z))
-            continue;
-        child = terrimpi_tree_at(t, node->level - 1u, x, z);
-        terrimpi_terrain_node_box(v->terrain, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+        return 0;
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_page_quarter(v->terrain, node, i, frustum, &child)) {
             terrimpi_view_want(v, &child, reason, urgency);
-    }
+            all &= terrimpi_page_of(t->pages, child.number) != NULL;
+        }
+    return all;
 }
 
 /* Whether the nodes exist that have to beside and above one that is split. */
@@ -11086,10 +11053,9 @@ static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
             terrimp_node node = terrimpi_tree_node(t, number);
             if (mark->measure < 1.0f)
                 continue;
-            terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
-                                        TERRIMP_SQRTF(mark->measure));
-            if (terrimpi_view_has_around(mip, &node) &&
-                terrimpi_page_divides(v->terrain, &node, &f->frustum))
+            if (terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
+                                            TERRIMP_SQRTF(mark->measure)) &&
+                terrimpi_view_has_around(mip, &node))
                 continue;
             mark->measure = 0.0f;
             v->late++;
@@ -15170,142 +15136,6 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
     return terrimpi_simp_run(desc, NULL, scratch, scratch_bytes, mesh);
 }
 
-/* --- a tile by one call --- */
-
-#define TERRIMPI_SIMP_POINTS 52u /* of a border of the largest budget */
-
-/* The largest vertical distance of a tile's samples to the triangles of a mesh. */
-static float terrimpi_simp_largest_error(const terrimp_simplify_desc *desc,
-                                         const terrimp_mesh *mesh)
-{
-    float most = 0.0f;
-    uint32_t i, k;
-    for (i = 0; i < mesh->surface_index_count; i += 3u) {
-        int64_t p[3][2], low[2], high[2], at[2], all;
-        float h[3];
-        for (k = 0; k < 3u; k++) {
-            const terrimp_mesh_vertex *v = &mesh->vertices[mesh->indices[i + k]];
-            p[k][0] = v->x;
-            p[k][1] = v->z;
-            h[k] = v->height;
-        }
-        for (k = 0; k < 2u; k++) {
-            low[k] = p[0][k] < p[1][k] ? p[0][k] : p[1][k];
-            low[k] = low[k] < p[2][k] ? low[k] : p[2][k];
-            high[k] = p[0][k] > p[1][k] ? p[0][k] : p[1][k];
-            high[k] = high[k] > p[2][k] ? high[k] : p[2][k];
-        }
-        all = terrimpi_twice_area(p[0], p[1], p[2]);
-        for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
-            for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-                int64_t b = terrimpi_twice_area(p[2], p[0], at);
-                int64_t c = terrimpi_twice_area(p[0], p[1], at);
-                float miss = desc->heights[at[1] * (int64_t)desc->cols + at[0]] - h[0];
-                if (b < 0 || c < 0 || b + c > all)
-                    continue;
-                miss -= ((h[1] - h[0]) * (float)b + (h[2] - h[0]) * (float)c) / (float)all;
-                most = terrimpi_max(most, terrimpi_abs(miss));
-            }
-    }
-    return most;
-}
-
-/* Simplifies the four borders of a tile. */
-static terrimp_result terrimpi_simp_borders(terrimp_simplify_desc *desc, float *line,
-                                            terrimp_border_point (*points)[TERRIMPI_SIMP_POINTS])
-{
-    uint32_t limit = terrimpi_terrain_border_points(desc->triangle_budget), k;
-    int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t along = terrimpi_along_x(side) ? 1u : desc->cols;
-        uint32_t count = terrimpi_along_x(side) ? desc->cols : desc->rows;
-        uint32_t first = side == TERRIMP_SIDE_Z1   ? (desc->rows - 1u) * desc->cols
-                         : side == TERRIMP_SIDE_X1 ? desc->cols - 1u : 0u;
-        for (k = 0; k < count; k++)
-            line[k] = desc->heights[first + k * along];
-        TERRIMPI_TRY(terrimp_border_simplify(line, count, limit, points[side],
-                                             TERRIMPI_SIMP_POINTS,
-                                             &desc->borders[side].point_count));
-        desc->borders[side].points = points[side];
-    }
-    return TERRIMP_OK;
-}
-
-/* Scratch: the tile, a border of it, then that of the simplifier. */
-static size_t terrimpi_simp_field_layout(uint32_t cols, uint32_t rows, uint32_t budget, void *base,
-                                         float **tile, float **line, void **rest)
-{
-    terrimpi_arena a = terrimpi_arena_at((unsigned char *)base);
-    size_t bytes = terrimp_simplify_scratch_bytes(cols, rows, budget);
-    if (bytes == 0 || (budget > 0 && budget < 6u))
-        return 0;
-    *rest = terrimpi_take(&a, bytes, 1);
-    *tile = (float *)terrimpi_take(&a, (size_t)cols * rows, sizeof **tile);
-    *line = (float *)terrimpi_take(&a, TERRIMP_MAX_TILE_DIM, sizeof **line);
-    return a.ok ? a.bytes : 0;
-}
-
-TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
-                                                        uint32_t triangle_budget)
-{
-    float *tile, *line;
-    void *rest;
-    return terrimpi_simp_field_layout(cols, rows, triangle_budget, NULL, &tile, &line, &rest);
-}
-
-TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
-                                                  const terrimp_rect *samples,
-                                                  uint32_t triangle_budget, float max_error,
-                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
-                                                  float *error)
-{
-    terrimp_border_point points[TERRIMP_SIDE_COUNT][TERRIMPI_SIMP_POINTS];
-    terrimp_simplify_desc desc;
-    float *tile, *line, off;
-    uint32_t low = 2, high, border = 0;
-    size_t needed;
-    void *rest;
-    int side;
-    TERRIMPI_REFUSE(!field || !samples || !mesh, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(max_error), TERRIMP_E_NOT_FINITE);
-    needed = terrimpi_simp_field_layout(samples->width, samples->height, triangle_budget, scratch,
-                                        &tile, &line, &rest);
-    TERRIMPI_REFUSE(needed == 0 || max_error < 0.0f, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(samples->x > field->width - samples->width || field->width < samples->width ||
-                    samples->y > field->depth - samples->height ||
-                    field->depth < samples->height, TERRIMP_E_RANGE);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
-    TERRIMPI_TRY(terrimp_heightfield_read(field, samples->x, samples->y, samples->width,
-                                          samples->height, 1, tile));
-    memset(&desc, 0, sizeof desc);
-    desc.heights = tile;
-    desc.cols = samples->width;
-    desc.rows = samples->height;
-    desc.triangle_budget = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    TERRIMPI_TRY(terrimpi_simp_borders(&desc, line, points));
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        border += desc.borders[side].point_count - 1u;
-    high = desc.triangle_budget;
-    low = terrimpi_max_u32(low, border - 2u);
-    TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
-    off = terrimpi_simp_largest_error(&desc, mesh);
-    while (max_error > 0.0f && off <= max_error && low < high) { /* high is enough; is this? */
-        desc.triangle_budget = low + (high - low) / 2u;
-        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
-        if (terrimpi_simp_largest_error(&desc, mesh) <= max_error)
-            high = desc.triangle_budget;
-        else
-            low = desc.triangle_budget + 1u;
-    }
-    if (desc.triangle_budget != high) {
-        desc.triangle_budget = high;
-        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
-    }
-    if (error)
-        *error = terrimpi_simp_largest_error(&desc, mesh);
-    return TERRIMP_OK;
-}
-
 /* --- skirts (Hess 4.2) --- */
 
 static terrimp_result terrimpi_raise_check_surface(const terrimp_mesh *mesh)
@@ -15378,49 +15208,57 @@ static void terrimpi_raise_down(float w, float n, float over, float *change)
         *change = terrimpi_min(*change, over / (n * w));
 }
 
-static int terrimpi_raise_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
+/* What a mesh misses, and that mesh. */
+typedef struct terrimpi_raise {
+    const float *miss; /* [rows][cols] how far the samples are above the mesh */
+    uint32_t cols, rows;
+    const terrimp_mesh *mesh;
+} terrimpi_raise;
+
+static float terrimpi_raise_is_free(const terrimpi_raise *r, const terrimp_mesh_vertex *v)
 {
-    return (v->x == 0 || v->x == desc->cols - 1) && (v->z == 0 || v->z == desc->rows - 1);
+    int corner = (v->x == 0 || v->x == r->cols - 1) && (v->z == 0 || v->z == r->rows - 1);
+    return corner ? 0.0f : 1.0f;
 }
 
 /* Goes once over the samples of a border between vertices a and b, which are in rising order
    whichever way the loop runs: both neighbours compute the same bits. */
-static void terrimpi_raise_segment(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                   uint32_t a, uint32_t b, const float *raise, float *change,
-                                   int lowering)
+static void terrimpi_raise_segment(const terrimpi_raise *r, uint32_t a, uint32_t b,
+                                   const float *raise, float *change, int lowering)
 {
-    const terrimp_mesh_vertex *p = mesh->vertices + a, *q = mesh->vertices + b;
-    uint32_t cols = desc->cols, stride = p->z == q->z ? 1 : cols;
-    const float *samples = desc->heights + p->z * cols + p->x;
+    const terrimp_mesh_vertex *p = r->mesh->vertices + a, *q = r->mesh->vertices + b;
+    uint32_t stride = p->z == q->z ? 1 : r->cols;
+    const float *miss = r->miss + p->z * r->cols + p->x;
     int32_t k, count = p->z == q->z ? q->x - p->x : q->z - p->z;
-    float *to[2], w[2], is_free[2];
-    to[0] = change + a;
-    to[1] = change + b;
-    is_free[0] = terrimpi_raise_is_corner(desc, p) ? 0.0f : 1.0f;
-    is_free[1] = terrimpi_raise_is_corner(desc, q) ? 0.0f : 1.0f;
-    for (k = 0; k <= count; k++, samples += stride) {
-        float surface, wanted;
-        int i;
-        w[1] = (float)k / (float)count;
-        w[0] = 1.0f - w[1];
-        surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
-        wanted = terrimpi_raise_wanted(*samples - surface,
-                                       *samples - (w[0] * p->height + w[1] * q->height),
-                                       w[0] * is_free[0] + w[1] * is_free[1]);
-        for (i = 0; i < 2; i++)
-            if (lowering)
-                terrimpi_raise_down(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
-            else
-                terrimpi_raise_up(w[i], wanted, to[i]);
+    float free_a = terrimpi_raise_is_free(r, p), free_b = terrimpi_raise_is_free(r, q);
+    for (k = 0; k <= count; k++, miss += stride) {
+        float w = (float)k / (float)count, over, wanted;
+        over = (1.0f - w) * raise[a] + w * raise[b] - *miss;
+        wanted = terrimpi_raise_wanted(-over, *miss, (1.0f - w) * free_a + w * free_b);
+        if (lowering) {
+            over = terrimpi_max(0.0f, over);
+            terrimpi_raise_down(1.0f - w, 2.0f, over, change + a);
+            terrimpi_raise_down(w, 2.0f, over, change + b);
+        } else {
+            terrimpi_raise_up(1.0f - w, wanted, change + a);
+            terrimpi_raise_up(w, wanted, change + b);
+        }
     }
 }
 
-/* Raises the loop's vertices, border by border, but for the corners. */
-static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                float *raise, float *change)
+/* What each pass begins with, and what it does to a vertex: the first one raises, others lower. */
+static float terrimpi_raise_begin(int pass) { return pass ? TERRIMPI_FLOAT_MAX : 0.0f; }
+
+static float terrimpi_raise_end(int pass, float raise, float change)
 {
-    const terrimp_mesh_vertex *v = mesh->vertices;
-    uint32_t n = mesh->border_vertex_count, first = 0, last, i;
+    return pass ? terrimpi_max(0.0f, raise - change) : change;
+}
+
+/* Raises the loop's vertices, border by border, but for the corners. */
+static void terrimpi_raise_loop(const terrimpi_raise *r, float *raise, float *change)
+{
+    const terrimp_mesh_vertex *v = r->mesh->vertices;
+    uint32_t n = r->mesh->border_vertex_count, first = 0, last, i;
     int side, pass;
     for (side = 0; side < 4; side++, first = last) {
         int along_x = side & 1, backwards = side >= 2;
@@ -15431,57 +15269,52 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
             last--; /* the loop's end closes the last side itself */
         for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
             for (i = first; i <= last; i++)
-                change[i % n] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
+                change[i % n] = terrimpi_raise_begin(pass);
             for (i = first; i < last; i++)
-                terrimpi_raise_segment(desc, mesh, backwards ? (i + 1) % n : i,
-                                       backwards ? i : (i + 1) % n, raise, change, pass > 0);
+                terrimpi_raise_segment(r, backwards ? (i + 1) % n : i, backwards ? i : (i + 1) % n,
+                                       raise, change, pass > 0);
             for (i = first + 1; i < last; i++)
-                raise[i] = pass ? terrimpi_max(0.0f, raise[i] - change[i]) : change[i];
+                raise[i] = terrimpi_raise_end(pass, raise[i], change[i]);
         }
     }
 }
 
-/* The slopes of the plane through three vertices. */
-static void terrimpi_raise_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
+/* The slopes of the plane through three vertices, of heights h. */
+static void terrimpi_raise_plane(const terrimp_mesh_vertex v[3], float h0, float h1, float h2,
+                                 float *gx, float *gz)
 {
     int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
     int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
-    float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    float inverse = 1.0f / (float)(bz * cx - bx * cz), hb = h1 - h0, hc = h2 - h0;
     *gx = ((float)bz * hc - (float)cz * hb) * inverse;
     *gz = ((float)cx * hb - (float)bx * hc) * inverse;
 }
 
 /* Goes once over the samples of a triangle. */
-static void terrimpi_raise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
-                                    const uint16_t *t, const float *raise, float *change,
-                                    int lowering)
+static void terrimpi_raise_triangle(const terrimpi_raise *r, const uint16_t *t, const float *raise,
+                                    float *change, int lowering)
 {
     terrimp_mesh_vertex v[3];
     terrimpi_simp_span span;
-    float slope_x[3], slope_z[3], gx, gz, to[3];
+    float slope_x[3], slope_z[3], gx, gz, to[3], h[3];
     float limit; /* how far above a sample the surface is when that changes nothing; no weight is
                     above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
         to[k] = change[t[k]];
-        v[k] = mesh->vertices[t[k]];
-        v[k].height = 0.0f;
+        v[k] = r->mesh->vertices[t[k]];
+        h[k] = raise[t[k]];
     }
-    for (k = 0; k < 3; k++) { /* slopes of the weights */
-        v[k].height = 1.0f;
-        terrimpi_raise_plane(v, &slope_x[k], &slope_z[k]);
-        v[k].height = 0.0f;
-    }
-    for (k = 0; k < 3; k++)
-        v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
+    for (k = 0; k < 3; k++) /* of the weights */
+        terrimpi_raise_plane(v, (float)(k == 0), (float)(k == 1), (float)(k == 2), &slope_x[k],
+                             &slope_z[k]);
     terrimpi_simp_find_span(v, &span);
-    terrimpi_raise_plane(v, &gx, &gz);
+    terrimpi_raise_plane(v, h[0], h[1], h[2], &gx, &gz);
     limit = lowering ? 3.001f * terrimpi_largest(to) : 0.0f;
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
             float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
-            float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
+            float miss = r->miss[z * (int32_t)r->cols + x], over = h[0] + dx * gx + dz * gz - miss;
             if (over >= limit)
                 continue;
             for (k = 0; k < 3; k++)
@@ -15495,9 +15328,8 @@ static void terrimpi_raise_triangle(const float *heights, int32_t cols, const te
                 continue;
             }
             for (k = 0; k < 3; k++)
-                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
-            wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            wanted = terrimpi_raise_wanted(-over, wanted - over, hold);
+                hold += t[k] >= r->mesh->border_vertex_count ? w[k] : 0.0f;
+            wanted = terrimpi_raise_wanted(-over, miss, hold);
             for (k = 0; k < 3; k++)
                 terrimpi_raise_up(w[k], wanted, &to[k]);
         }
@@ -15505,50 +15337,31 @@ static void terrimpi_raise_triangle(const float *heights, int32_t cols, const te
         change[t[k]] = to[k];
 }
 
-static terrimp_result terrimpi_raise_check(const terrimp_raise_desc *desc,
-                                           const terrimp_mesh *mesh)
-{
-    uint32_t i;
-    TERRIMPI_TRY(terrimpi_raise_check_surface(mesh));
-    TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows), TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!terrimpi_finite(desc->amount), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(desc->amount < 0.0f || desc->amount > 1.0f, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(mesh->vertex_count != mesh->surface_vertex_count, TERRIMP_E_STATE);
-    for (i = 0; i < mesh->surface_vertex_count; i++)
-        if (mesh->vertices[i].x >= desc->cols || mesh->vertices[i].z >= desc->rows)
-            return TERRIMP_E_RANGE;
-    for (i = 0; i < mesh->surface_index_count; i++)
-        TERRIMPI_REFUSE(mesh->indices[i] >= mesh->surface_vertex_count, TERRIMP_E_RANGE);
-    return terrimpi_simp_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
-                                                                       : TERRIMP_E_NOT_FINITE;
-}
+/* Finds by how much to raise each vertex so that no sample is above the mesh but for rounding,
+   except beside vertices that may not be raised: a sample whose weight hangs by more than half on
+   corners (on a border) or on border vertices (inside) may stay above. Corners stay where they are,
+   since four tiles share them; border vertices follow from the samples of their border alone, so
+   that neighbours still meet. Starts from every vertex raised by the largest shortfall round it and
+   lowers them together as far as the samples let it.
 
-TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
-                                              float *work)
+   raise   [2 * surface_vertex_count] out: in its first half the raises */
+static void terrimpi_raise_find(const terrimpi_raise *r, float *raise)
 {
-    uint32_t n, i;
-    float *change;
+    const terrimp_mesh *mesh = r->mesh;
+    uint32_t n = mesh->surface_vertex_count, i;
+    float *change = raise + n;
     int pass;
-    TERRIMPI_REFUSE(!desc || !mesh || !work, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_raise_check(desc, mesh));
-    n = mesh->surface_vertex_count;
-    change = work + n;
     for (i = 0; i < n; i++)
-        work[i] = 0.0f;
-    terrimpi_raise_loop(desc, mesh, work, change);
+        raise[i] = 0.0f;
+    terrimpi_raise_loop(r, raise, change);
     for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
         for (i = 0; i < n; i++)
-            change[i] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
+            change[i] = terrimpi_raise_begin(pass);
         for (i = 0; i < mesh->surface_index_count; i += 3)
-            terrimpi_raise_triangle(desc->heights, (int32_t)desc->cols, mesh, mesh->indices + i,
-                                    work, change, pass > 0);
+            terrimpi_raise_triangle(r, mesh->indices + i, raise, change, pass > 0);
         for (i = mesh->border_vertex_count; i < n; i++)
-            work[i] = pass ? terrimpi_max(0.0f, work[i] - change[i]) : change[i];
+            raise[i] = terrimpi_raise_end(pass, raise[i], change[i]);
     }
-    for (i = 0; i < n; i++)
-        mesh->vertices[i].height += desc->amount * work[i];
-    return TERRIMP_OK;
 }
 
 /* ==== Builder ============================================================ >>impl-builder */
@@ -16041,39 +15854,46 @@ typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
     float *row;             /* samples of one row or column of the node; scratch of its errors */
     float *tops;            /* of a border: see terrimpi_build_ground_tops */
-    float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
     uint16_t *indices;
     terrimpi_build_triangle *facets; /* [triangle] */
     uint32_t vertex_capacity, index_capacity;
+    uint32_t border_points; /* inner ones that a border keeps */
     void *rest;
     size_t rest_bytes;
 } terrimpi_build;
 
-static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base,
-                                    terrimpi_build *build)
+/* Lays it out for a tile, of a node that has up to `longest` samples along a side. */
+static size_t terrimpi_build_layout_tile(uint32_t cols, uint32_t rows, size_t longest,
+                                         uint32_t budget, void *base, terrimpi_build *build)
 {
     terrimpi_arena b = terrimpi_arena_at(base);
-    size_t side = desc->chunk_quads + 1u, vertices, longest;
-    terrimp_mesh_capacity(desc->triangle_budget, &build->vertex_capacity, &build->index_capacity);
-    build->rest_bytes =
-        terrimp_simplify_scratch_bytes((uint32_t)side, (uint32_t)side, desc->triangle_budget);
+    size_t vertices;
+    terrimp_mesh_capacity(budget, &build->vertex_capacity, &build->index_capacity);
+    build->border_points = terrimpi_terrain_border_points(budget);
+    build->rest_bytes = terrimp_simplify_scratch_bytes(cols, rows, budget);
     vertices = build->vertex_capacity;
-    longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
-    build->tile = (float *)terrimpi_take(&b, side * side, sizeof *build->tile);
+    build->tile = (float *)terrimpi_take(&b, (size_t)cols * rows, sizeof *build->tile);
     build->row = (float *)terrimpi_take(&b, longest, sizeof *build->row);
     build->tops = (float *)terrimpi_take(&b, longest, sizeof *build->tops);
-    build->heights = (float *)terrimpi_take(&b, vertices, sizeof *build->heights);
     build->work = (float *)terrimpi_take(&b, 2u * vertices, sizeof *build->work);
     build->vertices =
         (terrimp_mesh_vertex *)terrimpi_take(&b, vertices, sizeof *build->vertices);
     build->indices =
         (uint16_t *)terrimpi_take(&b, build->index_capacity, sizeof *build->indices);
     build->facets =
-        (terrimpi_build_triangle *)terrimpi_take(&b, desc->triangle_budget, sizeof *build->facets);
+        (terrimpi_build_triangle *)terrimpi_take(&b, budget, sizeof *build->facets);
     build->rest = terrimpi_take(&b, build->rest_bytes, 1);
-    return b.ok ? b.bytes : 0;
+    return b.ok && build->rest_bytes ? b.bytes : 0;
+}
+
+static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base,
+                                    terrimpi_build *build)
+{
+    uint32_t side = desc->chunk_quads + 1u;
+    size_t longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
+    return terrimpi_build_layout_tile(side, side, longest, desc->triangle_budget, base, build);
 }
 
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
@@ -16182,14 +16002,15 @@ static void terrimpi_build_subtract_border(const terrimpi_terrain_tile *p, const
 /* Reads row z of a node and takes the surface away: what is left is how far each sample is above
    it. Triangles share the columns at which a row crosses their sides, so every sample counts for
    exactly one of them. */
-static void terrimpi_build_residual_of_row(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+static void terrimpi_build_residual_of_row(const terrimp_heightfield *field,
+                                           const terrimpi_terrain_tile *p,
                                            const terrimp_mesh *mesh, const terrimpi_build *build,
                                            uint32_t z)
 {
     const terrimpi_build_triangle *facet = build->facets, *end = facet + mesh->surface_index_count /
         3u;
     float *row = build->row, last = (float)p->span_x;
-    terrimpi_field_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
+    terrimpi_field_tile(field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
         terrimpi_build_subtract_border(p, mesh, TERRIMP_SIDE_Z1, row);
         return;
@@ -16235,14 +16056,14 @@ static float terrimpi_build_line_mean(const float *line, uint32_t k, uint32_t le
 }
 
 /* Reads one of a node's borders, along +x or +z; returns how many quads it spans. */
-static uint32_t terrimpi_build_read_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                           int side, float *line)
+static uint32_t terrimpi_build_read_border(const terrimp_heightfield *field,
+                                           const terrimpi_terrain_tile *p, int side, float *line)
 {
     int along_x = terrimpi_along_x(side);
     uint32_t x = side == TERRIMP_SIDE_X1 ? p->x + p->span_x : p->x;
     uint32_t z = side == TERRIMP_SIDE_Z1 ? p->z + p->span_z : p->z;
     uint32_t span = along_x ? p->span_x : p->span_z;
-    terrimpi_field_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
+    terrimpi_field_tile(field, x, z, along_x ? span + 1u : 1u,
                         along_x ? 1u : span + 1u, 1, line);
     return span;
 }
@@ -16261,7 +16082,7 @@ static uint32_t terrimpi_build_tile_border(const terrimpi_terrain_tile *p, int s
 /* Fills the tile that the simplifier works on: at level 0 the samples, above that the mean of those
    round each place (single samples give 1 to 7 % more error). Borders are made of their own samples
    alone, and corners are samples, so that the nodes that share them agree. */
-static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+static void terrimpi_build_tile(const terrimp_heightfield *field, const terrimpi_terrain_tile *p,
                                 const terrimpi_build *build)
 {
     uint32_t i, k, z, half = (1u << p->level) / 2u, first, step;
@@ -16273,7 +16094,7 @@ static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain
         for (i = 0; i < p->cols; i++)
             out[i] = 0.0f;
         for (z = from; z < to; z++) {
-            terrimpi_field_tile(&t->desc.field, p->x, p->z + z, p->span_x, 1, 1, build->row);
+            terrimpi_field_tile(field, p->x, p->z + z, p->span_x, 1, 1, build->row);
             for (i = 1; i + 1u < p->cols; i++)
                 out[i] += terrimpi_build_line_mean(build->row, i, p->level, p->span_x);
         }
@@ -16281,7 +16102,7 @@ static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain
             out[i] /= (float)(to - from);
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t span = terrimpi_build_read_border(t, p, side, build->row);
+        uint32_t span = terrimpi_build_read_border(field, p, side, build->row);
         uint32_t count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             build->tile[first + k * step] =
@@ -16290,48 +16111,43 @@ static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain
     }
 }
 
-/* Simplifies the tile between its four borders. */
-static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
-                                              const terrimpi_terrain_tile *p,
+#define TERRIMPI_BUILD_POINTS 52u /* of a border of the largest budget */
+
+/* Simplifies the tile between its four borders, of as many points as the budget asks for. */
+static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, uint32_t budget,
                                               const terrimpi_build *build, terrimp_mesh *mesh)
 {
-    terrimp_border_point points[TERRIMP_SIDE_COUNT][16];
-    float line[129];
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][TERRIMPI_BUILD_POINTS];
+    float line[TERRIMP_MAX_TILE_DIM];
     terrimp_simplify_desc desc;
     terrimpi_simp_last_spacing squeeze;
-    int side, even;
+    int side, even = (p->span_x | p->span_z) % (1u << p->level) == 0;
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
-    desc.triangle_budget = t->desc.triangle_budget;
+    desc.triangle_budget = budget;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        TERRIMPI_TRY(terrimp_border_simplify(
-            line, count, terrimpi_terrain_border_points(t->desc.triangle_budget), points[side], 16,
-            &desc.borders[side].point_count));
+        TERRIMPI_TRY(terrimp_border_simplify(line, count, build->border_points, points[side],
+                                             TERRIMPI_BUILD_POINTS,
+                                             &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
     squeeze.last_x = (int32_t)p->span_x;
     squeeze.last_z = (int32_t)p->span_z;
-    memset(mesh, 0, sizeof *mesh);
-    mesh->vertices = build->vertices;
-    mesh->indices = build->indices;
-    mesh->vertex_capacity = build->vertex_capacity;
-    mesh->index_capacity = build->index_capacity;
-    even = (p->span_x | p->span_z) % (1u << p->level) == 0;
     return terrimpi_simp_run(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
    a sample round it over the polyline. From the border's own samples alone. */
-static void terrimpi_build_border_shortfall(const terrimp_terrain *t,
+static void terrimpi_build_border_shortfall(const terrimp_heightfield *field,
                                             const terrimpi_terrain_tile *p, int side,
                                             const terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    uint32_t span = terrimpi_build_read_border(t, p, side, build->row), first, step, i, k;
+    uint32_t span = terrimpi_build_read_border(field, p, side, build->row), first, step, i, k;
     uint32_t count = terrimpi_build_tile_border(p, side, &first, &step);
     terrimpi_build_subtract_border(p, mesh, side, build->row);
     build->tile[first] = build->tile[first + (count - 1u) * step] = 0.0f;
@@ -16348,8 +16164,9 @@ static void terrimpi_build_border_shortfall(const terrimp_terrain *t,
 
 /* Fills the tile with what the mesh misses: for each place the largest height of a sample round it
    over the surface. */
-static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                     const terrimp_mesh *mesh, const terrimpi_build *build)
+static void terrimpi_build_shortfall(const terrimp_heightfield *field,
+                                     const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                     const terrimpi_build *build)
 {
     uint32_t i, k, x, z;
     int side;
@@ -16359,7 +16176,7 @@ static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_te
         uint32_t from, to;
         terrimpi_build_window(k, p->level, p->rows, p->span_z, &from, &to);
         for (z = from; z < to; z++) {
-            terrimpi_build_residual_of_row(t, p, mesh, build, z);
+            terrimpi_build_residual_of_row(field, p, mesh, build, z);
             for (i = 1; i + 1u < p->cols; i++) {
                 uint32_t first, end;
                 float most;
@@ -16372,32 +16189,27 @@ static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_te
         }
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        terrimpi_build_border_shortfall(t, p, side, mesh, build);
+        terrimpi_build_border_shortfall(field, p, side, mesh, build);
 }
 
-/* Raises the mesh so that it stands proud of all samples. Since a raise is a piecewise linear
-   function over the same triangles, it is found on a flat copy of the mesh, from what is missed:
-   there the places of the tile stand for all samples round them, however steep the terrain is.
-   To do so twice halves the samples that still stand out, from 0.3 to 0.15 %, and makes the error
-   larger by a tenth to a fifth: not worth it. */
-static terrimp_result terrimpi_build_raise(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                           terrimp_mesh *mesh, const terrimpi_build *build)
+/* Raises the mesh so that it stands proud of all samples. A raise is a piecewise linear function
+   over the same triangles, so it is found from what is missed: there the places of the tile stand
+   for all samples round them, however steep the terrain is. To do so twice halves the samples that
+   still stand out, from 0.3 to 0.15 %, and makes the error larger by a tenth to a fifth: not worth
+   it. */
+static void terrimpi_build_raise(const terrimp_heightfield *field, const terrimpi_terrain_tile *p,
+                                 float proud, terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    terrimp_raise_desc raise;
+    terrimpi_raise raise;
     uint32_t i;
-    terrimpi_build_shortfall(t, p, mesh, build);
-    raise.heights = build->tile;
+    terrimpi_build_shortfall(field, p, mesh, build);
+    raise.miss = build->tile;
     raise.cols = p->cols;
     raise.rows = p->rows;
-    raise.amount = t->desc.proud;
-    for (i = 0; i < mesh->surface_vertex_count; i++) {
-        build->heights[i] = mesh->vertices[i].height;
-        mesh->vertices[i].height = 0.0f;
-    }
-    TERRIMPI_TRY(terrimp_mesh_raise(&raise, mesh, build->work));
+    raise.mesh = mesh;
+    terrimpi_raise_find(&raise, build->work);
     for (i = 0; i < mesh->surface_vertex_count; i++)
-        mesh->vertices[i].height += build->heights[i];
-    return TERRIMP_OK;
+        mesh->vertices[i].height += proud * build->work[i];
 }
 
 /* The highest that ground can be drawn at each sample of a border: of levels up to one the lines
@@ -16442,7 +16254,7 @@ static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_
         lift[i] = 0.0f;
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t span = terrimpi_build_read_border(t, p, side, build->row);
+        uint32_t span = terrimpi_build_read_border(&t->desc.field, p, side, build->row);
         terrimpi_build_ground_tops(build, span, p->level + 1u);
         terrimpi_build_subtract_border(p, mesh, side, build->tops);
         for (i = 0; i < mesh->border_vertex_count; i++) {
@@ -16551,16 +16363,17 @@ static void terrimpi_build_add_error(terrimpi_build_error *error, float differen
 }
 
 /* Measures a mesh against every sample of its node. */
-static void terrimpi_build_measure_node(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                        const terrimp_mesh *mesh, const terrimpi_build *build,
-                                        terrimpi_build_error *error, float *rms)
+static void terrimpi_build_measure_node(const terrimp_heightfield *field,
+                                        const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                        const terrimpi_build *build, terrimpi_build_error *error,
+                                        float *rms)
 {
     uint32_t x, z;
     float squares = 0.0f;
     error->above = error->below = 0.0f;
     terrimpi_build_setup_triangles(p, mesh, build->facets);
     for (z = 0; z <= p->span_z; z++) {
-        terrimpi_build_residual_of_row(t, p, mesh, build, z);
+        terrimpi_build_residual_of_row(field, p, mesh, build, z);
         error->squares = 0.0f; /* summed by row, as small sums round less */
         for (x = 0; x <= p->span_x; x++)
             terrimpi_build_add_error(error, build->row[x]);
@@ -16576,20 +16389,110 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
     terrimp_mesh mesh;
     terrimpi_build_error error;
     float rms;
-    terrimpi_build_tile(t, &p, build);
-    TERRIMPI_TRY(terrimpi_build_simplify(t, &p, build, &mesh));
+    terrimpi_build_tile(&t->desc.field, &p, build);
+    memset(&mesh, 0, sizeof mesh);
+    mesh.vertices = build->vertices;
+    mesh.indices = build->indices;
+    mesh.vertex_capacity = build->vertex_capacity;
+    mesh.index_capacity = build->index_capacity;
+    TERRIMPI_TRY(terrimpi_build_simplify(&p, t->desc.triangle_budget, build, &mesh));
     if (t->desc.proud > 0.0f) {
-        TERRIMPI_TRY(terrimpi_build_raise(t, &p, &mesh, build));
+        terrimpi_build_raise(&t->desc.field, &p, t->desc.proud, &mesh, build);
         terrimpi_build_lift_border(t, &p, &mesh, build);
     }
     terrimpi_build_store_surface(t, &p, node, &mesh);
-    terrimpi_build_measure_node(t, &p, &mesh, build, &error, &rms);
+    terrimpi_build_measure_node(&t->desc.field, &p, &mesh, build, &error, &rms);
     if (!terrimpi_finite2(error.above, error.below)) {
         t->meshes[node].counts = 0;
         return TERRIMP_E_NOT_FINITE;
     }
     t->meshes[node].error = terrimpi_max(error.above, error.below);
     t->meshes[node].error_rms = rms;
+    return TERRIMP_OK;
+}
+
+/* ---- a rectangle by one call ---- */
+
+static size_t terrimpi_build_layout_rect(const terrimp_rect *samples, uint32_t budget, void *base,
+                                         terrimpi_build *build)
+{
+    budget = budget ? budget : TERRIMP_TRIANGLE_BUDGET;
+    if (!terrimpi_simp_tile_size_ok(samples->width, samples->height) ||
+        !terrimpi_within_u32(budget, 6u, TERRIMP_MAX_TRIANGLES))
+        return 0;
+    return terrimpi_build_layout_tile(samples->width, samples->height, TERRIMP_MAX_TILE_DIM, budget,
+                                      base, build);
+}
+
+TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
+                                                        uint32_t triangle_budget)
+{
+    terrimp_rect samples = terrimpi_rect(0, 0, cols, rows);
+    terrimpi_build build;
+    return terrimpi_build_layout_rect(&samples, triangle_budget, NULL, &build);
+}
+
+/* Simplifies the tile to a budget and finds the largest error. */
+static terrimp_result terrimpi_build_rect(const terrimp_heightfield *field,
+                                          const terrimpi_terrain_tile *p, uint32_t budget,
+                                          const terrimpi_build *build, terrimp_mesh *mesh,
+                                          float *off)
+{
+    terrimpi_build_error error;
+    float rms;
+    TERRIMPI_TRY(terrimpi_build_simplify(p, budget, build, mesh));
+    terrimpi_build_measure_node(field, p, mesh, build, &error, &rms);
+    *off = terrimpi_max(error.above, error.below);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
+                                                  const terrimp_rect *samples,
+                                                  uint32_t triangle_budget, float max_error,
+                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
+                                                  float *error)
+{
+    terrimp_heightfield f;
+    terrimpi_terrain_tile p;
+    terrimpi_build build;
+    uint32_t low, high = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET, budget = high;
+    float off;
+    size_t needed;
+    TERRIMPI_REFUSE(!field || !samples || !mesh, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(max_error), TERRIMP_E_NOT_FINITE);
+    needed = terrimpi_build_layout_rect(samples, high, scratch, &build);
+    TERRIMPI_REFUSE(needed == 0 || max_error < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(samples->x > field->width - samples->width || field->width < samples->width ||
+                    samples->y > field->depth - samples->height ||
+                    field->depth < samples->height, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_TRY(terrimp_heightfield_read(&f, samples->x, samples->y, samples->width,
+                                          samples->height, 1, build.tile));
+    p.level = 0;
+    p.x = samples->x;
+    p.z = samples->y;
+    p.cols = samples->width;
+    p.rows = samples->height;
+    p.span_x = p.cols - 1u;
+    p.span_z = p.rows - 1u;
+    TERRIMPI_TRY(terrimpi_build_rect(&f, &p, high, &build, mesh, &off));
+    low = terrimpi_max_u32(2u, mesh->border_vertex_count - 2u);
+    while (max_error > 0.0f && off <= max_error && low < high) { /* high is enough; is this? */
+        float less;
+        budget = low + (high - low) / 2u;
+        TERRIMPI_TRY(terrimpi_build_rect(&f, &p, budget, &build, mesh, &less));
+        if (less <= max_error) {
+            high = budget;
+            off = less;
+        } else {
+            low = budget + 1u;
+        }
+    }
+    if (budget != high)
+        TERRIMPI_TRY(terrimpi_build_rect(&f, &p, high, &build, mesh, &off));
+    if (error)
+        *error = off;
     return TERRIMP_OK;
 }
 
@@ -17035,28 +16938,12 @@ static void terrimpi_bake_swap_words(unsigned char *words, size_t bytes)
 /* Fills in what a header says of a terrain. */
 static void terrimpi_bake_describe(const terrimp_terrain *t, terrimpi_bake *bake)
 {
-    const terrimp_terrain_desc *desc = &t->desc;
     memset(bake, 0, sizeof *bake);
-    bake->width = desc->field.width;
-    bake->depth = desc->field.depth;
-    bake->format = (uint32_t)desc->field.format;
-    bake->chunk_quads = desc->chunk_quads;
-    bake->triangle_budget = desc->triangle_budget;
-    bake->flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
-                  (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
-    bake->node_count = t->tree.node_count;
-    bake->vertex_limit = t->vertex_limit;
-    bake->index_limit = t->index_limit;
-    bake->mesh_triangle_count = t->mesh_triangle_count;
-    bake->height_scale = desc->field.height_scale;
-    bake->height_offset = desc->field.height_offset;
-    bake->height_low = desc->height_low;
-    bake->height_high = desc->height_high;
-    bake->sample_low = t->sample_low;
-    bake->sample_high = t->sample_high;
-    bake->range_low = t->range_low;
-    bake->range_step = t->range_step;
-    bake->proud = desc->proud;
+#define TERRIMPI_X(own, of) bake->own = t->of;
+    TERRIMPI_BAKE_FIELDS(TERRIMPI_X)
+#undef TERRIMPI_X
+    bake->flags = (t->desc.no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
+                  (t->desc.not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
 }
 
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
@@ -17247,16 +17134,15 @@ TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, u
     terrimp_pages_desc d;
     terrimpi_paging w;
     const terrimp_quadtree *t = &w.whole.tree;
-    uint32_t all;
-    uint64_t block_bytes;
+    uint32_t all, page_bytes;
     TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
     all = t->level_x[d.block_level] * t->level_z[d.block_level];
     TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
-    block_bytes = (uint64_t)terrimpi_page_full(d.block_level + 1u) * terrimpi_page_bytes(&w.whole);
-    *offset = TERRIMP_PAGES_HEADER_BYTES + block_bytes * first_block +
-              (uint64_t)terrimpi_page_upper(t, d.block_level) * terrimpi_page_bytes(&w.whole);
-    *bytes = block_bytes * block_count;
+    page_bytes = terrimpi_page_bytes(&w.whole);
+    *offset = TERRIMP_PAGES_HEADER_BYTES +
+              terrimpi_page_first(t, d.block_level, first_block) * page_bytes;
+    *bytes = (uint64_t)block_count * terrimpi_page_full(d.block_level + 1u) * page_bytes;
     return TERRIMP_OK;
 }
 
@@ -17300,16 +17186,15 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     terrimp_geomip_node *ground = &t->tree.nodes[n->number];
     terrimpi_mesh *mesh = &t->meshes[n->number];
     float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
+    terrimp_node child;
     uint32_t i;
     TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
     w->held[n->number] = *missed = *squares = 0.0f;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
-        *missed = terrimpi_max(*missed, w->missed[child]);
-        *squares += w->squares[child];
+        *missed = terrimpi_max(*missed, w->missed[child.number]);
+        *squares += w->squares[child.number];
         count += 1.0f;
     }
     if (w->level > 0) {
@@ -17320,16 +17205,14 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
         mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
     }
     w->held[n->number] = ground->rms;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
-        ground->low = terrimpi_min(ground->low, t->tree.nodes[child].low);
-        ground->high = terrimpi_max(ground->high, t->tree.nodes[child].high);
-        ground->error = terrimpi_max(ground->error, t->tree.nodes[child].error);
-        terrimpi_build_hold(mesh, t->meshes[child].low, t->meshes[child].high);
-        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child]);
+        ground->low = terrimpi_min(ground->low, t->tree.nodes[child.number].low);
+        ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
+        ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
+        terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
+        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child.number]);
     }
     terrimpi_build_hold(mesh, ground->low, ground->high);
     return TERRIMP_OK;
@@ -17373,18 +17256,18 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
 {
     const terrimp_terrain *t = w->part;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN, word;
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN;
     terrimpi_page_head head;
     memset(w->page, 0, bytes);
     head.stamp = w->stamp;
     head.node = whole.number;
     head.record = terrimpi_paging_record(w, n->number);
     for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimp_node child;
         terrimpi_record r;
-        if (n->level == 0 || !terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        r = terrimpi_paging_record(w, terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number);
+        r = terrimpi_paging_record(w, child.number);
         memcpy(w->page + at, &r, sizeof r);
     }
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
@@ -17392,11 +17275,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
     terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
     memcpy(w->page, &head, sizeof head);
-    head.checksum = 2166136261u;
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, w->page + at, sizeof word);
-        head.checksum = terrimpi_bake_hash_word(head.checksum, word);
-    }
+    head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
     return w->desc->store(w->desc->user,
                           terrimpi_page_offset(&w->whole, w->desc->block_level, &whole), w->page,
@@ -17450,17 +17329,13 @@ TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *d
 static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terrimp_node *n,
                                            unsigned char *page, terrimpi_page_head *head)
 {
-    uint32_t bytes = terrimpi_page_bytes(&w->whole), at, word, hash = 2166136261u;
+    uint32_t bytes = terrimpi_page_bytes(&w->whole);
     TERRIMPI_REFUSE(!w->desc->load(w->desc->user,
                                    terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
                                    bytes), TERRIMP_E_PAGE);
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
     memcpy(head, page, sizeof *head);
-    return head->checksum == hash && head->stamp == w->stamp && head->node == n->number
-               ? TERRIMP_OK : TERRIMP_E_BAKE;
+    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->stamp &&
+                   head->node == n->number ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
