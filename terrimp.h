@@ -10148,7 +10148,68 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
                                        (f->pixel_factor * f->desc->texels_per_px), is_known);
 }
 
-/* Where a picture is made from: ahead of the eye, so that its error falls before it grows again. */
+/* Whether a point lies over the terrain, or beyond sides where another one goes on. */
+static int terrimpi_view_inside(const terrimpi_frame *f, const terrimp_box *box,
+                                const float point[3])
+{
+    uint32_t beyond = 0;
+    beyond |= point[2] < box->min[2] ? 1u << TERRIMP_SIDE_Z0 : 0u;
+    beyond |= point[2] > box->max[2] ? 1u << TERRIMP_SIDE_Z1 : 0u;
+    beyond |= point[0] < box->min[0] ? 1u << TERRIMP_SIDE_X0 : 0u;
+    beyond |= point[0] > box->max[0] ? 1u << TERRIMP_SIDE_X1 : 0u;
+    return (beyond & ~f->desc->joined) == 0;
+}
+
+/* Whether all rays of an orthographic camera come in through the top of the terrain's box, and go
+   out through its bottom. */
+static int terrimpi_view_through(const terrimpi_frame *f)
+{
+    const float *forward = f->camera.forward;
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
+    terrimp_capture c;
+    terrimp_box box;
+    int corner, top, k;
+    if (!(forward[1] < 0.0f))
+        return 0;
+    terrimpi_camera_capture(&f->camera, &c);
+    terrimpi_terrain_node_box(f->terrain, &root, &box);
+    for (corner = 0; corner < 4; corner++)
+        for (top = 0; top < 2; top++) {
+            float at[3], way;
+            for (k = 0; k < 3; k++)
+                at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
+                        c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
+            way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
+            for (k = 0; k < 3; k++)
+                at[k] += forward[k] * way;
+            if (!terrimpi_view_inside(f, &box, at))
+                return 0;
+        }
+    return 1;
+}
+
+/* Whether an eye is on or over the ground. A ray that starts there passes through the ground before
+   it meets the floor or a wall, which are below the ground everywhere; one that comes in below the
+   terrain's outer border, or starts under the ground, does not. */
+static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
+{
+    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
+    terrimp_box box;
+    float ground;
+    uint32_t level; /* of the finest ground that is here */
+    terrimp_result result;
+    if (f->camera.orthographic)
+        return terrimpi_view_through(f);
+    terrimpi_terrain_node_box(f->terrain, &root, &box);
+    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    if (result == TERRIMP_E_MISS)
+        return terrimpi_view_inside(f, &box, eye);
+    return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
+}
+
+/* Where a picture is made from: ahead of the eye, so that its error falls before it grows again;
+   but not from below when the eye is over the ground, since what a ray from there meets from behind
+   would be missing. */
 static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *node,
                                 const terrimp_box *box, float closest, float eye[3])
 {
@@ -10162,7 +10223,8 @@ static void terrimpi_view_ahead(const terrimpi_frame *f, const terrimp_node *nod
     ahead = terrimpi_min(TERRIMPI_VIEW_AHEAD * reach, ahead * 0.5f * TERRIMPI_VIEW_LIFE);
     for (i = 0; i < 3u; i++)
         eye[i] += way[i] / terrimpi_length(way) * ahead;
-    if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest)
+    if (terrimp_box_distance(box, eye) < TERRIMPI_VIEW_AHEAD_BOX * closest ||
+        (terrimpi_view_over(f, f->eye) && !terrimpi_view_over(f, eye)))
         memcpy(eye, f->eye, sizeof f->eye);
 }
 
@@ -11727,67 +11789,6 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 
 /* ---- a frame ---- */
 
-/* Whether a point lies over the terrain, or beyond sides where another one goes on. */
-static int terrimpi_view_inside(const terrimpi_frame *f, const terrimp_box *box,
-                                const float point[3])
-{
-    uint32_t beyond = 0;
-    beyond |= point[2] < box->min[2] ? 1u << TERRIMP_SIDE_Z0 : 0u;
-    beyond |= point[2] > box->max[2] ? 1u << TERRIMP_SIDE_Z1 : 0u;
-    beyond |= point[0] < box->min[0] ? 1u << TERRIMP_SIDE_X0 : 0u;
-    beyond |= point[0] > box->max[0] ? 1u << TERRIMP_SIDE_X1 : 0u;
-    return (beyond & ~f->desc->joined) == 0;
-}
-
-/* Whether all rays of an orthographic camera come in through the top of the terrain's box, and go
-   out through its bottom. */
-static int terrimpi_view_through(const terrimpi_frame *f)
-{
-    const float *forward = f->camera.forward;
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
-    terrimp_capture c;
-    terrimp_box box;
-    int corner, top, k;
-    if (!(forward[1] < 0.0f))
-        return 0;
-    terrimpi_camera_capture(&f->camera, &c);
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
-    for (corner = 0; corner < 4; corner++)
-        for (top = 0; top < 2; top++) {
-            float at[3], way;
-            for (k = 0; k < 3; k++)
-                at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
-                        c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
-            way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
-            for (k = 0; k < 3; k++)
-                at[k] += forward[k] * way;
-            if (!terrimpi_view_inside(f, &box, at))
-                return 0;
-        }
-    return 1;
-}
-
-/* Whether the floor is to be drawn: where pictures are, while the eye is on or over the ground. A
-   ray that starts there passes through the ground before it meets the floor or a wall, which are
-   below the ground everywhere; one that comes in below the terrain's outer border, or starts under
-   the ground, does not. */
-static int terrimpi_view_over(const terrimpi_frame *f)
-{
-    const float *eye = f->camera.eye;
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
-    terrimp_box box;
-    float ground;
-    uint32_t level; /* of the finest ground that is here */
-    terrimp_result result;
-    if (f->camera.orthographic)
-        return terrimpi_view_through(f);
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
-    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
-    if (result == TERRIMP_E_MISS)
-        return terrimpi_view_inside(f, &box, eye);
-    return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
-}
-
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_view_list(terrimp_view *v)
 {
@@ -11801,7 +11802,7 @@ static void terrimpi_view_list(terrimp_view *v)
     for (i = 0; i < v->draw_count; i++)
         impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
     if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
-        terrimpi_view_over(&v->frame))
+        terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
             terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
 }

@@ -213,6 +213,14 @@ static void flight_stand(const flight *f, const float eye[3], const float forwar
                        : eye[i];
 }
 
+/* Whether an eye stands over the ground. */
+static int flight_over(const flight *f, const float eye[3])
+{
+    float ground;
+    return terrimp_heightfield_height(&f->l->desc.field, eye[0], eye[2], &ground) == TERRIMP_OK &&
+           eye[1] >= ground;
+}
+
 static void begin_picture(flight *f, flight_picture *picture,
                           const terrimp_capture_command *command)
 {
@@ -228,6 +236,9 @@ static void begin_picture(flight *f, flight_picture *picture,
     f->begun_count += command->part == 0;
     CHECK(!f->desc.no_lookahead || f->dropped || f->camera.orthographic || f->apart ||
           memcmp(command->eye, f->camera.eye, sizeof command->eye) == 0);
+    /* from over the ground none is made from below: it would lack what is seen from behind */
+    CHECK(f->camera.orthographic || f->apart || !flight_over(f, f->camera.eye) ||
+          flight_over(f, command->eye));
 }
 
 /* What a node or all nodes had is gone. */
