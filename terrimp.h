@@ -2215,7 +2215,7 @@ TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t 
    triangle_budget  [Limits: 6..TERRIMP_MAX_TRIANGLES] [Default 0 -> TERRIMP_TRIANGLE_BUDGET]
    max_error        [wu] above 0: as few triangles as are found to keep every sample within it; all
                     of the budget when that is not enough [Limits: >= 0]
-   scratch          [bytes] as for terrimp_simplify
+   scratch          [bytes] aligned to 8 bytes
    mesh             in: arrays, as terrimp_mesh_capacity says; out: in samples of the rectangle
    error            out: [wu] the largest vertical distance of a sample; NULL: not wanted
    Errors           E_VOID for a sample without data
@@ -2240,32 +2240,6 @@ TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *fie
    Errors  E_STATE when the mesh has no surface yet
    Source  Hess 2010, section 4.2 */
 TERRIMP_API terrimp_result terrimp_mesh_add_skirt(terrimp_mesh *mesh, int upper, float height);
-
-/* --- standing proud (Hess 6.1) --- */
-
-typedef struct terrimp_raise_desc {
-    const float *heights; /* (required) [rows][cols] of the tile that the mesh was made from */
-    uint32_t cols;        /* (required) as then */
-    uint32_t rows;        /* (required) as then */
-    float amount;         /* 0: not at all; 1: until no sample is above [Limits: 0..1] */
-} terrimp_raise_desc;
-
-/* Raises a mesh so that terrain does not stand out of it: with amount 1 no sample is above the
-   surface but for rounding, except beside vertices that may not be raised: a sample whose weight
-   hangs by more than half on corners (on a border) or on border vertices (inside) may stay above.
-   Corners stay where they are, since four tiles share them; border vertices follow from the samples
-   of their border alone, so that neighbours still meet. Starts from every vertex raised by the
-   largest shortfall round it and lowers them together as far as the samples let it.
-
-   desc    how far
-   mesh    in: a mesh of that tile without skirts; out: its heights
-   work    [2 * surface_vertex_count] scratch; out: in its first half the raise of each vertex [wu]
-   Errors  E_STATE when the mesh has no surface or has skirts
-   Cost    O(cols rows), 13 passes over the samples; about 0.6 ms for 65 x 65
-   Source  Hess 2010, section 6.1, names the silhouettes that a low mesh cuts; the remedy is ours */
-TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
-                                              float *work);
-
 
 /* ==== Builder ============================================================ >>builder */
 
@@ -15227,142 +15201,6 @@ TERRIMP_API terrimp_result terrimp_simplify(const terrimp_simplify_desc *desc, v
     return terrimpi_simp_run(desc, NULL, scratch, scratch_bytes, mesh);
 }
 
-/* --- a tile by one call --- */
-
-#define TERRIMPI_SIMP_POINTS 52u /* of a border of the largest budget */
-
-/* The largest vertical distance of a tile's samples to the triangles of a mesh. */
-static float terrimpi_simp_largest_error(const terrimp_simplify_desc *desc,
-                                         const terrimp_mesh *mesh)
-{
-    float most = 0.0f;
-    uint32_t i, k;
-    for (i = 0; i < mesh->surface_index_count; i += 3u) {
-        int64_t p[3][2], low[2], high[2], at[2], all;
-        float h[3];
-        for (k = 0; k < 3u; k++) {
-            const terrimp_mesh_vertex *v = &mesh->vertices[mesh->indices[i + k]];
-            p[k][0] = v->x;
-            p[k][1] = v->z;
-            h[k] = v->height;
-        }
-        for (k = 0; k < 2u; k++) {
-            low[k] = p[0][k] < p[1][k] ? p[0][k] : p[1][k];
-            low[k] = low[k] < p[2][k] ? low[k] : p[2][k];
-            high[k] = p[0][k] > p[1][k] ? p[0][k] : p[1][k];
-            high[k] = high[k] > p[2][k] ? high[k] : p[2][k];
-        }
-        all = terrimpi_twice_area(p[0], p[1], p[2]);
-        for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
-            for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-                int64_t b = terrimpi_twice_area(p[2], p[0], at);
-                int64_t c = terrimpi_twice_area(p[0], p[1], at);
-                float miss = desc->heights[at[1] * (int64_t)desc->cols + at[0]] - h[0];
-                if (b < 0 || c < 0 || b + c > all)
-                    continue;
-                miss -= ((h[1] - h[0]) * (float)b + (h[2] - h[0]) * (float)c) / (float)all;
-                most = terrimpi_max(most, terrimpi_abs(miss));
-            }
-    }
-    return most;
-}
-
-/* Simplifies the four borders of a tile. */
-static terrimp_result terrimpi_simp_borders(terrimp_simplify_desc *desc, float *line,
-                                            terrimp_border_point (*points)[TERRIMPI_SIMP_POINTS])
-{
-    uint32_t limit = terrimpi_terrain_border_points(desc->triangle_budget), k;
-    int side;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t along = terrimpi_along_x(side) ? 1u : desc->cols;
-        uint32_t count = terrimpi_along_x(side) ? desc->cols : desc->rows;
-        uint32_t first = side == TERRIMP_SIDE_Z1   ? (desc->rows - 1u) * desc->cols
-                         : side == TERRIMP_SIDE_X1 ? desc->cols - 1u : 0u;
-        for (k = 0; k < count; k++)
-            line[k] = desc->heights[first + k * along];
-        TERRIMPI_TRY(terrimp_border_simplify(line, count, limit, points[side],
-                                             TERRIMPI_SIMP_POINTS,
-                                             &desc->borders[side].point_count));
-        desc->borders[side].points = points[side];
-    }
-    return TERRIMP_OK;
-}
-
-/* Scratch: the tile, a border of it, then that of the simplifier. */
-static size_t terrimpi_simp_field_layout(uint32_t cols, uint32_t rows, uint32_t budget, void *base,
-                                         float **tile, float **line, void **rest)
-{
-    terrimpi_arena a = terrimpi_arena_at((unsigned char *)base);
-    size_t bytes = terrimp_simplify_scratch_bytes(cols, rows, budget);
-    if (bytes == 0 || (budget > 0 && budget < 6u))
-        return 0;
-    *rest = terrimpi_take(&a, bytes, 1);
-    *tile = (float *)terrimpi_take(&a, (size_t)cols * rows, sizeof **tile);
-    *line = (float *)terrimpi_take(&a, TERRIMP_MAX_TILE_DIM, sizeof **line);
-    return a.ok ? a.bytes : 0;
-}
-
-TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
-                                                        uint32_t triangle_budget)
-{
-    float *tile, *line;
-    void *rest;
-    return terrimpi_simp_field_layout(cols, rows, triangle_budget, NULL, &tile, &line, &rest);
-}
-
-TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
-                                                  const terrimp_rect *samples,
-                                                  uint32_t triangle_budget, float max_error,
-                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
-                                                  float *error)
-{
-    terrimp_border_point points[TERRIMP_SIDE_COUNT][TERRIMPI_SIMP_POINTS];
-    terrimp_simplify_desc desc;
-    float *tile, *line, off;
-    uint32_t low = 2, high, border = 0;
-    size_t needed;
-    void *rest;
-    int side;
-    TERRIMPI_REFUSE(!field || !samples || !mesh, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite(max_error), TERRIMP_E_NOT_FINITE);
-    needed = terrimpi_simp_field_layout(samples->width, samples->height, triangle_budget, scratch,
-                                        &tile, &line, &rest);
-    TERRIMPI_REFUSE(needed == 0 || max_error < 0.0f, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(samples->x > field->width - samples->width || field->width < samples->width ||
-                    samples->y > field->depth - samples->height ||
-                    field->depth < samples->height, TERRIMP_E_RANGE);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
-    TERRIMPI_TRY(terrimp_heightfield_read(field, samples->x, samples->y, samples->width,
-                                          samples->height, 1, tile));
-    memset(&desc, 0, sizeof desc);
-    desc.heights = tile;
-    desc.cols = samples->width;
-    desc.rows = samples->height;
-    desc.triangle_budget = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET;
-    TERRIMPI_TRY(terrimpi_simp_borders(&desc, line, points));
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        border += desc.borders[side].point_count - 1u;
-    high = desc.triangle_budget;
-    low = terrimpi_max_u32(low, border - 2u);
-    TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
-    off = terrimpi_simp_largest_error(&desc, mesh);
-    while (max_error > 0.0f && off <= max_error && low < high) { /* high is enough; is this? */
-        desc.triangle_budget = low + (high - low) / 2u;
-        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
-        if (terrimpi_simp_largest_error(&desc, mesh) <= max_error)
-            high = desc.triangle_budget;
-        else
-            low = desc.triangle_budget + 1u;
-    }
-    if (desc.triangle_budget != high) {
-        desc.triangle_budget = high;
-        TERRIMPI_TRY(terrimp_simplify(&desc, rest, bytes, mesh));
-    }
-    if (error)
-        *error = terrimpi_simp_largest_error(&desc, mesh);
-    return TERRIMP_OK;
-}
-
 /* --- skirts (Hess 4.2) --- */
 
 static terrimp_result terrimpi_raise_check_surface(const terrimp_mesh *mesh)
@@ -15435,49 +15273,57 @@ static void terrimpi_raise_down(float w, float n, float over, float *change)
         *change = terrimpi_min(*change, over / (n * w));
 }
 
-static int terrimpi_raise_is_corner(const terrimp_raise_desc *desc, const terrimp_mesh_vertex *v)
+/* What a mesh misses, and that mesh. */
+typedef struct terrimpi_raise {
+    const float *miss; /* [rows][cols] how far the samples are above the mesh */
+    uint32_t cols, rows;
+    const terrimp_mesh *mesh;
+} terrimpi_raise;
+
+static float terrimpi_raise_is_free(const terrimpi_raise *r, const terrimp_mesh_vertex *v)
 {
-    return (v->x == 0 || v->x == desc->cols - 1) && (v->z == 0 || v->z == desc->rows - 1);
+    int corner = (v->x == 0 || v->x == r->cols - 1) && (v->z == 0 || v->z == r->rows - 1);
+    return corner ? 0.0f : 1.0f;
 }
 
 /* Goes once over the samples of a border between vertices a and b, which are in rising order
    whichever way the loop runs: both neighbours compute the same bits. */
-static void terrimpi_raise_segment(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                   uint32_t a, uint32_t b, const float *raise, float *change,
-                                   int lowering)
+static void terrimpi_raise_segment(const terrimpi_raise *r, uint32_t a, uint32_t b,
+                                   const float *raise, float *change, int lowering)
 {
-    const terrimp_mesh_vertex *p = mesh->vertices + a, *q = mesh->vertices + b;
-    uint32_t cols = desc->cols, stride = p->z == q->z ? 1 : cols;
-    const float *samples = desc->heights + p->z * cols + p->x;
+    const terrimp_mesh_vertex *p = r->mesh->vertices + a, *q = r->mesh->vertices + b;
+    uint32_t stride = p->z == q->z ? 1 : r->cols;
+    const float *miss = r->miss + p->z * r->cols + p->x;
     int32_t k, count = p->z == q->z ? q->x - p->x : q->z - p->z;
-    float *to[2], w[2], is_free[2];
-    to[0] = change + a;
-    to[1] = change + b;
-    is_free[0] = terrimpi_raise_is_corner(desc, p) ? 0.0f : 1.0f;
-    is_free[1] = terrimpi_raise_is_corner(desc, q) ? 0.0f : 1.0f;
-    for (k = 0; k <= count; k++, samples += stride) {
-        float surface, wanted;
-        int i;
-        w[1] = (float)k / (float)count;
-        w[0] = 1.0f - w[1];
-        surface = w[0] * (p->height + raise[a]) + w[1] * (q->height + raise[b]);
-        wanted = terrimpi_raise_wanted(*samples - surface,
-                                       *samples - (w[0] * p->height + w[1] * q->height),
-                                       w[0] * is_free[0] + w[1] * is_free[1]);
-        for (i = 0; i < 2; i++)
-            if (lowering)
-                terrimpi_raise_down(w[i], 2.0f, terrimpi_max(0.0f, surface - *samples), to[i]);
-            else
-                terrimpi_raise_up(w[i], wanted, to[i]);
+    float free_a = terrimpi_raise_is_free(r, p), free_b = terrimpi_raise_is_free(r, q);
+    for (k = 0; k <= count; k++, miss += stride) {
+        float w = (float)k / (float)count, over, wanted;
+        over = (1.0f - w) * raise[a] + w * raise[b] - *miss;
+        wanted = terrimpi_raise_wanted(-over, *miss, (1.0f - w) * free_a + w * free_b);
+        if (lowering) {
+            over = terrimpi_max(0.0f, over);
+            terrimpi_raise_down(1.0f - w, 2.0f, over, change + a);
+            terrimpi_raise_down(w, 2.0f, over, change + b);
+        } else {
+            terrimpi_raise_up(1.0f - w, wanted, change + a);
+            terrimpi_raise_up(w, wanted, change + b);
+        }
     }
 }
 
-/* Raises the loop's vertices, border by border, but for the corners. */
-static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_mesh *mesh,
-                                float *raise, float *change)
+/* What each pass begins with, and what it does to a vertex: the first one raises, others lower. */
+static float terrimpi_raise_begin(int pass) { return pass ? TERRIMPI_FLOAT_MAX : 0.0f; }
+
+static float terrimpi_raise_end(int pass, float raise, float change)
 {
-    const terrimp_mesh_vertex *v = mesh->vertices;
-    uint32_t n = mesh->border_vertex_count, first = 0, last, i;
+    return pass ? terrimpi_max(0.0f, raise - change) : change;
+}
+
+/* Raises the loop's vertices, border by border, but for the corners. */
+static void terrimpi_raise_loop(const terrimpi_raise *r, float *raise, float *change)
+{
+    const terrimp_mesh_vertex *v = r->mesh->vertices;
+    uint32_t n = r->mesh->border_vertex_count, first = 0, last, i;
     int side, pass;
     for (side = 0; side < 4; side++, first = last) {
         int along_x = side & 1, backwards = side >= 2;
@@ -15488,57 +15334,52 @@ static void terrimpi_raise_loop(const terrimp_raise_desc *desc, const terrimp_me
             last--; /* the loop's end closes the last side itself */
         for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
             for (i = first; i <= last; i++)
-                change[i % n] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
+                change[i % n] = terrimpi_raise_begin(pass);
             for (i = first; i < last; i++)
-                terrimpi_raise_segment(desc, mesh, backwards ? (i + 1) % n : i,
-                                       backwards ? i : (i + 1) % n, raise, change, pass > 0);
+                terrimpi_raise_segment(r, backwards ? (i + 1) % n : i, backwards ? i : (i + 1) % n,
+                                       raise, change, pass > 0);
             for (i = first + 1; i < last; i++)
-                raise[i] = pass ? terrimpi_max(0.0f, raise[i] - change[i]) : change[i];
+                raise[i] = terrimpi_raise_end(pass, raise[i], change[i]);
         }
     }
 }
 
-/* The slopes of the plane through three vertices. */
-static void terrimpi_raise_plane(const terrimp_mesh_vertex v[3], float *gx, float *gz)
+/* The slopes of the plane through three vertices, of heights h. */
+static void terrimpi_raise_plane(const terrimp_mesh_vertex v[3], float h0, float h1, float h2,
+                                 float *gx, float *gz)
 {
     int32_t bx = v[1].x - v[0].x, bz = v[1].z - v[0].z;
     int32_t cx = v[2].x - v[0].x, cz = v[2].z - v[0].z;
-    float inverse = 1.0f / (float)(bz * cx - bx * cz);
-    float hb = v[1].height - v[0].height, hc = v[2].height - v[0].height;
+    float inverse = 1.0f / (float)(bz * cx - bx * cz), hb = h1 - h0, hc = h2 - h0;
     *gx = ((float)bz * hc - (float)cz * hb) * inverse;
     *gz = ((float)cx * hb - (float)bx * hc) * inverse;
 }
 
 /* Goes once over the samples of a triangle. */
-static void terrimpi_raise_triangle(const float *heights, int32_t cols, const terrimp_mesh *mesh,
-                                    const uint16_t *t, const float *raise, float *change,
-                                    int lowering)
+static void terrimpi_raise_triangle(const terrimpi_raise *r, const uint16_t *t, const float *raise,
+                                    float *change, int lowering)
 {
     terrimp_mesh_vertex v[3];
     terrimpi_simp_span span;
-    float slope_x[3], slope_z[3], gx, gz, to[3];
+    float slope_x[3], slope_z[3], gx, gz, to[3], h[3];
     float limit; /* how far above a sample the surface is when that changes nothing; no weight is
                     above 1 */
     int32_t x, z, k;
     for (k = 0; k < 3; k++) {
         to[k] = change[t[k]];
-        v[k] = mesh->vertices[t[k]];
-        v[k].height = 0.0f;
+        v[k] = r->mesh->vertices[t[k]];
+        h[k] = raise[t[k]];
     }
-    for (k = 0; k < 3; k++) { /* slopes of the weights */
-        v[k].height = 1.0f;
-        terrimpi_raise_plane(v, &slope_x[k], &slope_z[k]);
-        v[k].height = 0.0f;
-    }
-    for (k = 0; k < 3; k++)
-        v[k].height = mesh->vertices[t[k]].height + raise[t[k]];
+    for (k = 0; k < 3; k++) /* of the weights */
+        terrimpi_raise_plane(v, (float)(k == 0), (float)(k == 1), (float)(k == 2), &slope_x[k],
+                             &slope_z[k]);
     terrimpi_simp_find_span(v, &span);
-    terrimpi_raise_plane(v, &gx, &gz);
+    terrimpi_raise_plane(v, h[0], h[1], h[2], &gx, &gz);
     limit = lowering ? 3.001f * terrimpi_largest(to) : 0.0f;
     for (z = span.low; z < span.high; z++)
         for (x = span.left[z]; x < span.right[z]; x++) {
             float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
-            float over = v[0].height + dx * gx + dz * gz - heights[z * cols + x];
+            float miss = r->miss[z * (int32_t)r->cols + x], over = h[0] + dx * gx + dz * gz - miss;
             if (over >= limit)
                 continue;
             for (k = 0; k < 3; k++)
@@ -15552,9 +15393,8 @@ static void terrimpi_raise_triangle(const float *heights, int32_t cols, const te
                 continue;
             }
             for (k = 0; k < 3; k++)
-                hold += t[k] >= mesh->border_vertex_count ? w[k] : 0.0f;
-            wanted = w[0] * raise[t[0]] + w[1] * raise[t[1]] + w[2] * raise[t[2]];
-            wanted = terrimpi_raise_wanted(-over, wanted - over, hold);
+                hold += t[k] >= r->mesh->border_vertex_count ? w[k] : 0.0f;
+            wanted = terrimpi_raise_wanted(-over, miss, hold);
             for (k = 0; k < 3; k++)
                 terrimpi_raise_up(w[k], wanted, &to[k]);
         }
@@ -15562,50 +15402,31 @@ static void terrimpi_raise_triangle(const float *heights, int32_t cols, const te
         change[t[k]] = to[k];
 }
 
-static terrimp_result terrimpi_raise_check(const terrimp_raise_desc *desc,
-                                           const terrimp_mesh *mesh)
-{
-    uint32_t i;
-    TERRIMPI_TRY(terrimpi_raise_check_surface(mesh));
-    TERRIMPI_REFUSE(!desc->heights, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows), TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(!terrimpi_finite(desc->amount), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(desc->amount < 0.0f || desc->amount > 1.0f, TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(mesh->vertex_count != mesh->surface_vertex_count, TERRIMP_E_STATE);
-    for (i = 0; i < mesh->surface_vertex_count; i++)
-        if (mesh->vertices[i].x >= desc->cols || mesh->vertices[i].z >= desc->rows)
-            return TERRIMP_E_RANGE;
-    for (i = 0; i < mesh->surface_index_count; i++)
-        TERRIMPI_REFUSE(mesh->indices[i] >= mesh->surface_vertex_count, TERRIMP_E_RANGE);
-    return terrimpi_simp_all_finite(desc->heights, desc->cols * desc->rows) ? TERRIMP_OK
-                                                                       : TERRIMP_E_NOT_FINITE;
-}
+/* Finds by how much to raise each vertex so that no sample is above the mesh but for rounding,
+   except beside vertices that may not be raised: a sample whose weight hangs by more than half on
+   corners (on a border) or on border vertices (inside) may stay above. Corners stay where they are,
+   since four tiles share them; border vertices follow from the samples of their border alone, so
+   that neighbours still meet. Starts from every vertex raised by the largest shortfall round it and
+   lowers them together as far as the samples let it.
 
-TERRIMP_API terrimp_result terrimp_mesh_raise(const terrimp_raise_desc *desc, terrimp_mesh *mesh,
-                                              float *work)
+   raise   [2 * surface_vertex_count] out: in its first half the raises */
+static void terrimpi_raise_find(const terrimpi_raise *r, float *raise)
 {
-    uint32_t n, i;
-    float *change;
+    const terrimp_mesh *mesh = r->mesh;
+    uint32_t n = mesh->surface_vertex_count, i;
+    float *change = raise + n;
     int pass;
-    TERRIMPI_REFUSE(!desc || !mesh || !work, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_raise_check(desc, mesh));
-    n = mesh->surface_vertex_count;
-    change = work + n;
     for (i = 0; i < n; i++)
-        work[i] = 0.0f;
-    terrimpi_raise_loop(desc, mesh, work, change);
+        raise[i] = 0.0f;
+    terrimpi_raise_loop(r, raise, change);
     for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
         for (i = 0; i < n; i++)
-            change[i] = pass ? TERRIMPI_FLOAT_MAX : 0.0f;
+            change[i] = terrimpi_raise_begin(pass);
         for (i = 0; i < mesh->surface_index_count; i += 3)
-            terrimpi_raise_triangle(desc->heights, (int32_t)desc->cols, mesh, mesh->indices + i,
-                                    work, change, pass > 0);
+            terrimpi_raise_triangle(r, mesh->indices + i, raise, change, pass > 0);
         for (i = mesh->border_vertex_count; i < n; i++)
-            work[i] = pass ? terrimpi_max(0.0f, work[i] - change[i]) : change[i];
+            raise[i] = terrimpi_raise_end(pass, raise[i], change[i]);
     }
-    for (i = 0; i < n; i++)
-        mesh->vertices[i].height += desc->amount * work[i];
-    return TERRIMP_OK;
 }
 
 /* ==== Builder ============================================================ >>impl-builder */
@@ -16098,39 +15919,46 @@ typedef struct terrimpi_build {
     float *tile;            /* [side][side] what the simplifier sees; then what it missed */
     float *row;             /* samples of one row or column of the node; scratch of its errors */
     float *tops;            /* of a border: see terrimpi_build_ground_tops */
-    float *heights;         /* [vertex] before they are raised */
     float *work;            /* [2][vertex] of the raising */
     terrimp_mesh_vertex *vertices;
     uint16_t *indices;
     terrimpi_build_triangle *facets; /* [triangle] */
     uint32_t vertex_capacity, index_capacity;
+    uint32_t border_points; /* inner ones that a border keeps */
     void *rest;
     size_t rest_bytes;
 } terrimpi_build;
 
-static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base,
-                                    terrimpi_build *build)
+/* Lays it out for a tile, of a node that has up to `longest` samples along a side. */
+static size_t terrimpi_build_layout_tile(uint32_t cols, uint32_t rows, size_t longest,
+                                         uint32_t budget, void *base, terrimpi_build *build)
 {
     terrimpi_arena b = terrimpi_arena_at(base);
-    size_t side = desc->chunk_quads + 1u, vertices, longest;
-    terrimp_mesh_capacity(desc->triangle_budget, &build->vertex_capacity, &build->index_capacity);
-    build->rest_bytes =
-        terrimp_simplify_scratch_bytes((uint32_t)side, (uint32_t)side, desc->triangle_budget);
+    size_t vertices;
+    terrimp_mesh_capacity(budget, &build->vertex_capacity, &build->index_capacity);
+    build->border_points = terrimpi_terrain_border_points(budget);
+    build->rest_bytes = terrimp_simplify_scratch_bytes(cols, rows, budget);
     vertices = build->vertex_capacity;
-    longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
-    build->tile = (float *)terrimpi_take(&b, side * side, sizeof *build->tile);
+    build->tile = (float *)terrimpi_take(&b, (size_t)cols * rows, sizeof *build->tile);
     build->row = (float *)terrimpi_take(&b, longest, sizeof *build->row);
     build->tops = (float *)terrimpi_take(&b, longest, sizeof *build->tops);
-    build->heights = (float *)terrimpi_take(&b, vertices, sizeof *build->heights);
     build->work = (float *)terrimpi_take(&b, 2u * vertices, sizeof *build->work);
     build->vertices =
         (terrimp_mesh_vertex *)terrimpi_take(&b, vertices, sizeof *build->vertices);
     build->indices =
         (uint16_t *)terrimpi_take(&b, build->index_capacity, sizeof *build->indices);
     build->facets =
-        (terrimpi_build_triangle *)terrimpi_take(&b, desc->triangle_budget, sizeof *build->facets);
+        (terrimpi_build_triangle *)terrimpi_take(&b, budget, sizeof *build->facets);
     build->rest = terrimpi_take(&b, build->rest_bytes, 1);
-    return b.ok ? b.bytes : 0;
+    return b.ok && build->rest_bytes ? b.bytes : 0;
+}
+
+static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base,
+                                    terrimpi_build *build)
+{
+    uint32_t side = desc->chunk_quads + 1u;
+    size_t longest = terrimpi_max_u32(desc->field.width, desc->field.depth) + 2u * side;
+    return terrimpi_build_layout_tile(side, side, longest, desc->triangle_budget, base, build);
 }
 
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
@@ -16239,14 +16067,15 @@ static void terrimpi_build_subtract_border(const terrimpi_terrain_tile *p, const
 /* Reads row z of a node and takes the surface away: what is left is how far each sample is above
    it. Triangles share the columns at which a row crosses their sides, so every sample counts for
    exactly one of them. */
-static void terrimpi_build_residual_of_row(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+static void terrimpi_build_residual_of_row(const terrimp_heightfield *field,
+                                           const terrimpi_terrain_tile *p,
                                            const terrimp_mesh *mesh, const terrimpi_build *build,
                                            uint32_t z)
 {
     const terrimpi_build_triangle *facet = build->facets, *end = facet + mesh->surface_index_count /
         3u;
     float *row = build->row, last = (float)p->span_x;
-    terrimpi_field_tile(&t->desc.field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
+    terrimpi_field_tile(field, p->x, p->z + z, p->span_x + 1u, 1, 1, row);
     if (z == p->span_z) {
         terrimpi_build_subtract_border(p, mesh, TERRIMP_SIDE_Z1, row);
         return;
@@ -16292,14 +16121,14 @@ static float terrimpi_build_line_mean(const float *line, uint32_t k, uint32_t le
 }
 
 /* Reads one of a node's borders, along +x or +z; returns how many quads it spans. */
-static uint32_t terrimpi_build_read_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                           int side, float *line)
+static uint32_t terrimpi_build_read_border(const terrimp_heightfield *field,
+                                           const terrimpi_terrain_tile *p, int side, float *line)
 {
     int along_x = terrimpi_along_x(side);
     uint32_t x = side == TERRIMP_SIDE_X1 ? p->x + p->span_x : p->x;
     uint32_t z = side == TERRIMP_SIDE_Z1 ? p->z + p->span_z : p->z;
     uint32_t span = along_x ? p->span_x : p->span_z;
-    terrimpi_field_tile(&t->desc.field, x, z, along_x ? span + 1u : 1u,
+    terrimpi_field_tile(field, x, z, along_x ? span + 1u : 1u,
                         along_x ? 1u : span + 1u, 1, line);
     return span;
 }
@@ -16318,7 +16147,7 @@ static uint32_t terrimpi_build_tile_border(const terrimpi_terrain_tile *p, int s
 /* Fills the tile that the simplifier works on: at level 0 the samples, above that the mean of those
    round each place (single samples give 1 to 7 % more error). Borders are made of their own samples
    alone, and corners are samples, so that the nodes that share them agree. */
-static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
+static void terrimpi_build_tile(const terrimp_heightfield *field, const terrimpi_terrain_tile *p,
                                 const terrimpi_build *build)
 {
     uint32_t i, k, z, half = (1u << p->level) / 2u, first, step;
@@ -16330,7 +16159,7 @@ static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain
         for (i = 0; i < p->cols; i++)
             out[i] = 0.0f;
         for (z = from; z < to; z++) {
-            terrimpi_field_tile(&t->desc.field, p->x, p->z + z, p->span_x, 1, 1, build->row);
+            terrimpi_field_tile(field, p->x, p->z + z, p->span_x, 1, 1, build->row);
             for (i = 1; i + 1u < p->cols; i++)
                 out[i] += terrimpi_build_line_mean(build->row, i, p->level, p->span_x);
         }
@@ -16338,7 +16167,7 @@ static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain
             out[i] /= (float)(to - from);
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t span = terrimpi_build_read_border(t, p, side, build->row);
+        uint32_t span = terrimpi_build_read_border(field, p, side, build->row);
         uint32_t count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             build->tile[first + k * step] =
@@ -16347,48 +16176,43 @@ static void terrimpi_build_tile(const terrimp_terrain *t, const terrimpi_terrain
     }
 }
 
-/* Simplifies the tile between its four borders. */
-static terrimp_result terrimpi_build_simplify(const terrimp_terrain *t,
-                                              const terrimpi_terrain_tile *p,
+#define TERRIMPI_BUILD_POINTS 52u /* of a border of the largest budget */
+
+/* Simplifies the tile between its four borders, of as many points as the budget asks for. */
+static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, uint32_t budget,
                                               const terrimpi_build *build, terrimp_mesh *mesh)
 {
-    terrimp_border_point points[TERRIMP_SIDE_COUNT][16];
-    float line[129];
+    terrimp_border_point points[TERRIMP_SIDE_COUNT][TERRIMPI_BUILD_POINTS];
+    float line[TERRIMP_MAX_TILE_DIM];
     terrimp_simplify_desc desc;
     terrimpi_simp_last_spacing squeeze;
-    int side, even;
+    int side, even = (p->span_x | p->span_z) % (1u << p->level) == 0;
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
-    desc.triangle_budget = t->desc.triangle_budget;
+    desc.triangle_budget = budget;
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
         uint32_t first, step, k, count = terrimpi_build_tile_border(p, side, &first, &step);
         for (k = 0; k < count; k++)
             line[k] = build->tile[first + k * step];
-        TERRIMPI_TRY(terrimp_border_simplify(
-            line, count, terrimpi_terrain_border_points(t->desc.triangle_budget), points[side], 16,
-            &desc.borders[side].point_count));
+        TERRIMPI_TRY(terrimp_border_simplify(line, count, build->border_points, points[side],
+                                             TERRIMPI_BUILD_POINTS,
+                                             &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
     squeeze.step = 1 << p->level;
     squeeze.last_x = (int32_t)p->span_x;
     squeeze.last_z = (int32_t)p->span_z;
-    memset(mesh, 0, sizeof *mesh);
-    mesh->vertices = build->vertices;
-    mesh->indices = build->indices;
-    mesh->vertex_capacity = build->vertex_capacity;
-    mesh->index_capacity = build->index_capacity;
-    even = (p->span_x | p->span_z) % (1u << p->level) == 0;
     return terrimpi_simp_run(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
    a sample round it over the polyline. From the border's own samples alone. */
-static void terrimpi_build_border_shortfall(const terrimp_terrain *t,
+static void terrimpi_build_border_shortfall(const terrimp_heightfield *field,
                                             const terrimpi_terrain_tile *p, int side,
                                             const terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    uint32_t span = terrimpi_build_read_border(t, p, side, build->row), first, step, i, k;
+    uint32_t span = terrimpi_build_read_border(field, p, side, build->row), first, step, i, k;
     uint32_t count = terrimpi_build_tile_border(p, side, &first, &step);
     terrimpi_build_subtract_border(p, mesh, side, build->row);
     build->tile[first] = build->tile[first + (count - 1u) * step] = 0.0f;
@@ -16405,8 +16229,9 @@ static void terrimpi_build_border_shortfall(const terrimp_terrain *t,
 
 /* Fills the tile with what the mesh misses: for each place the largest height of a sample round it
    over the surface. */
-static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                     const terrimp_mesh *mesh, const terrimpi_build *build)
+static void terrimpi_build_shortfall(const terrimp_heightfield *field,
+                                     const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                     const terrimpi_build *build)
 {
     uint32_t i, k, x, z;
     int side;
@@ -16416,7 +16241,7 @@ static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_te
         uint32_t from, to;
         terrimpi_build_window(k, p->level, p->rows, p->span_z, &from, &to);
         for (z = from; z < to; z++) {
-            terrimpi_build_residual_of_row(t, p, mesh, build, z);
+            terrimpi_build_residual_of_row(field, p, mesh, build, z);
             for (i = 1; i + 1u < p->cols; i++) {
                 uint32_t first, end;
                 float most;
@@ -16429,32 +16254,27 @@ static void terrimpi_build_shortfall(const terrimp_terrain *t, const terrimpi_te
         }
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        terrimpi_build_border_shortfall(t, p, side, mesh, build);
+        terrimpi_build_border_shortfall(field, p, side, mesh, build);
 }
 
-/* Raises the mesh so that it stands proud of all samples. Since a raise is a piecewise linear
-   function over the same triangles, it is found on a flat copy of the mesh, from what is missed:
-   there the places of the tile stand for all samples round them, however steep the terrain is.
-   To do so twice halves the samples that still stand out, from 0.3 to 0.15 %, and makes the error
-   larger by a tenth to a fifth: not worth it. */
-static terrimp_result terrimpi_build_raise(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                           terrimp_mesh *mesh, const terrimpi_build *build)
+/* Raises the mesh so that it stands proud of all samples. A raise is a piecewise linear function
+   over the same triangles, so it is found from what is missed: there the places of the tile stand
+   for all samples round them, however steep the terrain is. To do so twice halves the samples that
+   still stand out, from 0.3 to 0.15 %, and makes the error larger by a tenth to a fifth: not worth
+   it. */
+static void terrimpi_build_raise(const terrimp_heightfield *field, const terrimpi_terrain_tile *p,
+                                 float proud, terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    terrimp_raise_desc raise;
+    terrimpi_raise raise;
     uint32_t i;
-    terrimpi_build_shortfall(t, p, mesh, build);
-    raise.heights = build->tile;
+    terrimpi_build_shortfall(field, p, mesh, build);
+    raise.miss = build->tile;
     raise.cols = p->cols;
     raise.rows = p->rows;
-    raise.amount = t->desc.proud;
-    for (i = 0; i < mesh->surface_vertex_count; i++) {
-        build->heights[i] = mesh->vertices[i].height;
-        mesh->vertices[i].height = 0.0f;
-    }
-    TERRIMPI_TRY(terrimp_mesh_raise(&raise, mesh, build->work));
+    raise.mesh = mesh;
+    terrimpi_raise_find(&raise, build->work);
     for (i = 0; i < mesh->surface_vertex_count; i++)
-        mesh->vertices[i].height += build->heights[i];
-    return TERRIMP_OK;
+        mesh->vertices[i].height += proud * build->work[i];
 }
 
 /* The highest that ground can be drawn at each sample of a border: of levels up to one the lines
@@ -16499,7 +16319,7 @@ static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_
         lift[i] = 0.0f;
     }
     for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
-        uint32_t span = terrimpi_build_read_border(t, p, side, build->row);
+        uint32_t span = terrimpi_build_read_border(&t->desc.field, p, side, build->row);
         terrimpi_build_ground_tops(build, span, p->level + 1u);
         terrimpi_build_subtract_border(p, mesh, side, build->tops);
         for (i = 0; i < mesh->border_vertex_count; i++) {
@@ -16608,16 +16428,17 @@ static void terrimpi_build_add_error(terrimpi_build_error *error, float differen
 }
 
 /* Measures a mesh against every sample of its node. */
-static void terrimpi_build_measure_node(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
-                                        const terrimp_mesh *mesh, const terrimpi_build *build,
-                                        terrimpi_build_error *error, float *rms)
+static void terrimpi_build_measure_node(const terrimp_heightfield *field,
+                                        const terrimpi_terrain_tile *p, const terrimp_mesh *mesh,
+                                        const terrimpi_build *build, terrimpi_build_error *error,
+                                        float *rms)
 {
     uint32_t x, z;
     float squares = 0.0f;
     error->above = error->below = 0.0f;
     terrimpi_build_setup_triangles(p, mesh, build->facets);
     for (z = 0; z <= p->span_z; z++) {
-        terrimpi_build_residual_of_row(t, p, mesh, build, z);
+        terrimpi_build_residual_of_row(field, p, mesh, build, z);
         error->squares = 0.0f; /* summed by row, as small sums round less */
         for (x = 0; x <= p->span_x; x++)
             terrimpi_build_add_error(error, build->row[x]);
@@ -16633,20 +16454,110 @@ static terrimp_result terrimpi_build_mesh(terrimp_terrain *t, uint32_t node,
     terrimp_mesh mesh;
     terrimpi_build_error error;
     float rms;
-    terrimpi_build_tile(t, &p, build);
-    TERRIMPI_TRY(terrimpi_build_simplify(t, &p, build, &mesh));
+    terrimpi_build_tile(&t->desc.field, &p, build);
+    memset(&mesh, 0, sizeof mesh);
+    mesh.vertices = build->vertices;
+    mesh.indices = build->indices;
+    mesh.vertex_capacity = build->vertex_capacity;
+    mesh.index_capacity = build->index_capacity;
+    TERRIMPI_TRY(terrimpi_build_simplify(&p, t->desc.triangle_budget, build, &mesh));
     if (t->desc.proud > 0.0f) {
-        TERRIMPI_TRY(terrimpi_build_raise(t, &p, &mesh, build));
+        terrimpi_build_raise(&t->desc.field, &p, t->desc.proud, &mesh, build);
         terrimpi_build_lift_border(t, &p, &mesh, build);
     }
     terrimpi_build_store_surface(t, &p, node, &mesh);
-    terrimpi_build_measure_node(t, &p, &mesh, build, &error, &rms);
+    terrimpi_build_measure_node(&t->desc.field, &p, &mesh, build, &error, &rms);
     if (!terrimpi_finite2(error.above, error.below)) {
         t->meshes[node].counts = 0;
         return TERRIMP_E_NOT_FINITE;
     }
     t->meshes[node].error = terrimpi_max(error.above, error.below);
     t->meshes[node].error_rms = rms;
+    return TERRIMP_OK;
+}
+
+/* ---- a rectangle by one call ---- */
+
+static size_t terrimpi_build_layout_rect(const terrimp_rect *samples, uint32_t budget, void *base,
+                                         terrimpi_build *build)
+{
+    budget = budget ? budget : TERRIMP_TRIANGLE_BUDGET;
+    if (!terrimpi_simp_tile_size_ok(samples->width, samples->height) ||
+        !terrimpi_within_u32(budget, 6u, TERRIMP_MAX_TRIANGLES))
+        return 0;
+    return terrimpi_build_layout_tile(samples->width, samples->height, TERRIMP_MAX_TILE_DIM, budget,
+                                      base, build);
+}
+
+TERRIMP_API size_t terrimp_simplify_field_scratch_bytes(uint32_t cols, uint32_t rows,
+                                                        uint32_t triangle_budget)
+{
+    terrimp_rect samples = terrimpi_rect(0, 0, cols, rows);
+    terrimpi_build build;
+    return terrimpi_build_layout_rect(&samples, triangle_budget, NULL, &build);
+}
+
+/* Simplifies the tile to a budget and finds the largest error. */
+static terrimp_result terrimpi_build_rect(const terrimp_heightfield *field,
+                                          const terrimpi_terrain_tile *p, uint32_t budget,
+                                          const terrimpi_build *build, terrimp_mesh *mesh,
+                                          float *off)
+{
+    terrimpi_build_error error;
+    float rms;
+    TERRIMPI_TRY(terrimpi_build_simplify(p, budget, build, mesh));
+    terrimpi_build_measure_node(field, p, mesh, build, &error, &rms);
+    *off = terrimpi_max(error.above, error.below);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *field,
+                                                  const terrimp_rect *samples,
+                                                  uint32_t triangle_budget, float max_error,
+                                                  void *scratch, size_t bytes, terrimp_mesh *mesh,
+                                                  float *error)
+{
+    terrimp_heightfield f;
+    terrimpi_terrain_tile p;
+    terrimpi_build build;
+    uint32_t low, high = triangle_budget ? triangle_budget : TERRIMP_TRIANGLE_BUDGET, budget = high;
+    float off;
+    size_t needed;
+    TERRIMPI_REFUSE(!field || !samples || !mesh, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite(max_error), TERRIMP_E_NOT_FINITE);
+    needed = terrimpi_build_layout_rect(samples, high, scratch, &build);
+    TERRIMPI_REFUSE(needed == 0 || max_error < 0.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(samples->x > field->width - samples->width || field->width < samples->width ||
+                    samples->y > field->depth - samples->height ||
+                    field->depth < samples->height, TERRIMP_E_RANGE);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
+    TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
+    TERRIMPI_TRY(terrimp_heightfield_read(&f, samples->x, samples->y, samples->width,
+                                          samples->height, 1, build.tile));
+    p.level = 0;
+    p.x = samples->x;
+    p.z = samples->y;
+    p.cols = samples->width;
+    p.rows = samples->height;
+    p.span_x = p.cols - 1u;
+    p.span_z = p.rows - 1u;
+    TERRIMPI_TRY(terrimpi_build_rect(&f, &p, high, &build, mesh, &off));
+    low = terrimpi_max_u32(2u, mesh->border_vertex_count - 2u);
+    while (max_error > 0.0f && off <= max_error && low < high) { /* high is enough; is this? */
+        float less;
+        budget = low + (high - low) / 2u;
+        TERRIMPI_TRY(terrimpi_build_rect(&f, &p, budget, &build, mesh, &less));
+        if (less <= max_error) {
+            high = budget;
+            off = less;
+        } else {
+            low = budget + 1u;
+        }
+    }
+    if (budget != high)
+        TERRIMPI_TRY(terrimpi_build_rect(&f, &p, high, &build, mesh, &off));
+    if (error)
+        *error = off;
     return TERRIMP_OK;
 }
 

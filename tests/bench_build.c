@@ -38,7 +38,7 @@ static double standing_out(const terrimp_terrain *t, uint32_t node, float slack)
         build.indices[i] = (uint16_t)terrimpi_mesh_corner(t, node, i);
     terrimpi_build_setup_triangles(&p, &mesh, build.facets);
     for (z = 0; z <= p.span_z; z++) {
-        terrimpi_build_residual_of_row(t, &p, &mesh, &build, z);
+        terrimpi_build_residual_of_row(&t->desc.field, &p, &mesh, &build, z);
         for (x = 0; x <= p.span_x; x++)
             count += build.row[x] > slack;
     }

@@ -222,11 +222,9 @@ static void simplifier_refuses(void)
     static terrimp_border_point points[8];
     static terrimp_mesh_vertex vertices[600];
     static uint16_t indices[3000];
-    static float work[1200];
     static int64_t scratch[40000];
     terrimp_border_point ends[2];
     terrimp_simplify_desc desc, bad;
-    terrimp_raise_desc raise, bad_raise;
     terrimp_mesh mesh, before;
     float line[5] = {1.0f, 2.0f, 3.0f, 2.0f, 1.0f};
     struct { uint32_t vertices, indices; } counts;
@@ -332,27 +330,10 @@ static void simplifier_refuses(void)
     MESH_REFUSES(TERRIMP_E_NOT_FINITE, terrimp_simplify(&desc, scratch, bytes, &mesh));
     flat_samples[7] = 0.0f;
 
-    memset(&raise, 0, sizeof raise);
-    raise.heights = flat_samples;
-    raise.cols = 5;
-    raise.rows = 4;
-    raise.amount = 1.0f;
-    MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_raise(&raise, &mesh, work));
     MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_add_skirt(&mesh, 0, 0.0f));
     MESH_REFUSES(TERRIMP_E_STATE, terrimp_mesh_add_skirt(&mesh, 1, 1.0f));
     GIVES(TERRIMP_OK, terrimp_simplify(&desc, scratch, bytes, &mesh));
     before = mesh;
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(NULL, &mesh, work));
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, NULL, work));
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, &mesh, NULL));
-    bad_raise = raise;
-    bad_raise.heights = NULL;
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&bad_raise, &mesh, work));
-    bad_raise = raise;
-    bad_raise.amount = 1.5f;
-    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad_raise, &mesh, work));
-    bad_raise.amount = not_finite(0);
-    GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&bad_raise, &mesh, work));
     GIVES(TERRIMP_E_NULL, terrimp_mesh_add_skirt(NULL, 0, 0.0f));
     GIVES(TERRIMP_E_NULL, terrimp_mesh_add_skirt(NULL, 1, 0.0f));
     GIVES(TERRIMP_E_RANGE, terrimp_mesh_add_skirt(&mesh, 1, -1.0f));
@@ -1231,45 +1212,6 @@ static void too_little_room_for_ground_is_an_error(void)
     land_free(&l);
 }
 
-static void meshes_are_not_raised_by_bad_numbers(void)
-{
-    static float work[2 * 1000];
-    simp_case *t = &simp_a;
-    terrimp_raise_desc raise, bad;
-    int i;
-    simp_fill(t, 20, 17, 0);
-    simp_make_borders(t, 0);
-    CHECK(simp_run(t, 0) == TERRIMP_OK);
-    memset(&raise, 0, sizeof raise);
-    raise.heights = t->heights;
-    raise.cols = t->cols;
-    raise.rows = t->rows;
-    raise.amount = 1.0f;
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(NULL, &t->mesh, work));
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, NULL, work));
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&raise, &t->mesh, NULL));
-    bad = raise, bad.heights = NULL;
-    GIVES(TERRIMP_E_NULL, terrimp_mesh_raise(&bad, &t->mesh, work));
-    bad = raise, bad.cols = 1;
-    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
-    bad = raise, bad.cols--; /* the mesh stands out of it */
-    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
-    bad = raise, bad.amount = 1.5f;
-    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&bad, &t->mesh, work));
-    for (i = 0; i < 3; i++) {
-        bad = raise, bad.amount = not_finite(i);
-        GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&bad, &t->mesh, work));
-    }
-    t->heights[7] = not_finite(0);
-    GIVES(TERRIMP_E_NOT_FINITE, terrimp_mesh_raise(&raise, &t->mesh, work));
-    t->heights[7] = 1.0f;
-    t->mesh.indices[0] = (uint16_t)t->mesh.surface_vertex_count;
-    GIVES(TERRIMP_E_RANGE, terrimp_mesh_raise(&raise, &t->mesh, work));
-    t->mesh.vertex_count++;
-    GIVES(TERRIMP_E_STATE, terrimp_mesh_raise(&raise, &t->mesh, work));
-    simp_free(t);
-}
-
 static void geomip_functions_refuse(void)
 {
     terrimp_heightfield bad;
@@ -1376,7 +1318,6 @@ static void bad_input_tests(void)
     RUN(views_refuse);
     RUN(samples_outside_of_the_named_range_are_refused);
     RUN(too_little_room_for_ground_is_an_error);
-    RUN(meshes_are_not_raised_by_bad_numbers);
     RUN(geomip_functions_refuse);
     RUN(pictures_are_not_tightened_or_split_by_bad_numbers);
     RUN(every_result_has_been_provoked);

@@ -357,9 +357,11 @@ static int cull_truly_hidden(int k, int x, int y)
 
 static void culling_takes_nothing_that_an_eye_sees(void)
 {
+    static signed char truth[CULL_LAYERS][CULL_SIDE_Y][CULL_SIDE_X]; /* -1: not found out yet */
     int turn, rule, k, x, y;
     long truly = 0, found[TERRIMP_CULL_COUNT] = {0, 0, 0};
     for (turn = 0; turn < 6; turn++) {
+        memset(truth, -1, sizeof truth);
         for (k = 0; k < CULL_LAYERS; k++)
             random_mask(cull_opaque[k], CULL_SIDE_X, CULL_SIDE_Y, 4 + 3 * turn, 0.55f);
         for (rule = TERRIMP_CULL_BLOCK; rule < TERRIMP_CULL_COUNT; rule++) {
@@ -372,7 +374,9 @@ static void culling_takes_nothing_that_an_eye_sees(void)
                         CHECK(opaque || !shown);
                         if (!opaque || (shown && rule == TERRIMP_CULL_BLOCK))
                             continue;
-                        hidden = cull_truly_hidden(k, x, y);
+                        if (truth[k][y][x] < 0)
+                            truth[k][y][x] = (signed char)cull_truly_hidden(k, x, y);
+                        hidden = truth[k][y][x];
                         truly += hidden && rule == TERRIMP_CULL_CORNERS;
                         found[rule] += !shown;
                         CHECK(shown || hidden);

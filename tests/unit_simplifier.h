@@ -417,15 +417,30 @@ static void skirts_are_closed_walls_that_face_the_right_way(void)
     simp_free(t);
 }
 
+/* Raises the mesh of a case as those of terrains are; work has the raise of each vertex then. */
 static void simp_raise(simp_case *t, float amount, float *work)
 {
-    terrimp_raise_desc raise;
-    memset(&raise, 0, sizeof raise);
-    raise.heights = t->heights;
-    raise.cols = t->cols;
-    raise.rows = t->rows;
-    raise.amount = amount;
-    CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_OK);
+    terrimp_heightfield field;
+    terrimpi_terrain_tile p;
+    terrimpi_build build;
+    uint32_t budget = t->mesh.surface_index_count / 3u;
+    size_t bytes = terrimpi_build_layout_tile(t->cols, t->rows, TERRIMP_MAX_TILE_DIM, budget, NULL,
+                                              &build);
+    void *scratch = malloc(bytes);
+    terrimpi_build_layout_tile(t->cols, t->rows, TERRIMP_MAX_TILE_DIM, budget, scratch, &build);
+    memset(&field, 0, sizeof field);
+    field.samples = t->heights;
+    field.width = t->cols;
+    field.depth = t->rows;
+    CHECK(terrimp_heightfield_resolve(&field, &field) == TERRIMP_OK);
+    memset(&p, 0, sizeof p);
+    p.cols = t->cols;
+    p.rows = t->rows;
+    p.span_x = p.cols - 1u;
+    p.span_z = p.rows - 1u;
+    terrimpi_build_raise(&field, &p, amount, &t->mesh, &build);
+    memcpy(work, build.work, t->mesh.surface_vertex_count * sizeof *work);
+    free(scratch);
 }
 
 /* Is every sample under the raised surface, but for those whose weight hangs by more than half on
@@ -494,7 +509,6 @@ static void raised_neighbours_still_meet(void)
     int round;
     for (round = 0; round < 6; round++) {
         simp_case *p = &simp_a, *q = &simp_b;
-        terrimp_raise_desc raise;
         uint32_t x, i, k, shared = 0;
         simp_fill(p, 65, 33, 6);
         simp_fill(q, 65, 49, 6);
@@ -503,15 +517,8 @@ static void raised_neighbours_still_meet(void)
         simp_make_borders(p, 0);
         simp_make_borders(q, 0);
         CHECK(simp_run(p, 0) == TERRIMP_OK && simp_run(q, 0) == TERRIMP_OK);
-        memset(&raise, 0, sizeof raise);
-        raise.amount = 0.7f;
-        raise.heights = p->heights;
-        raise.cols = 65;
-        raise.rows = 33;
-        CHECK(terrimp_mesh_raise(&raise, &p->mesh, work) == TERRIMP_OK);
-        raise.heights = q->heights;
-        raise.rows = 49;
-        CHECK(terrimp_mesh_raise(&raise, &q->mesh, work) == TERRIMP_OK);
+        simp_raise(p, 0.7f, work);
+        simp_raise(q, 0.7f, work);
         for (i = 0; i < p->mesh.border_vertex_count; i++)
             for (k = 0; k < q->mesh.border_vertex_count; k++) {
                 const terrimp_mesh_vertex *v = p->mesh.vertices + i, *w = q->mesh.vertices + k;
@@ -531,7 +538,7 @@ static void simplifier_refuses_bad_input(void)
     terrimp_mesh untouched;
     terrimp_simplify_desc d;
     terrimp_border_point p[8];
-    float h[4] = {0.0f, 1.0f, NAN, 2.0f}, work[4];
+    float h[4] = {0.0f, 1.0f, NAN, 2.0f};
     uint32_t count = 77, v = 5, i = 5;
     simp_fill(t, 17, 17, 6);
     simp_make_borders(t, 0);
@@ -583,9 +590,7 @@ static void simplifier_refuses_bad_input(void)
     CHECK(terrimp_border_simplify(h, 2, 0, p, 1, &count) == TERRIMP_E_CAPACITY && count == 77);
     {
         terrimp_mesh none;
-        terrimp_raise_desc raise;
         memset(&none, 0, sizeof none);
-        memset(&raise, 0, sizeof raise);
         CHECK(terrimp_mesh_add_skirt(NULL, 0, 0.0f) == TERRIMP_E_NULL);
         CHECK(terrimp_mesh_add_skirt(&none, 0, 0.0f) == TERRIMP_E_NULL);
         CHECK(terrimp_mesh_add_skirt(&t->mesh, 0, NAN) == TERRIMP_E_NOT_FINITE);
@@ -593,15 +598,6 @@ static void simplifier_refuses_bad_input(void)
         none.vertices = t->mesh.vertices;
         none.indices = t->mesh.indices;
         CHECK(terrimp_mesh_add_skirt(&none, 1, 1.0f) == TERRIMP_E_STATE);
-        CHECK(terrimp_mesh_raise(NULL, &t->mesh, work) == TERRIMP_E_NULL);
-        CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_E_NULL);
-        raise.heights = t->heights;
-        CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_E_RANGE);
-        raise.cols = raise.rows = 17;
-        raise.amount = 2.0f;
-        CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_E_RANGE);
-        raise.amount = NAN;
-        CHECK(terrimp_mesh_raise(&raise, &t->mesh, work) == TERRIMP_E_NOT_FINITE);
     }
     simp_free(t);
 }

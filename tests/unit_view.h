@@ -2068,14 +2068,12 @@ static void auto_is_not_dearer_than_ground_where_pictures_do_not_last(void)
     land l;
     make_hills(&l);
     if (land_build(&l))
-        for (i = 0; i < sizeof steps / sizeof *steps; i++)
-            for (k = 0; k < 4u; k++) {
-                double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, steps[i], losses[k], 80,
-                                            &flight_room);
-                double both = flight_cost(&l, TERRIMP_MODE_AUTO, steps[i], losses[k], 80,
-                                          &flight_room);
-                CHECK(both <= 1.1 * ground);
-            }
+        for (i = 0; i < sizeof steps / sizeof *steps; i++) {
+            double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, steps[i], 0, 80, &flight_room);
+            for (k = 0; k < 4u; k++)
+                CHECK(flight_cost(&l, TERRIMP_MODE_AUTO, steps[i], losses[k], 80, &flight_room) <=
+                      1.1 * ground);
+        }
     land_free(&l);
 }
 
