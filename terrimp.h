@@ -6451,12 +6451,14 @@ static terrimp_rect terrimpi_atlas_corner(const terrimp_live_atlas *atlas, const
     return best;
 }
 
-/* terrimp_live_atlas_alloc of checked arguments. */
-static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                           uint32_t height, uint32_t *slot)
+TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
+                                                    uint32_t height, uint32_t *slot)
 {
     uint32_t spot, handle;
     terrimp_rect taken, whole;
+    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
     spot = terrimpi_atlas_find(atlas, width, height);
     handle = atlas->unused;
     if (spot == atlas->free_count || handle == atlas->desc.max_slots) {
@@ -6474,15 +6476,6 @@ static terrimp_result terrimpi_atlas_alloc(terrimp_live_atlas *atlas, uint32_t w
     terrimpi_atlas_free_cut(atlas, 0, &taken, &whole);
     *slot = handle;
     return TERRIMP_OK;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, uint32_t width,
-                                                    uint32_t height, uint32_t *slot)
-{
-    TERRIMPI_REFUSE(!atlas || !slot, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(width < 1u || height < 1u, TERRIMP_E_RANGE);
-    return terrimpi_atlas_alloc(atlas, width, height, slot);
 }
 
 /* Adds the free rectangles that overlap `freed`, which is no slot any more. They replace those
@@ -6524,11 +6517,14 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
     return TERRIMP_OK;
 }
 
-/* terrimp_live_atlas_room of checked arguments. */
-static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width, uint32_t height,
-                                uint32_t size[2])
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2])
 {
     uint32_t i, best_x = 0, best_y = 0;
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
     for (i = 0; i < atlas->free_count; i++) {
         const terrimp_rect *spot = &atlas->free_rects[i];
         uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
@@ -6550,16 +6546,6 @@ static void terrimpi_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
         best_x = best_y = 0;
     size[0] = best_x;
     size[1] = best_y;
-}
-
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2])
-{
-    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
-                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
-    terrimpi_atlas_room(atlas, width, height, size);
     return TERRIMP_OK;
 }
 
@@ -7509,7 +7495,8 @@ typedef struct terrimpi_bake {
     uint32_t magic, version;
     uint32_t bytes;         /* in all */
     uint32_t checksum;      /* of everything behind it */
-    uint32_t width, depth, format;
+    uint32_t width, depth;
+    int32_t format;
     uint32_t chunk_quads, triangle_budget, flags;
     uint32_t node_count, vertex_limit, index_limit, mesh_triangle_count;
     uint32_t samples;       /* checksum of the heightfield's samples */
@@ -7517,6 +7504,27 @@ typedef struct terrimpi_bake {
     float height_low, height_high, sample_low, sample_high;
     float range_low, range_step, proud;
 } terrimpi_bake;
+
+/* What a header repeats of a terrain: X(its own field, that of the terrain). */
+#define TERRIMPI_BAKE_FIELDS(X)                 \
+    X(width, desc.field.width)                  \
+    X(depth, desc.field.depth)                  \
+    X(format, desc.field.format)                \
+    X(chunk_quads, desc.chunk_quads)            \
+    X(triangle_budget, desc.triangle_budget)    \
+    X(node_count, tree.node_count)              \
+    X(vertex_limit, vertex_limit)               \
+    X(index_limit, index_limit)                 \
+    X(mesh_triangle_count, mesh_triangle_count) \
+    X(height_scale, desc.field.height_scale)    \
+    X(height_offset, desc.field.height_offset)  \
+    X(height_low, desc.height_low)              \
+    X(height_high, desc.height_high)            \
+    X(sample_low, sample_low)                   \
+    X(sample_high, sample_high)                 \
+    X(range_low, range_low)                     \
+    X(range_step, range_step)                   \
+    X(proud, desc.proud)
 
 /* Fowler, Noll and Vo's hash, a word at a time: no changed word goes unseen, nor two that are
    exchanged. */
@@ -7564,36 +7572,21 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
 static int terrimpi_bake_header(const terrimpi_bake *bake, uint32_t version, terrimp_terrain *t)
 {
     static const float any = 0.0f; /* stands for the samples: they are not looked at */
-    terrimp_terrain_desc desc;
     memset(t, 0, sizeof *t);
-    memset(&desc, 0, sizeof desc);
-    if (bake->version != version || bake->format == 0 ||
-        bake->format >= (uint32_t)TERRIMP_FORMAT_COUNT || bake->chunk_quads == 0 ||
+    if (bake->version != version || bake->format == 0 || bake->chunk_quads == 0 ||
         bake->triangle_budget == 0 || bake->flags > 3u)
         return 0;
-    desc.field.samples = &any;
-    desc.field.width = bake->width;
-    desc.field.depth = bake->depth;
-    desc.field.format = (int)bake->format;
-    desc.field.height_scale = bake->height_scale;
-    desc.field.height_offset = bake->height_offset;
-    desc.chunk_quads = bake->chunk_quads;
-    desc.triangle_budget = bake->triangle_budget;
-    desc.proud = bake->proud;
-    desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
-    desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
-    desc.height_low = bake->height_low;
-    desc.height_high = bake->height_high;
-    if (terrimp_terrain_desc_resolve(&desc, &t->desc) != TERRIMP_OK || !terrimpi_terrain_count(t))
+#define TERRIMPI_X(own, of) t->of = bake->own;
+    TERRIMPI_BAKE_FIELDS(TERRIMPI_X)
+#undef TERRIMPI_X
+    t->desc.field.samples = &any;
+    t->desc.not_proud = (bake->flags & TERRIMPI_BAKE_NOT_PROUD) != 0;
+    t->desc.no_lower_skirts = (bake->flags & TERRIMPI_BAKE_NO_LOWER_SKIRTS) != 0;
+    if (terrimp_terrain_desc_resolve(&t->desc, &t->desc) != TERRIMP_OK ||
+        !terrimpi_terrain_count(t))
         return 0;
-    t->mesh_triangle_count = bake->mesh_triangle_count;
-    t->sample_low = bake->sample_low;
-    t->sample_high = bake->sample_high;
-    t->range_low = bake->range_low;
-    t->range_step = bake->range_step;
     return bake->node_count == t->tree.node_count && bake->vertex_limit == t->vertex_limit &&
-           bake->index_limit == t->index_limit && terrimpi_finite(t->sample_low) &&
-           terrimpi_finite(t->sample_high) &&
+           bake->index_limit == t->index_limit && terrimpi_finite2(t->sample_low, t->sample_high) &&
            terrimpi_terrain_range_fits(&t->desc.field, t->range_low, t->range_step);
 }
 
@@ -7767,7 +7760,7 @@ TERRIMP_API terrimp_result terrimp_bake_check(const void *block, size_t bytes,
     info->bytes = bake.bytes;
     info->width = bake.width;
     info->depth = bake.depth;
-    info->format = (int)bake.format;
+    info->format = bake.format;
     info->height_scale = t.desc.field.height_scale;
     info->height_offset = bake.height_offset;
     info->chunk_quads = bake.chunk_quads;
@@ -9945,7 +9938,7 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
 {
     do {
         for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
-            if (terrimpi_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
+            if (terrimp_live_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
                 TERRIMP_OK)
                 return 1;
     } while (terrimpi_cache_evict(c));
@@ -17003,28 +16996,12 @@ static void terrimpi_bake_swap_words(unsigned char *words, size_t bytes)
 /* Fills in what a header says of a terrain. */
 static void terrimpi_bake_describe(const terrimp_terrain *t, terrimpi_bake *bake)
 {
-    const terrimp_terrain_desc *desc = &t->desc;
     memset(bake, 0, sizeof *bake);
-    bake->width = desc->field.width;
-    bake->depth = desc->field.depth;
-    bake->format = (uint32_t)desc->field.format;
-    bake->chunk_quads = desc->chunk_quads;
-    bake->triangle_budget = desc->triangle_budget;
-    bake->flags = (desc->no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
-                  (desc->not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
-    bake->node_count = t->tree.node_count;
-    bake->vertex_limit = t->vertex_limit;
-    bake->index_limit = t->index_limit;
-    bake->mesh_triangle_count = t->mesh_triangle_count;
-    bake->height_scale = desc->field.height_scale;
-    bake->height_offset = desc->field.height_offset;
-    bake->height_low = desc->height_low;
-    bake->height_high = desc->height_high;
-    bake->sample_low = t->sample_low;
-    bake->sample_high = t->sample_high;
-    bake->range_low = t->range_low;
-    bake->range_step = t->range_step;
-    bake->proud = desc->proud;
+#define TERRIMPI_X(own, of) bake->own = t->of;
+    TERRIMPI_BAKE_FIELDS(TERRIMPI_X)
+#undef TERRIMPI_X
+    bake->flags = (t->desc.no_lower_skirts ? (uint32_t)TERRIMPI_BAKE_NO_LOWER_SKIRTS : 0u) |
+                  (t->desc.not_proud ? (uint32_t)TERRIMPI_BAKE_NOT_PROUD : 0u);
 }
 
 TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, void *out,
