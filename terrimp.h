@@ -4528,6 +4528,17 @@ static int terrimpi_tree_beyond(const terrimp_quadtree *t, const terrimp_node *n
     return 1;
 }
 
+/* The child of a node in its quarter i, along x, then z. Returns 0 when there is none. */
+static int terrimpi_tree_quarter(const terrimp_quadtree *t, const terrimp_node *n, uint32_t i,
+                                 terrimp_node *child)
+{
+    uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+    if (n->level == 0 || !terrimpi_tree_has(t, n->level - 1u, x, z))
+        return 0;
+    *child = terrimpi_tree_at(t, n->level - 1u, x, z);
+    return 1;
+}
+
 /* ---- where it lies ---- */
 
 /* Column and row of lattice position (i, j) of a level. */
@@ -6681,31 +6692,21 @@ TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc 
 
 #endif /* TERRIMP_NO_TROUBLE */
 
-/* Vertices and indices of the floor, and of its ground alone. */
-static uint32_t terrimpi_floor_ground_vertices(const terrimp_terrain *t)
-{
-    return (t->tree.level_x[t->floor_level] + 1u) * (t->tree.level_z[t->floor_level] + 1u);
-}
+/* How many vertices, indices and points of the walls the floor has. */
+typedef struct terrimpi_floor {
+    uint32_t ground_vertices, ground_indices, wall_points, vertices, indices;
+} terrimpi_floor;
 
-static uint32_t terrimpi_floor_ground_indices(const terrimp_terrain *t)
+static terrimpi_floor terrimpi_floor_of(const terrimp_terrain *t)
 {
-    return t->tree.level_x[t->floor_level] * t->tree.level_z[t->floor_level] * 6u;
-}
-
-static uint32_t terrimpi_floor_wall_points(const terrimp_terrain *t)
-{
-    return 2u * TERRIMPI_FLOOR_WALL_POINTS *
-           (t->tree.level_x[t->floor_level] + t->tree.level_z[t->floor_level]);
-}
-
-static uint32_t terrimpi_floor_vertices(const terrimp_terrain *t)
-{
-    return terrimpi_floor_ground_vertices(t) + 2u * terrimpi_floor_wall_points(t);
-}
-
-static uint32_t terrimpi_floor_indices(const terrimp_terrain *t)
-{
-    return terrimpi_floor_ground_indices(t) + 6u * terrimpi_floor_wall_points(t);
+    uint32_t wide = t->tree.level_x[t->floor_level], deep = t->tree.level_z[t->floor_level];
+    terrimpi_floor f;
+    f.ground_vertices = (wide + 1u) * (deep + 1u);
+    f.ground_indices = 6u * wide * deep;
+    f.wall_points = 2u * TERRIMPI_FLOOR_WALL_POINTS * (wide + deep);
+    f.vertices = f.ground_vertices + 2u * f.wall_points;
+    f.indices = f.ground_indices + 6u * f.wall_points;
+    return f;
 }
 
 /* Inner points that a border keeps: those of 64 quads are the simplifier's default, and a budget
@@ -7160,8 +7161,8 @@ TERRIMP_API terrimp_result terrimp_terrain_get_info(const terrimp_terrain *terra
     info->ground_index_count = terrimpi_terrain_pattern_of(quads, 0xffffffffu).first_index;
     info->mesh_vertex_stride = terrain->vertex_stride;
     info->mesh_index_stride = terrain->index_stride;
-    info->floor_vertex_count = terrimpi_floor_vertices(terrain);
-    info->floor_index_count = terrimpi_floor_indices(terrain);
+    info->floor_vertex_count = terrimpi_floor_of(terrain).vertices;
+    info->floor_index_count = terrimpi_floor_of(terrain).indices;
     info->mesh_vertex_count =
         terrimpi_mesh_places(terrain) * terrain->vertex_stride + info->floor_vertex_count;
     info->mesh_index_count =
@@ -7319,10 +7320,9 @@ static float terrimpi_terrain_lowest(const terrimp_terrain *t, const uint32_t a[
    floor up to the lowest samples between the points beside, so nowhere over the border. */
 static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t *indices)
 {
-    uint32_t ground = terrimpi_floor_ground_vertices(t), i, k, points;
-    uint32_t first = terrimpi_floor_ground_indices(t);
+    terrimpi_floor f = terrimpi_floor_of(t);
+    uint32_t ground = f.ground_vertices, first = f.ground_indices, points = f.wall_points, i, k;
     terrimp_node root = terrimpi_tree_root(&t->tree);
-    points = terrimpi_floor_wall_points(t);
     terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
@@ -7339,7 +7339,7 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
                                               terrimpi_terrain_lowest(t, at, after));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
-    for (i = first; i < terrimpi_floor_indices(t); i++)
+    for (i = first; i < f.indices; i++)
         indices[i] = (uint16_t)(indices[i] + ground);
 }
 
@@ -7406,8 +7406,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_mesh(const terrimp_terrain *terr
     TERRIMPI_REFUSE(node > terrain->tree.node_count, TERRIMP_E_RANGE);
     is_floor = node == terrain->tree.node_count;
     TERRIMPI_REFUSE(!is_floor && !terrimpi_tree_opens(&terrain->tree, node), TERRIMP_E_PAGE);
-    vertices = is_floor ? terrimpi_floor_vertices(terrain) : terrain->vertex_stride;
-    index_count = is_floor ? terrimpi_floor_indices(terrain) : terrain->index_stride;
+    vertices = is_floor ? terrimpi_floor_of(terrain).vertices : terrain->vertex_stride;
+    index_count = is_floor ? terrimpi_floor_of(terrain).indices : terrain->index_stride;
     TERRIMPI_REFUSE(xyz_capacity / 3u < vertices ||
                     index_capacity < index_count, TERRIMP_E_CAPACITY);
     if (is_floor)
@@ -7429,8 +7429,8 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_meshes(const terrimp_terrain *te
     vertex_stride = terrain->vertex_stride;
     index_stride = terrain->index_stride;
     node = terrain->tree.node_count;
-    if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_vertices(terrain) ||
-        index_capacity < node * index_stride + terrimpi_floor_indices(terrain))
+    if (xyz_capacity / 3u < node * vertex_stride + terrimpi_floor_of(terrain).vertices ||
+        index_capacity < node * index_stride + terrimpi_floor_of(terrain).indices)
         return TERRIMP_E_CAPACITY;
     terrimpi_floor_write(terrain, xyz + 3u * node * vertex_stride, indices + node * index_stride);
     while (node-- > 0)
@@ -8597,6 +8597,17 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
     return (bytes + 15u) / 16u * 16u;
 }
 
+/* The checksum of a page: of all but its first word. */
+static uint32_t terrimpi_page_hash(const unsigned char *page, uint32_t bytes)
+{
+    uint32_t at, hash = 2166136261u, word;
+    for (at = 4u; at < bytes; at += 4u) {
+        memcpy(&word, page + at, sizeof word);
+        hash = terrimpi_bake_hash_word(hash, word);
+    }
+    return hash;
+}
+
 /* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
    its top down, and on each level four children side by side ---- */
 
@@ -8612,25 +8623,31 @@ static uint32_t terrimpi_page_interleave(uint32_t x, uint32_t z)
     return out;
 }
 
-/* Pages above the blocks. */
-static uint32_t terrimpi_page_upper(const terrimp_quadtree *t, uint32_t block_level)
+/* Where a block's pages begin, counted in pages: those above the blocks come first and. */
+static uint64_t terrimpi_page_first(const terrimp_quadtree *t, uint32_t block_level, uint32_t block)
 {
-    return t->node_count - t->level_first[block_level + 1u];
+    return t->node_count - t->level_first[block_level + 1u] +
+           (uint64_t)block * terrimpi_page_full(block_level + 1u);
+}
+
+/* Where all pages end, counted the same way. */
+static uint64_t terrimpi_page_end(const terrimp_quadtree *t, uint32_t level)
+{
+    return terrimpi_page_first(t, level, t->level_x[level] * t->level_z[level]);
 }
 
 static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_level,
                                      const terrimp_node *n)
 {
     const terrimp_quadtree *tree = &t->tree;
-    uint32_t index = n->number - tree->level_first[block_level + 1u];
+    uint64_t index = n->number - tree->level_first[block_level + 1u];
     if (n->level <= block_level) {
         uint32_t up = block_level - n->level, mask = (1u << up) - 1u;
-        index = terrimpi_page_upper(tree, block_level) +
-                ((n->z >> up) * tree->level_x[block_level] + (n->x >> up)) *
-                    terrimpi_page_full(block_level + 1u) +
-                terrimpi_page_full(up) + terrimpi_page_interleave(n->x & mask, n->z & mask);
+        uint32_t block = (n->z >> up) * tree->level_x[block_level] + (n->x >> up);
+        index = terrimpi_page_first(tree, block_level, block) + terrimpi_page_full(up) +
+                terrimpi_page_interleave(n->x & mask, n->z & mask);
     }
-    return TERRIMP_PAGES_HEADER_BYTES + (uint64_t)index * terrimpi_page_bytes(t);
+    return TERRIMP_PAGES_HEADER_BYTES + index * terrimpi_page_bytes(t);
 }
 
 /* ---- the header ---- */
@@ -8666,12 +8683,9 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
                     t->desc.field.format == TERRIMP_FORMAT_F32 ||
                     head->block_level >= t->tree.level_count ||
-                    terrimpi_page_upper(&t->tree, head->block_level) +
-                        (uint64_t)t->tree.level_x[head->block_level] *
-                            t->tree.level_z[head->block_level] *
-                            terrimpi_page_full(head->block_level + 1u) > 0xffffffffu ||
+                    terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
-    for (i = 0; i < terrimpi_floor_ground_vertices(t) + terrimpi_floor_wall_points(t); i++) {
+    for (i = 0; i < terrimpi_floor_of(t).ground_vertices + terrimpi_floor_of(t).wall_points; i++) {
         float height;
         memcpy(&height, lows + i * sizeof height, sizeof height);
         TERRIMPI_REFUSE(!terrimpi_finite(height), TERRIMP_E_BAKE);
@@ -8684,20 +8698,13 @@ TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
 {
     terrimp_terrain t;
     terrimpi_pages_head head;
-    terrimp_node last;
-    uint32_t edge;
     TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
     if (!info)
         return TERRIMP_OK;
-    edge = (1u << head.block_level) - 1u;
-    last = terrimpi_tree_at(&t.tree, head.block_level, t.tree.level_x[head.block_level] - 1u,
-                            t.tree.level_z[head.block_level] - 1u);
-    last.level = 0; /* the last node of a block, whether there is one or not */
-    last.x = (last.x << head.block_level) + edge;
-    last.z = (last.z << head.block_level) + edge;
     memset(info, 0, sizeof *info);
     info->page_bytes = terrimpi_page_bytes(&t);
-    info->bytes = terrimpi_page_offset(&t, head.block_level, &last) + info->page_bytes;
+    info->bytes = TERRIMP_PAGES_HEADER_BYTES +
+                  terrimpi_page_end(&t.tree, head.block_level) * info->page_bytes;
     info->width = t.desc.field.width;
     info->depth = t.desc.field.depth;
     info->chunk_quads = t.desc.chunk_quads;
@@ -8876,22 +8883,24 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     return TERRIMP_OK;
 }
 
-/* The slot of a page that has been begun; NULL: it has not. */
-static terrimpi_page_slot *terrimpi_page_begun(const terrimp_terrain *t, uint32_t node)
+/* The slot of a page that has been begun. */
+static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t node,
+                                          terrimpi_page_slot **slot)
 {
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(t->tree.pages, node);
-    return slot && !slot->is_here ? slot : NULL;
+    TERRIMPI_TRY(terrimpi_page_check(t, node, t));
+    *slot = terrimpi_page_slot_of(t->tree.pages, node);
+    return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
 /* Whether the records of a node's children are held by its own. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
 {
+    terrimp_node child;
     uint32_t i;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+    for (i = 0; i < 4u; i++) {
         terrimpi_record r;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
         memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
                        i * TERRIMPI_PAGE_RECORD, sizeof r);
@@ -8914,13 +8923,9 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     terrimpi_field_scan scan;
     terrimp_heightfield f = terrimpi_page_field(t, node);
     terrimp_node n = terrimpi_tree_node(&t->tree, node);
-    uint32_t at, hash = 2166136261u, word;
     memcpy(&head, page, sizeof head);
-    for (at = 4u; at < p->page_bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
-    if (head.checksum != hash || head.stamp != p->stamp || head.node != node ||
+    if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
+        head.node != node ||
         memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
@@ -8933,9 +8938,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
-    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
-    slot = terrimpi_page_begun(terrain, node);
-    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
     if (terrimpi_page_ok(terrain, node))
@@ -8947,9 +8950,7 @@ TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t n
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
-    TERRIMPI_TRY(terrimpi_page_check(terrain, node, terrain));
-    slot = terrimpi_page_begun(terrain, node);
-    TERRIMPI_REFUSE(!slot, TERRIMP_E_STATE);
+    TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_OK;
 }
@@ -8990,11 +8991,23 @@ static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
         slot->used = t->pages->frame;
 }
 
+/* As terrimpi_tree_quarter, of a child in sight; the node's page is here. */
+static int terrimpi_page_quarter(const terrimp_terrain *t, const terrimp_node *node, uint32_t i,
+                                 const terrimp_frustum *frustum, terrimp_node *child)
+{
+    terrimp_box box;
+    if (!terrimpi_tree_quarter(&t->tree, node, i, child))
+        return 0;
+    terrimpi_terrain_node_box(t, child, &box);
+    return terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE;
+}
+
 /* Whether a node may be left for its children: its page is here, and of these each in sight. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum)
 {
     const terrimp_quadtree *tree = &t->tree;
+    terrimp_node child;
     uint32_t i;
     int all = 1;
     if (!tree->pages)
@@ -9002,41 +9015,25 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     if (!terrimpi_page_of(tree->pages, node->number))
         return 0;
     terrimpi_page_use(tree, node->number);
-    for (i = 0; i < 4u && node->level > 0; i++) {
-        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
-        terrimp_node child;
-        terrimp_box box;
-        if (!terrimpi_tree_has(tree, node->level - 1u, x, z))
-            continue;
-        child = terrimpi_tree_at(tree, node->level - 1u, x, z);
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
-            continue;
-        terrimpi_page_use(tree, child.number);
-        all &= terrimpi_page_of(tree->pages, child.number) != NULL;
-    }
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_page_quarter(t, node, i, frustum, &child)) {
+            terrimpi_page_use(tree, child.number);
+            all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+        }
     return all;
 }
 
 /* ---- heights and rays ---- */
 
-/* The finest page that is here at a position. */
-static terrimp_node terrimpi_page_at(const terrimp_terrain *t, float x, float z)
+/* The finest node at a position whose page is here. */
+static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z, terrimp_node *n)
 {
-    const terrimp_quadtree *tree = &t->tree;
-    terrimp_node n = terrimpi_tree_root(tree);
-    while (n.level > 0) {
-        uint32_t level = n.level - 1u, quads = tree->chunk_quads, i, j;
-        terrimp_node child;
-        i = 2u * n.x + (x >= terrimpi_tree_x(tree, level, (2u * n.x + 1u) * quads) ? 1u : 0u);
-        j = 2u * n.z + (z >= terrimpi_tree_z(tree, level, (2u * n.z + 1u) * quads) ? 1u : 0u);
-        child = terrimpi_tree_at(tree, level, terrimpi_min_u32(i, tree->level_x[level] - 1u),
-                                 terrimpi_min_u32(j, tree->level_z[level] - 1u));
-        if (!terrimpi_page_of(tree->pages, child.number))
-            break;
-        n = child;
+    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, n));
+    while (!terrimpi_page_of(t->pages, n->number)) {
+        TERRIMPI_REFUSE(n->level + 1u == t->level_count, TERRIMP_E_PAGE);
+        *n = terrimpi_tree_parent(t, n);
     }
-    return n;
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
@@ -9049,14 +9046,8 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
     f = terrain->desc.field;
     memset(&n, 0, sizeof n);
     if (terrain->tree.pages) {
-        const terrimp_quadtree *tree = &terrain->tree;
-        TERRIMPI_REFUSE(!terrimpi_finite2(x, z), TERRIMP_E_NOT_FINITE);
-        TERRIMPI_REFUSE(!terrimpi_within(x, f.origin_x, terrimpi_tree_x(tree, 0, f.width - 1u)) ||
-                        !terrimpi_within(z, f.origin_z, terrimpi_tree_z(tree, 0, f.depth - 1u)),
-                        TERRIMP_E_MISS);
-        n = terrimpi_page_at(terrain, x, z);
-        TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, n.number) || (n.level > 0 && !level),
-                        TERRIMP_E_PAGE);
+        TERRIMPI_TRY(terrimpi_page_at(&terrain->tree, x, z, &n));
+        TERRIMPI_REFUSE(n.level > 0 && !level, TERRIMP_E_PAGE);
         f = terrimpi_page_field(terrain, n.number);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
@@ -10934,28 +10925,25 @@ static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int re
         *worst = want;
 }
 
-/* The same for the children of a node that are in sight, and the node itself. */
-static void terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
-                                        const terrimp_node *node, int reason, float urgency)
+/* The same for a node and its children in sight. Returns whether all of them are here. */
+static int terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
+                                       const terrimp_node *node, int reason, float urgency)
 {
     const terrimp_quadtree *t = &v->terrain->tree;
+    terrimp_node child;
     uint32_t i;
+    int all = 1;
     if (!t->pages)
-        return;
+        return 1;
     terrimpi_view_want(v, node, reason, urgency);
     if (!terrimpi_page_of(t->pages, node->number))
-        return;
-    for (i = 0; i < 4u && node->level > 0; i++) {
-        uint32_t x = 2u * node->x + i % 2u, z = 2u * node->z + i / 2u;
-        terrimp_node child;
-        terrimp_box box;
-        if (!terrimpi_tree_has(t, node->level - 1u, x, z))
-            continue;
-        child = terrimpi_tree_at(t, node->level - 1u, x, z);
-        terrimpi_terrain_node_box(v->terrain, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+        return 0;
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_page_quarter(v->terrain, node, i, frustum, &child)) {
             terrimpi_view_want(v, &child, reason, urgency);
-    }
+            all &= terrimpi_page_of(t->pages, child.number) != NULL;
+        }
+    return all;
 }
 
 /* Whether the nodes exist that have to beside and above one that is split. */
@@ -10992,10 +10980,9 @@ static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
             terrimp_node node = terrimpi_tree_node(t, number);
             if (mark->measure < 1.0f)
                 continue;
-            terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
-                                        TERRIMP_SQRTF(mark->measure));
-            if (terrimpi_view_has_around(mip, &node) &&
-                terrimpi_page_divides(v->terrain, &node, &f->frustum))
+            if (terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
+                                            TERRIMP_SQRTF(mark->measure)) &&
+                terrimpi_view_has_around(mip, &node))
                 continue;
             mark->measure = 0.0f;
             v->late++;
@@ -11458,7 +11445,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
     memset(&command, 0, sizeof command);
     command.base_vertex = terrimpi_mesh_places(v->built) * v->terrain->vertex_stride;
     command.first_index = terrimpi_mesh_places(v->built) * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_indices(v->built);
+    command.index_count = terrimpi_floor_of(v->built).indices;
     if (v->terrain->real) { /* its first chunk says of which repetition */
         uint32_t tiles = v->terrain->tiles;
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
@@ -11960,7 +11947,7 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
         s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
     } else {
         s->draws++;
-        s->triangles += terrimpi_floor_indices(v->built) / 3u;
+        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
     }
 }
 
@@ -14568,17 +14555,6 @@ typedef struct terrimpi_simp_chain {
     int32_t first, step, count, wrap;
 } terrimpi_simp_chain;
 
-static terrimpi_simp_chain terrimpi_simp_make_chain(int32_t first, int32_t step, int32_t count,
-                                                    int32_t wrap)
-{
-    terrimpi_simp_chain chain;
-    chain.first = first;
-    chain.step = step;
-    chain.count = count;
-    chain.wrap = wrap;
-    return chain;
-}
-
 static int32_t terrimpi_simp_chain_at(const terrimpi_simp_chain *chain, int32_t i)
 {
     int32_t v = chain->first + i * chain->step;
@@ -14704,13 +14680,33 @@ static void terrimpi_simp_join(terrimpi_simplifier *s)
         }
 }
 
+/* Fills what lies between the border, whose sides begin at side[], and a lattice of cols x rows
+   vertices; without one, the strip from one long side to the other, which runs the other way. */
+static void terrimpi_simp_zip_border(terrimpi_simplifier *s, const int32_t side[5], int32_t cols,
+                                     int32_t rows)
+{
+    int32_t v = s->border_count, end = s->vertex_count, i = s->cols > 2 ? 1 : 0;
+    const terrimpi_simp_chain lattice[4] = {{v, cols, rows, end},
+                                            {v + cols * (rows - 1), 1, cols, end},
+                                            {end - 1, -cols, rows, end},
+                                            {v + cols - 1, -1, cols, end}};
+    const terrimpi_simp_chain border[4] = {{side[0], 1, side[1] - side[0] + 1, v},
+                                           {side[1], 1, side[2] - side[1] + 1, v},
+                                           {side[2], 1, side[3] - side[2] + 1, v},
+                                           {side[3], 1, side[4] - side[3] + 1, v}};
+    const terrimpi_simp_chain across = {side[i + 3], -1, border[i + 2].count, v};
+    if (cols == 0)
+        terrimpi_simp_zip(s, &border[i], &across);
+    for (i = 0; i < 4 && cols > 0; i++)
+        terrimpi_simp_zip(s, &border[i], &lattice[i]);
+}
+
 /* Builds the start mesh: the border polylines round a regular lattice of samples, or round nothing
    where the tile has no inside. Returns whether the lattice holds every inner sample. */
 static int terrimpi_simp_start(terrimpi_simplifier *s, const terrimp_simplify_desc *desc,
                                int32_t lattice_limit, terrimp_mesh_vertex *loop)
 {
     int32_t w = s->cols - 1, h = s->rows - 1, side[5], cols = 0, rows = 0, i, j, v;
-    terrimpi_simp_chain outer[4], inner[4];
     terrimpi_simp_place_border(s, desc->borders, loop, side);
     if (w > 1 && h > 1)
         terrimpi_simp_lattice_size(w - 1, h - 1, lattice_limit, &cols, &rows);
@@ -14723,21 +14719,8 @@ static int terrimpi_simp_start(terrimpi_simplifier *s, const terrimp_simplify_de
         }
     s->vertex_count = v;
     s->half_edge_end = s->triangle_count = 0;
-    for (i = 0; i < 4; i++)
-        outer[i] = terrimpi_simp_make_chain(side[i], 1, side[i + 1] - side[i] + 1, s->border_count);
+    terrimpi_simp_zip_border(s, side, cols, rows);
     v = s->border_count;
-    if (cols > 0) {
-        inner[0] = terrimpi_simp_make_chain(v, cols, rows, s->vertex_count);
-        inner[1] = terrimpi_simp_make_chain(v + cols * (rows - 1), 1, cols, s->vertex_count);
-        inner[2] = terrimpi_simp_make_chain(s->vertex_count - 1, -cols, rows, s->vertex_count);
-        inner[3] = terrimpi_simp_make_chain(v + cols - 1, -1, cols, s->vertex_count);
-        for (i = 0; i < 4; i++)
-            terrimpi_simp_zip(s, outer + i, inner + i);
-    } else { /* one strip from one long side to the other, which runs the other way */
-        i = w > 1 ? 1 : 0;
-        inner[0] = terrimpi_simp_make_chain(side[i + 3], -1, outer[i + 2].count, v);
-        terrimpi_simp_zip(s, outer + i, inner);
-    }
     for (j = 0; j + 1 < rows; j++)
         for (i = 0; i + 1 < cols; i++) {
             int32_t a = v + j * cols + i;
@@ -15869,6 +15852,14 @@ static size_t terrimpi_build_layout(const terrimp_terrain_desc *desc, void *base
     return terrimpi_build_layout_tile(side, side, longest, desc->triangle_budget, base, build);
 }
 
+/* Whether a block of scratch will do for a terrain. */
+static terrimp_result terrimpi_build_check(const terrimp_terrain *t, const void *scratch,
+                                           size_t bytes)
+{
+    terrimpi_build build;
+    return terrimpi_check_block(scratch, bytes, terrimpi_build_layout(&t->desc, NULL, &build));
+}
+
 /* Adds the side from p to q of a triangle whose corners run counter-clockwise seen from above. */
 static void terrimpi_build_add_edge(const terrimpi_terrain_tile *p, const terrimp_mesh_vertex *from,
                                     const terrimp_mesh_vertex *to, terrimpi_build_triangle *facet)
@@ -16603,11 +16594,9 @@ TERRIMP_API terrimp_result terrimp_terrain_build_finish(terrimp_terrain *terrain
 TERRIMP_API terrimp_result terrimp_terrain_build(terrimp_terrain *terrain, void *scratch,
                                                  size_t bytes)
 {
-    terrimpi_build build;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_build_check(terrain, scratch, bytes));
     TERRIMPI_TRY(terrimp_terrain_build_begin(terrain));
     for (node = 0; node < terrain->tree.node_count; node++)
         TERRIMPI_TRY(terrimp_terrain_build_node(terrain, node, scratch, bytes));
@@ -16738,12 +16727,10 @@ TERRIMP_API terrimp_result terrimp_terrain_refine(terrimp_terrain *terrain, uint
                                                   uint32_t count, uint32_t *done, void *scratch,
                                                   size_t bytes)
 {
-    terrimpi_build build;
     uint32_t node;
     TERRIMPI_REFUSE(!terrain || !done, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built || terrain->baked, TERRIMP_E_STATE);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_build_check(terrain, scratch, bytes));
     *done = 0;
     terrain->tree.edits++;
     for (node = 0; node < terrain->tree.node_count && *done < count; node++) {
@@ -16771,12 +16758,10 @@ TERRIMP_API terrimp_result terrimp_terrain_rebuild(terrimp_terrain *terrain,
                                                    const terrimp_rect *samples, void *scratch,
                                                    size_t bytes)
 {
-    terrimpi_build build;
     uint32_t done;
     TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_REFUSE(terrain->baked, TERRIMP_E_STATE);
-    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes,
-                                      terrimpi_build_layout(&terrain->desc, NULL, &build)));
+    TERRIMPI_TRY(terrimpi_build_check(terrain, scratch, bytes));
     TERRIMPI_TRY(terrimp_terrain_edit(terrain, samples));
     return terrimp_terrain_refine(terrain, NULL, terrain->tree.node_count, &done, scratch, bytes);
 }
@@ -17107,16 +17092,15 @@ TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, u
     terrimp_pages_desc d;
     terrimpi_paging w;
     const terrimp_quadtree *t = &w.whole.tree;
-    uint32_t all;
-    uint64_t block_bytes;
+    uint32_t all, page_bytes;
     TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
     all = t->level_x[d.block_level] * t->level_z[d.block_level];
     TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
-    block_bytes = (uint64_t)terrimpi_page_full(d.block_level + 1u) * terrimpi_page_bytes(&w.whole);
-    *offset = TERRIMP_PAGES_HEADER_BYTES + block_bytes * first_block +
-              (uint64_t)terrimpi_page_upper(t, d.block_level) * terrimpi_page_bytes(&w.whole);
-    *bytes = block_bytes * block_count;
+    page_bytes = terrimpi_page_bytes(&w.whole);
+    *offset = TERRIMP_PAGES_HEADER_BYTES +
+              terrimpi_page_first(t, d.block_level, first_block) * page_bytes;
+    *bytes = (uint64_t)block_count * terrimpi_page_full(d.block_level + 1u) * page_bytes;
     return TERRIMP_OK;
 }
 
@@ -17160,16 +17144,15 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     terrimp_geomip_node *ground = &t->tree.nodes[n->number];
     terrimpi_mesh *mesh = &t->meshes[n->number];
     float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
+    terrimp_node child;
     uint32_t i;
     TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
     w->held[n->number] = *missed = *squares = 0.0f;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
-        *missed = terrimpi_max(*missed, w->missed[child]);
-        *squares += w->squares[child];
+        *missed = terrimpi_max(*missed, w->missed[child.number]);
+        *squares += w->squares[child.number];
         count += 1.0f;
     }
     if (w->level > 0) {
@@ -17180,16 +17163,14 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
         mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
     }
     w->held[n->number] = ground->rms;
-    for (i = 0; i < 4u && n->level > 0; i++) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u, child;
-        if (!terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        child = terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number;
-        ground->low = terrimpi_min(ground->low, t->tree.nodes[child].low);
-        ground->high = terrimpi_max(ground->high, t->tree.nodes[child].high);
-        ground->error = terrimpi_max(ground->error, t->tree.nodes[child].error);
-        terrimpi_build_hold(mesh, t->meshes[child].low, t->meshes[child].high);
-        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child]);
+        ground->low = terrimpi_min(ground->low, t->tree.nodes[child.number].low);
+        ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
+        ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
+        terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
+        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child.number]);
     }
     terrimpi_build_hold(mesh, ground->low, ground->high);
     return TERRIMP_OK;
@@ -17233,18 +17214,18 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
 {
     const terrimp_terrain *t = w->part;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN, word;
+    uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN;
     terrimpi_page_head head;
     memset(w->page, 0, bytes);
     head.stamp = w->stamp;
     head.node = whole.number;
     head.record = terrimpi_paging_record(w, n->number);
     for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
-        uint32_t x = 2u * n->x + i % 2u, z = 2u * n->z + i / 2u;
+        terrimp_node child;
         terrimpi_record r;
-        if (n->level == 0 || !terrimpi_tree_has(&t->tree, n->level - 1u, x, z))
+        if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        r = terrimpi_paging_record(w, terrimpi_tree_at(&t->tree, n->level - 1u, x, z).number);
+        r = terrimpi_paging_record(w, child.number);
         memcpy(w->page + at, &r, sizeof r);
     }
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
@@ -17252,11 +17233,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
     terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
     memcpy(w->page, &head, sizeof head);
-    head.checksum = 2166136261u;
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, w->page + at, sizeof word);
-        head.checksum = terrimpi_bake_hash_word(head.checksum, word);
-    }
+    head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
     return w->desc->store(w->desc->user,
                           terrimpi_page_offset(&w->whole, w->desc->block_level, &whole), w->page,
@@ -17310,17 +17287,13 @@ TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *d
 static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terrimp_node *n,
                                            unsigned char *page, terrimpi_page_head *head)
 {
-    uint32_t bytes = terrimpi_page_bytes(&w->whole), at, word, hash = 2166136261u;
+    uint32_t bytes = terrimpi_page_bytes(&w->whole);
     TERRIMPI_REFUSE(!w->desc->load(w->desc->user,
                                    terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
                                    bytes), TERRIMP_E_PAGE);
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
     memcpy(head, page, sizeof *head);
-    return head->checksum == hash && head->stamp == w->stamp && head->node == n->number
-               ? TERRIMP_OK : TERRIMP_E_BAKE;
+    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->stamp &&
+                   head->node == n->number ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
 TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *desc,
@@ -17397,9 +17370,9 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
 {
     const terrimp_terrain *t = &w->whole;
     uint32_t level = t->floor_level, wide = t->tree.level_x[level], deep = t->tree.level_z[level];
-    uint32_t i, k, x, z, points = terrimpi_floor_wall_points(t);
+    uint32_t i, k, x, z, points = terrimpi_floor_of(t).wall_points;
     terrimpi_page_head head;
-    for (i = 0; i < terrimpi_floor_ground_vertices(t) + points; i++)
+    for (i = 0; i < terrimpi_floor_of(t).ground_vertices + points; i++)
         lows[i] = TERRIMPI_FLOAT_MAX;
     for (z = 0; z < deep; z++)
         for (x = 0; x < wide; x++) {
@@ -17410,7 +17383,7 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
                 *corner = terrimpi_min(*corner, head.record.ground.low);
             }
         }
-    lows += terrimpi_floor_ground_vertices(t);
+    lows += terrimpi_floor_of(t).ground_vertices;
     for (k = 0; k < points; k++) {
         uint32_t before[2], at[2], after[2];
         terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);

@@ -359,20 +359,89 @@ static void pages_that_are_no_good_are_refused(void)
     paged_free(&other);
 }
 
+/* What was known of a node before a call: where its page stood, and when it was last asked for. */
+typedef struct paged_past {
+    int state;
+    uint32_t used;
+} paged_past;
+
+static void remember_pages(const paged_land *p, paged_past *past)
+{
+    uint32_t node;
+    for (node = 0; node < p->l.info.node_count; node++) {
+        terrimp_page_info info;
+        CHECK(terrimp_page_get_info(p->opened, node, &info) == TERRIMP_OK);
+        past[node].state = info.state;
+    }
+}
+
+/* Whether a page could be given up for that of another node: it is here, no page is below it, it is
+   neither the root's nor of the other's parent, and it has rested for a whole frame. */
+static int may_be_given_up(const paged_land *p, const paged_past *past, uint32_t frame,
+                           uint32_t node, uint32_t other)
+{
+    const terrimp_quadtree *tree = &p->opened->tree;
+    uint32_t below, root = tree->node_count - 1u;
+    if (past[node].state != TERRIMP_PAGE_HERE || node == root || past[node].used + 1u >= frame ||
+        (other != root && terrimpi_tree_parent_number(tree, other) == node))
+        return 0;
+    for (below = 0; below < node; below++)
+        if (past[below].state != TERRIMP_PAGE_ABSENT &&
+            terrimpi_tree_parent_number(tree, below) == node)
+            return 0;
+    return 1;
+}
+
+/* After a call for a node: one page is given up at most, only for one that was begun, only when no
+   slot is free, and of those that may be, one that has rested for longest. All slots are in use
+   only when none may be. Returns how many were given up. */
+static uint32_t check_given_up(const paged_land *p, paged_past *past, uint32_t slots,
+                               uint32_t frame, uint32_t asked, terrimp_result result)
+{
+    uint32_t node, longest = UINT32_MAX, full = 0, gone = 0, was = 0;
+    terrimp_page_info info;
+    int begun;
+    for (node = 0; node < p->l.info.node_count; node++) {
+        full += past[node].state != TERRIMP_PAGE_ABSENT;
+        if (past[node].used < longest && may_be_given_up(p, past, frame, node, asked))
+            longest = past[node].used;
+        CHECK(terrimp_page_get_info(p->opened, node, &info) == TERRIMP_OK);
+        if (node != asked && past[node].state != info.state) {
+            CHECK(info.state == TERRIMP_PAGE_ABSENT);
+            was = node;
+            gone++;
+        }
+    }
+    CHECK(terrimp_page_get_info(p->opened, asked, &info) == TERRIMP_OK);
+    begun = past[asked].state == TERRIMP_PAGE_ABSENT && info.state != TERRIMP_PAGE_ABSENT;
+    CHECK(gone == (begun && full == slots ? 1u : 0u));
+    if (gone > 0)
+        CHECK(may_be_given_up(p, past, frame, was, asked) && past[was].used == longest);
+    if (result == TERRIMP_E_CAPACITY)
+        CHECK(full == slots && longest == UINT32_MAX);
+    if (begun)
+        past[asked].used = frame;
+    return gone;
+}
+
 /* Slots: the parent of what is here is here, a frame's pages stay, and there are never more. */
 static void pages_are_closed_upwards(void)
 {
     paged_land p;
-    uint32_t turn, node, count, state[4] = {0, 0, 0, 0}, coming[64], full = 0;
+    uint32_t turn, node, count, state[4] = {0, 0, 0, 0}, coming[64], full = 0, frame = 0, given = 0;
+    paged_past *past;
     void *page;
     if (!paged_prepare(&p, 200, 170, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
         !paged_open(&p, 24))
         return;
-    for (turn = 0; turn < 2000u; turn++) {
+    past = (paged_past *)calloc(p.l.info.node_count, sizeof *past);
+    for (turn = 0; turn < 3000u; turn++) {
         terrimp_result result;
+        uint32_t asked;
         node = random_range(0, p.l.info.node_count - 1u);
         node = p.l.info.node_count - 1u - random_range(0, node);
-        switch (turn % 400u ? random_range(0, 2) : 3u) {
+        asked = node;
+        switch (turn % (turn < 2000u ? 10u : 400u) ? random_range(0, 2) : 3u) {
         case 0: result = paged_fetch(&p, node); break;
         case 1: result = terrimp_page_begin(p.opened, node, &page); break;
         case 2: result = terrimp_page_fail(p.opened, node); break;
@@ -380,9 +449,12 @@ static void pages_are_closed_upwards(void)
         }
         CHECK(result == TERRIMP_OK || result == TERRIMP_E_STATE || result == TERRIMP_E_CAPACITY);
         full += result == TERRIMP_E_CAPACITY;
+        frame += turn % (turn < 2000u ? 10u : 400u) == 0;
+        given += check_given_up(&p, past, 24, frame, asked, result);
         CHECK(terrimp_pages_withdrawn(p.opened, coming, 64, &count) == TERRIMP_OK);
         while (count > 0 && turn % 16u == 0)
             CHECK(terrimp_page_fail(p.opened, coming[--count]) == TERRIMP_OK);
+        remember_pages(&p, past);
         memset(state, 0, sizeof state);
         for (node = 0; node < p.l.info.node_count; node++) {
             terrimp_page_info info, above;
@@ -397,7 +469,8 @@ static void pages_are_closed_upwards(void)
         }
         CHECK(state[TERRIMP_PAGE_HERE] + state[TERRIMP_PAGE_COMING] <= 24u);
     }
-    CHECK(full > 0);
+    CHECK(full > 0 && given > 10u);
+    free(past);
     paged_free(&p);
 }
 
