@@ -971,7 +971,8 @@ static void a_circle_of_a_mesh_is_told_and_the_rest_is_in_order(void)
 {
     static const float xyz[18] = {1.0f, 0, 0, -0.5f, 0, -0.866f, -0.5f, 0, 0.866f, 3.94f, 0, 0.695f,
                                   -1.368f, 0, -3.759f, -2.571f, 0, 3.064f};
-    static const uint16_t ring[21] = {0, 1, 2, 1, 0, 3, 2, 1, 4, 0, 2, 5, 3, 4, 1, 4, 5, 2, 5, 3, 0};
+    static const uint16_t ring[21] = {0, 1, 2, 1, 0, 3, 2, 1, 4, 0, 2, 5,
+                                      3, 4, 1, 4, 5, 2, 5, 3, 0};
     static const float eye[3] = {0, 9, 0};
     uint16_t indices[21], scratch[6 + 3 * 21];
     uint32_t circles, first, i, k, found;
