@@ -18115,24 +18115,28 @@ static uint32_t terrimpi_mask_tail(uint32_t width)
     return 0xffffffffu >> (31u - (width - 1u) % 32u);
 }
 
+/* A word of a row's bits, without what lies outside of columns x to end - 1. */
+static uint32_t terrimpi_mask_word(const uint32_t *row, uint32_t word, uint32_t x, uint32_t end)
+{
+    uint32_t bits = word * 32u < end ? row[word] : 0u;
+    if (word == x / 32u)
+        bits &= 0xffffffffu << x % 32u;
+    if (word == (end - 1u) / 32u)
+        bits &= terrimpi_mask_tail(end);
+    return bits;
+}
+
 /* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
 static void terrimpi_mask_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
 {
-    uint32_t words = TERRIMP_MASK_WORDS(width), i, other = 0;
-    row[words - 1u] &= terrimpi_mask_tail(width);
-    if (dx < 0)
-        for (i = 0; i < words; i++) {
-            uint32_t all = row[i] | opaque[i];
-            row[i] = all & (all << 1 | other);
-            other = all >> 31;
-        }
-    else
-        for (i = words; i-- > 0;) {
-            uint32_t all = row[i] | (i + 1u < words ? opaque[i]
-                                                    : opaque[i] & terrimpi_mask_tail(width));
-            row[i] = all & (all >> 1 | other);
-            other = all << 31;
-        }
+    uint32_t words = TERRIMP_MASK_WORDS(width), n, other = 0;
+    for (n = 0; n < words; n++) {
+        uint32_t i = dx < 0 ? n : words - 1u - n, all = row[i] | opaque[i];
+        if (i + 1u == words)
+            all &= terrimpi_mask_tail(width);
+        row[i] = all & ((dx < 0 ? all << 1 : all >> 1) | other);
+        other = dx < 0 ? all >> 31 : all << 31;
+    }
 }
 
 /* One step of a mask of state from a layer to the next: what has neighbours at dx, dy and across
@@ -18193,7 +18197,7 @@ typedef struct terrimpi_cover {
     uint32_t node_count, node_limit;
     uint32_t *low, *high; /* of each column or row of a rectangle: its opaque texels' extent */
     float *beyond;        /* squared area of what lies at or beyond a cut there */
-    uint32_t *seen;       /* a row of bits */
+    uint32_t *swapped;    /* [width][words of height] the mask with x and y swapped */
 } terrimpi_cover;
 
 static uint32_t terrimpi_mask_bit_count(uint32_t bits)
@@ -18211,59 +18215,44 @@ static uint32_t terrimpi_mask_next_bit(uint32_t *bits)
     return below;
 }
 
-/* A word of a mask's row y, without what lies outside of columns x to end. */
-static uint32_t terrimpi_mask_word(const terrimp_cover_desc *d, uint32_t y, uint32_t word,
-                                   uint32_t x, uint32_t end)
+/* Lays the mask down with x and y swapped. */
+static void terrimpi_cover_swap(terrimpi_cover *c)
 {
-    uint32_t bits = d->mask[(size_t)y * TERRIMP_MASK_WORDS(d->width) + word];
-    if (word == x / 32u)
-        bits &= 0xffffffffu << x % 32u;
-    if (word == (end - 1u) / 32u)
-        bits &= terrimpi_mask_tail(end);
-    return bits;
-}
-
-/* Extents of the columns of a rectangle, in its rows; an empty one has low > high. */
-static void terrimpi_cover_columns(terrimpi_cover *c, const terrimp_rect *r)
-{
-    uint32_t end = r->x + r->width, turn, i, word;
-    for (i = 0; i < r->width; i++) {
-        c->low[i] = 1;
-        c->high[i] = 0;
-    }
-    for (turn = 0; turn < 2u; turn++) {
-        memset(c->seen, 0, TERRIMP_MASK_WORDS(c->desc.width) * sizeof *c->seen);
-        for (i = 0; i < r->height; i++) {
-            uint32_t y = turn ? r->height - 1u - i : i;
-            for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
-                uint32_t fresh = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end);
-                fresh &= ~c->seen[word];
-                c->seen[word] |= fresh;
-                while (fresh)
-                    (turn ? c->high : c->low)[word * 32u + terrimpi_mask_next_bit(&fresh) - r->x] =
-                        y;
+    uint32_t words = TERRIMP_MASK_WORDS(c->desc.width), x, y, i;
+    uint32_t across = TERRIMP_MASK_WORDS(c->desc.height);
+    memset(c->swapped, 0, (size_t)across * c->desc.width * sizeof *c->swapped);
+    for (y = 0; y < c->desc.height; y++)
+        for (i = 0; i < words; i++) {
+            uint32_t bits = terrimpi_mask_word(c->desc.mask + (size_t)y * words, i, 0,
+                                               c->desc.width);
+            while (bits) {
+                x = 32u * i + terrimpi_mask_next_bit(&bits);
+                c->swapped[(size_t)x * across + y / 32u] |= 1u << y % 32u;
             }
         }
-    }
 }
 
-/* The same of its rows; returns how many of its texels are opaque. */
-static uint32_t terrimpi_cover_rows(terrimpi_cover *c, const terrimp_rect *r)
+/* Extents of the opaque texels in each row of a rectangle, or each column; an empty one has
+   low > high. Returns how many texels are opaque. */
+static uint32_t terrimpi_cover_scan(terrimpi_cover *c, const terrimp_rect *rect, int columns)
 {
-    uint32_t end = r->x + r->width, y, word, opaque = 0;
-    for (y = 0; y < r->height; y++) {
+    terrimp_rect r = columns ? terrimpi_rect(rect->y, rect->x, rect->height, rect->width) : *rect;
+    uint32_t words = TERRIMP_MASK_WORDS(columns ? c->desc.height : c->desc.width);
+    uint32_t end = r.x + r.width, y, word, opaque = 0;
+    for (y = 0; y < r.height; y++) {
+        const uint32_t *row = (columns ? c->swapped : c->desc.mask) + (size_t)(r.y + y) * words;
         c->low[y] = 1;
         c->high[y] = 0;
-        for (word = r->x / 32u; word <= (end - 1u) / 32u; word++) {
-            uint32_t bits = terrimpi_mask_word(&c->desc, r->y + y, word, r->x, end), last = bits;
+        for (word = r.x / 32u; word <= (end - 1u) / 32u; word++) {
+            uint32_t bits = terrimpi_mask_word(row, word, r.x, end), last = bits;
             if (!bits)
                 continue;
             opaque += terrimpi_mask_bit_count(bits);
             if (c->low[y] > c->high[y])
-                c->low[y] = word * 32u + terrimpi_mask_next_bit(&bits) - r->x;
+                c->low[y] = word * 32u + terrimpi_mask_next_bit(&bits) - r.x;
             last |= last >> 1, last |= last >> 2, last |= last >> 4, last |= last >> 8;
             last |= last >> 16;
-            c->high[y] = word * 32u + terrimpi_mask_bit_count(last) - 1u - r->x;
+            c->high[y] = word * 32u + terrimpi_mask_bit_count(last) - 1u - r.x;
         }
     }
     return opaque;
@@ -18325,7 +18314,7 @@ static float terrimpi_cover_cut(terrimpi_cover *c, uint32_t count, uint32_t *at)
 /* Shrinks a rectangle to its opaque texels; returns how many there are. */
 static uint32_t terrimpi_cover_tighten(terrimpi_cover *c, terrimp_rect *r)
 {
-    uint32_t opaque = terrimpi_cover_rows(c, r), y;
+    uint32_t opaque = terrimpi_cover_scan(c, r, 0), y;
     terrimpi_cover_extent e = {1, 0, 0, 0};
     for (y = 0; y < r->height; y++)
         terrimpi_cover_extent_add(c, &e, y);
@@ -18341,7 +18330,7 @@ static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
     terrimp_rect r = c->nodes[node].rect, part[2];
     uint32_t x = 0, y = 0, k;
     float by_y = terrimpi_cover_cut(c, r.height, &y);
-    terrimpi_cover_columns(c, &r);
+    terrimpi_cover_scan(c, &r, 1);
     part[0] = part[1] = r;
     if (terrimpi_cover_cut(c, r.width, &x) < by_y) {
         part[0].width = x;
@@ -18363,7 +18352,7 @@ static void terrimpi_cover_in_two(terrimpi_cover *c, uint32_t node)
 static void terrimpi_cover_split(terrimpi_cover *c, uint32_t node)
 {
     terrimpi_cover_node *n = &c->nodes[node];
-    uint32_t opaque = terrimpi_cover_rows(c, &n->rect);
+    uint32_t opaque = terrimpi_cover_scan(c, &n->rect, 0);
     n->cost = terrimpi_cover_cost(c, n->rect.width, n->rect.height);
     n->parts = 0;
     if (n->rect.width * n->rect.height - opaque > c->desc.quad_cost &&
@@ -18444,7 +18433,8 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
     c->high = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->high);
     c->beyond = (float *)terrimpi_take(&arena, longest, sizeof *c->beyond);
-    c->seen = (uint32_t *)terrimpi_take(&arena, TERRIMP_MASK_WORDS(longest), sizeof *c->seen);
+    c->swapped = (uint32_t *)terrimpi_take(
+        &arena, (size_t)desc->width * TERRIMP_MASK_WORDS(desc->height), sizeof *c->swapped);
     c->nodes = (terrimpi_cover_node *)terrimpi_take(&arena, c->node_limit, sizeof *c->nodes);
     *bytes = arena.bytes;
     return arena.ok ? TERRIMP_OK : TERRIMP_E_OVERFLOW;
@@ -18491,6 +18481,7 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, &c, &needed));
     TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
+    terrimpi_cover_swap(&c);
     c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
     c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
     for (i = 0; i < c.node_count; i++)
@@ -18542,35 +18533,28 @@ static void terrimpi_layer_clip_cut(const float *vertices, uint32_t stride, cons
 
 /* A polygon between two parallel planes has the vertices of the triangle that lie there, and those
    where its edges pass the planes: so no polygon is clipped twice. */
-static uint32_t terrimpi_layer_clip(const float *vertices, uint32_t stride, const float depths[3],
-                                    float low, float high, float *out)
+TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
+                                              const float depths[3], float low, float high,
+                                              float *out, uint32_t *count)
 {
-    uint32_t a, k, count = 0;
+    uint32_t a, k, n = 0;
+    TERRIMPI_REFUSE(!vertices || !depths || !out || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!terrimpi_finite3(depths), TERRIMP_E_NOT_FINITE);
+    TERRIMPI_REFUSE(!stride || !(low <= high), TERRIMP_E_RANGE);
     for (a = 0; a < 3u; a++) {
         uint32_t b = a == 2u ? 0u : a + 1u;
         int rises = depths[b] > depths[a];
         if (depths[a] >= low && depths[a] <= high)
-            memcpy(out + (size_t)count++ * stride, vertices + (size_t)a * stride,
-                   stride * sizeof *out);
+            memcpy(out + (size_t)n++ * stride, vertices + (size_t)a * stride, stride * sizeof *out);
         for (k = 0; k < 2u; k++) {
             float plane = (k == 0) == rises ? low : high;
             if ((depths[a] < plane && plane < depths[b]) ||
                 (depths[b] < plane && plane < depths[a]))
                 terrimpi_layer_clip_cut(vertices, stride, depths, a, b, plane,
-                                        out + (size_t)count++ * stride);
+                                        out + (size_t)n++ * stride);
         }
     }
-    return count;
-}
-
-TERRIMP_API terrimp_result terrimp_layer_clip(const float *vertices, uint32_t stride,
-                                              const float depths[3], float low, float high,
-                                              float *out, uint32_t *count)
-{
-    TERRIMPI_REFUSE(!vertices || !depths || !out || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!terrimpi_finite3(depths), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!stride || !(low <= high), TERRIMP_E_RANGE);
-    *count = terrimpi_layer_clip(vertices, stride, depths, low, high, out);
+    *count = n;
     return TERRIMP_OK;
 }
 
@@ -18687,8 +18671,9 @@ TERRIMP_API terrimp_result terrimp_layer_triangle(const terrimp_layer_record *re
         layer--; /* what touches a border is in both */
     last = terrimp_layer_of(record->layers, high);
     for (; layer <= last; layer++) {
-        count = terrimpi_layer_clip(seen, 3, depths, terrimp_layer_border(record->layers, layer),
-                                    terrimp_layer_border(record->layers, layer + 1u), polygon);
+        low = terrimp_layer_border(record->layers, layer);
+        high = terrimp_layer_border(record->layers, layer + 1u);
+        TERRIMPI_TRY(terrimp_layer_clip(seen, 3, depths, low, high, polygon, &count));
         for (i = 0; i < count; i++) {
             float texel = record->layers->texel * polygon[3u * i + 2u];
             uv[2u * i] = polygon[3u * i] / texel;
@@ -18725,20 +18710,11 @@ TERRIMP_API terrimp_result terrimp_layer_depths(const terrimp_layer_record *reco
     return TERRIMP_OK;
 }
 
-/* A word of a row's bits, each moved to the place of its neighbour before it (dx = 1: of the bit at
-   x + 1), without what lies beyond the width. */
-static uint32_t terrimpi_mask_at(const uint32_t *row, uint32_t width, uint32_t word, int dx)
+/* A word of a row's bits, with dx = 1 each moved to the place of its neighbour before it. */
+static uint32_t terrimpi_mask_at(const uint32_t *row, uint32_t width, uint32_t word, uint32_t dx)
 {
-    uint32_t words = TERRIMP_MASK_WORDS(width), here = row[word], next = 0;
-    if (word + 1u == words)
-        here &= terrimpi_mask_tail(width);
-    if (!dx)
-        return here;
-    if (word + 2u == words)
-        next = row[word + 1u] & terrimpi_mask_tail(width);
-    else if (word + 1u < words)
-        next = row[word + 1u];
-    return here >> 1 | next << 31;
+    uint32_t here = terrimpi_mask_word(row, word, 0, width);
+    return dx ? here >> 1 | terrimpi_mask_word(row, word + 1u, 0, width) << 31 : here;
 }
 
 TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uint32_t *back,
@@ -18755,8 +18731,8 @@ TERRIMP_API terrimp_result terrimp_layer_repair(const uint32_t *front, const uin
             uint32_t f[4], both[4], one[4], missing[4]; /* of the block's corner at dx + 2 dy */
             for (k = 0; k < 4u; k++) {
                 size_t row = (y + (k >> 1)) * words;
-                uint32_t b = terrimpi_mask_at(back + row, width, word, (int)(k & 1u));
-                f[k] = terrimpi_mask_at(front + row, width, word, (int)(k & 1u));
+                uint32_t b = terrimpi_mask_at(back + row, width, word, k & 1u);
+                f[k] = terrimpi_mask_at(front + row, width, word, k & 1u);
                 both[k] = f[k] & b;
                 one[k] = f[k] ^ b;
                 missing[k] = f[k] & ~b;
@@ -18801,6 +18777,7 @@ typedef struct terrimpi_depth_triangle {
 /* A texel of a layer that can be seen, by its middle. */
 typedef struct terrimpi_depth_point {
     uint16_t x, y, k;
+    uint16_t fan; /* which triangle of a fan would stand for it */
     uint32_t next;
 } terrimpi_depth_point;
 
@@ -19333,39 +19310,26 @@ static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s
                                  const terrimpi_depth_fan *f)
 {
     float limit = d->tolerance * d->tolerance;
-    uint32_t i, k, p, list = TERRIMPI_DEPTH_END, *queue = d->queue, n = 0;
+    uint32_t i, k, p, at = 0, n = 0;
     for (i = 0; i < s->count; i++)
         for (p = d->triangles[s->triangles[i]].points; p != TERRIMPI_DEPTH_END;
              p = d->points[p].next) {
-            uint32_t first = n ? queue[n - 1u] : 0u; /* neighbours mostly go to the same one */
-            for (k = 0; k < f->all; k++) {
-                uint32_t i_fan = (first + k) % f->all;
-                if (terrimpi_depth_gap(d, &d->points[p],
-                                       i_fan < f->count
-                                           ? f->corner[i_fan]
-                                           : d->triangles[f->triangles[i_fan]].corner) <= limit)
+            for (k = 0; k < f->all; k++) { /* neighbours mostly go to the same one */
+                const uint32_t *v = at < f->count ? f->corner[at]
+                                                  : d->triangles[f->triangles[at]].corner;
+                if (terrimpi_depth_gap(d, &d->points[p], v) <= limit)
                     break;
+                at = at + 1u < f->all ? at + 1u : 0u;
             }
             if (k == f->all)
                 return 0;
-            queue[n++] = (first + k) % f->all;
+            d->points[p].fan = (uint16_t)at;
+            d->queue[n++] = p;
         }
-    for (i = 0; i < s->count; i++) { /* one list of all, in the order of the queue */
-        terrimpi_depth_triangle *t = &d->triangles[s->triangles[s->count - 1u - i]];
-        uint32_t last = t->points;
-        if (last == TERRIMPI_DEPTH_END)
-            continue;
-        while (d->points[last].next != TERRIMPI_DEPTH_END)
-            last = d->points[last].next;
-        d->points[last].next = list;
-        list = t->points;
-        t->points = TERRIMPI_DEPTH_END;
-    }
-    for (n = 0; list != TERRIMPI_DEPTH_END; n++) {
-        p = list;
-        list = d->points[p].next;
-        terrimpi_depth_give(d, p, f->triangles[queue[n]]);
-    }
+    for (i = 0; i < s->count; i++)
+        d->triangles[s->triangles[i]].points = TERRIMPI_DEPTH_END;
+    for (i = 0; i < n; i++)
+        terrimpi_depth_give(d, d->queue[i], f->triangles[d->points[d->queue[i]].fan]);
     return 1;
 }
 
@@ -19885,14 +19849,12 @@ static void terrimpi_place_greedily(terrimpi_place_work *p)
     }
 }
 
-static int terrimpi_place_is_shown(const terrimpi_place_work *p, uint32_t candidate)
+/* Whether a candidate is shown anywhere. */
+static int terrimpi_place_uses(const terrimpi_place_work *p, const uint8_t *shown,
+                               uint32_t candidate)
 {
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
-    uint32_t i;
-    for (i = c->first_gain; i < c->first_gain + c->gain_count; i++)
-        if (p->shown[i])
-            return 1;
-    return 0;
+    return c->gain_count && memchr(shown + c->first_gain, 1, c->gain_count) != NULL;
 }
 
 /* Brings a view back to a cost, with pictures that are paid for; returns whether that worked. */
@@ -19944,7 +19906,7 @@ static void terrimpi_place_spares(terrimpi_place_work *p)
 {
     uint32_t i;
     for (i = 0; i < p->desc->candidate_count; i++)
-        p->made[i] = (uint8_t)terrimpi_place_is_shown(p, i);
+        p->made[i] = (uint8_t)terrimpi_place_uses(p, p->shown, i);
     for (i = 0; i < p->desc->view_count; i++)
         p->spare[i] = TERRIMPI_PLACE_NONE;
     for (i = p->desc->gain_count; i-- > 0;) {
@@ -20007,7 +19969,7 @@ static void terrimpi_place_sum(const terrimpi_place_work *p, terrimp_placement *
         out->unsolved += !terrimpi_place_solved(p, p->costs[i]);
     }
     for (i = 0; i < p->desc->candidate_count; i++)
-        if (terrimpi_place_is_shown(p, i)) {
+        if (terrimpi_place_uses(p, p->shown, i)) {
             out->chosen++;
             out->memory += p->desc->candidates[i].memory;
         }
@@ -20026,12 +19988,6 @@ static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *ou
     terrimpi_place_sum(p, out);
 }
 
-static int terrimpi_place_uses(const terrimpi_place_work *p, uint32_t candidate)
-{
-    const terrimp_place_candidate *c = &p->desc->candidates[candidate];
-    return c->gain_count && memchr(p->best + c->first_gain, 1, c->gain_count) != NULL;
-}
-
 /* Attempts to do without each chosen candidate, and to begin with each other one, as long as that
    pays and work is left to spend. */
 static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *best)
@@ -20041,7 +19997,8 @@ static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *be
     for (; since < n && tries > 0; i = i + 1u < n ? i + 1u : 0u, since++) {
         terrimp_placement attempt;
         uint8_t wish = p->wish[i];
-        p->wish[i] = terrimpi_place_uses(p, i) ? TERRIMPI_PLACE_NEVER : TERRIMPI_PLACE_FIRST;
+        p->wish[i] = terrimpi_place_uses(p, p->best, i) ? TERRIMPI_PLACE_NEVER
+                                                        : TERRIMPI_PLACE_FIRST;
         if (p->wish[i] == wish)
             continue;
         terrimpi_place_attempt(p, &attempt);

@@ -13,6 +13,12 @@ typedef struct greedy_box {
     uint32_t x0, y0, x1, y1, filled;
 } greedy_box;
 
+static uint32_t greedy_word(const terrimp_cover_desc *g, uint32_t y, uint32_t word, uint32_t x0,
+                            uint32_t x1)
+{
+    return terrimpi_mask_word(g->mask + (size_t)y * TERRIMP_MASK_WORDS(g->width), word, x0, x1);
+}
+
 /* How many cells of a box are filled, on a grid that is a mask. */
 static uint32_t greedy_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t y0,
                                      uint32_t x1, uint32_t y1)
@@ -20,7 +26,7 @@ static uint32_t greedy_filled(const terrimp_cover_desc *g, uint32_t x0, uint32_t
     uint32_t y, word, filled = 0;
     for (y = y0; y < y1 && x0 < x1; y++)
         for (word = x0 / 32u; word <= (x1 - 1u) / 32u; word++)
-            filled += terrimpi_mask_bit_count(terrimpi_mask_word(g, y, word, x0, x1));
+            filled += terrimpi_mask_bit_count(greedy_word(g, y, word, x0, x1));
     return filled;
 }
 
@@ -86,7 +92,7 @@ static terrimp_cover_desc greedy_grid(const terrimpi_cover *c, uint32_t cell, ui
     memset(cells, 0, (size_t)g.height * TERRIMP_MASK_WORDS(g.width) * sizeof *cells);
     for (y = 0; y < c->desc.height; y++)
         for (word = 0; word < TERRIMP_MASK_WORDS(c->desc.width); word++) {
-            uint32_t bits = terrimpi_mask_word(&c->desc, y, word, 0, c->desc.width);
+            uint32_t bits = greedy_word(&c->desc, y, word, 0, c->desc.width);
             uint32_t *row = cells + (size_t)(y / cell) * TERRIMP_MASK_WORDS(g.width);
             while (bits) {
                 uint32_t x = (word * 32u + terrimpi_mask_next_bit(&bits)) / cell;
@@ -133,7 +139,7 @@ static uint32_t cover_greedily(const terrimp_cover_desc *desc, uint32_t cell, fl
     for (y = 0; y < g.height; y++)
         for (word = 0; word < TERRIMP_MASK_WORDS(g.width); word++) {
             uint32_t bits;
-            while ((bits = terrimpi_mask_word(&g, y, word, 0, g.width)) != 0) {
+            while ((bits = greedy_word(&g, y, word, 0, g.width)) != 0) {
                 uint32_t x = word * 32u + terrimpi_mask_next_bit(&bits);
                 terrimp_rect r = greedy_take(&c, &g, cells, x, y, cell, min_fill);
                 terrimpi_cover_tighten(&c, &r);
