@@ -2009,13 +2009,13 @@ TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
 /* Puts the triangles of a coarse mesh into painter's order for an eye, in place: walls that face
    away from it, the surface, which has to be convex as seen from above, and the walls that face the
    eye, below the surface's closest borders. Where triangles hide each other in a circle there is no
-   such order: then the farthest of them comes first.
+   such order: then one of them comes before what is beyond it.
 
    xyz         [vertex_count][3] as terrimp_terrain_fill_mesh writes them, floats
    eye         of the frame [wu]
    indices     [index_count] in, out [Limits: of index_count: a multiple of 3, < 65536]
    scratch     [vertex_count + 3 * index_count] of the caller
-   circles     out: how often there was no order; NULL: not wanted
+   circles     out: how many times that was so; NULL: not wanted
    Errors      E_RANGE also for an index that is too large
    Cost        O(index_count) */
 TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex_count,
@@ -13013,14 +13013,13 @@ static void terrimpi_sorted_cut(const terrimp_sorted *s, terrimp_sorted_square *
 static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out, int corner,
                                  int begin, int end, int turned)
 {
-    int first;
     if (begin && end) {
-        first = terrimpi_sorted_corner_first(s, out, begin, end, turned);
-        if (first)
-            terrimpi_sorted_triangle(out, begin, end, corner, turned);
-        terrimpi_sorted_cut(s, out, 0, end, begin, 3, turned);
-        if (!first)
-            terrimpi_sorted_triangle(out, begin, end, corner, turned);
+        int i, first = terrimpi_sorted_corner_first(s, out, begin, end, turned);
+        for (i = 0; i < 2; i++)
+            if (i != first)
+                terrimpi_sorted_triangle(out, begin, end, corner, turned);
+            else
+                terrimpi_sorted_cut(s, out, 0, end, begin, 3, turned);
     } else if (begin) {
         terrimpi_sorted_cut(s, out, begin, 3, corner, 0, turned);
     } else if (end) {
@@ -13441,16 +13440,18 @@ TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
     return TERRIMP_OK;
 }
 
-#define TERRIMPI_SORTED_WALL 0xfffeu
+enum { TERRIMPI_SORTED_WALL = 3, TERRIMPI_SORTED_DONE };
 
-/* The surface of a mesh: its half-edges in lists by the vertex that they start from, and how many
-   triangles beside a triangle are to be drawn before it. */
+/* The surface of a mesh: its half-edges in lists by the vertex that they start from, and how far
+   the way through it has come. */
 typedef struct terrimpi_sorted_net {
     const float *xyz, *eye;
-    uint16_t *first, *next;   /* of a vertex, of a half-edge; 0xffff: none */
-    uint16_t *corners;        /* the indices as they were */
-    uint16_t *waits, *queue;  /* of a triangle: 0xffff when it is queued; triangles */
-    uint32_t queued, surface; /* triangles of the surface */
+    uint16_t *first, *next; /* of a vertex, of a half-edge; 0xffff: none */
+    uint16_t *corners;      /* the indices as they were */
+    uint16_t *seen, *path;  /* sides of a triangle that were looked across, WALL, or DONE; triangles
+                               that wait, each for the next one */
+    uint16_t *out;
+    uint32_t circles;
 } terrimpi_sorted_net;
 
 static uint16_t terrimpi_sorted_end(const terrimpi_sorted_net *net, uint32_t edge)
@@ -13470,43 +13471,16 @@ static float terrimpi_sorted_within(const terrimpi_sorted_net *net, uint32_t edg
     return from < to ? side : -side;
 }
 
-/* The triangle beyond a half-edge, if the eye is (not: is not) beyond it too; else 0xffff. */
-static uint32_t terrimpi_sorted_beyond(const terrimpi_sorted_net *net, uint32_t edge, int eye)
+/* The triangle beyond a half-edge if it is farther away, as the eye is not beyond it; else
+   0xffff. */
+static uint32_t terrimpi_sorted_beyond(const terrimpi_sorted_net *net, uint32_t edge)
 {
-    float side = terrimpi_sorted_within(net, edge, net->eye);
-    uint16_t from = net->corners[edge];
     uint32_t other = net->first[terrimpi_sorted_end(net, edge)];
-    if (eye ? !(side < 0.0f) : !(side > 0.0f))
+    if (!(terrimpi_sorted_within(net, edge, net->eye) > 0.0f))
         return 0xffffu;
-    while (other != 0xffffu && terrimpi_sorted_end(net, other) != from)
+    while (other != 0xffffu && terrimpi_sorted_end(net, other) != net->corners[edge])
         other = net->next[other];
     return other == 0xffffu ? other : other / 3u;
-}
-
-static void terrimpi_sorted_push(terrimpi_sorted_net *net, uint32_t triangle)
-{
-    net->waits[triangle] = 0xffffu;
-    net->queue[net->queued++] = (uint16_t)triangle;
-}
-
-/* The farthest triangle that waits, by its corners. */
-static uint32_t terrimpi_sorted_farthest(const terrimpi_sorted_net *net, uint32_t count)
-{
-    uint32_t t, k, best = 0;
-    float most = -1.0f;
-    for (t = 0; t < count; t++) {
-        float sum = 0.0f;
-        for (k = 0; k < 3u && net->waits[t] < TERRIMPI_SORTED_WALL; k++) {
-            const float *p = net->xyz + 3u * net->corners[3u * t + k];
-            sum += (p[0] - net->eye[0]) * (p[0] - net->eye[0]) +
-                   (p[2] - net->eye[2]) * (p[2] - net->eye[2]);
-        }
-        if (net->waits[t] < TERRIMPI_SORTED_WALL && sum > most) {
-            most = sum;
-            best = t;
-        }
-    }
-    return best;
 }
 
 /* Whether the eye is before a triangle's face. */
@@ -13521,32 +13495,42 @@ static int terrimpi_sorted_faces(const terrimpi_sorted_net *net, uint32_t triang
     return terrimpi_dot(normal, to) > 0.0f;
 }
 
-/* Enters the half-edges of the surface. Walls, which have no area as seen from above, wait until
-   the end if the eye is before them; the others come first. */
+/* Enters the half-edges of the surface. Walls have no area as seen from above. */
 static void terrimpi_sorted_net_begin(terrimpi_sorted_net *net, uint32_t vertex_count,
                                       uint32_t count)
 {
-    uint32_t t, e, k;
+    uint32_t t, e;
     memset(net->first, 0xff, vertex_count * sizeof *net->first);
     for (t = 0; t < count; t++) {
-        net->waits[t] = 0;
-        if (!(terrimpi_sorted_within(net, 3u * t, net->xyz + 3u * net->corners[3u * t + 2u]) >
-              0.0f)) {
-            net->waits[t] = TERRIMPI_SORTED_WALL;
-            if (!terrimpi_sorted_faces(net, t))
-                terrimpi_sorted_push(net, t);
-            continue;
-        }
-        net->surface++;
-        for (e = 3u * t; e < 3u * t + 3u; e++) {
+        const float *third = net->xyz + 3u * net->corners[3u * t + 2u];
+        net->seen[t] = terrimpi_sorted_within(net, 3u * t, third) > 0.0f ? 0 : TERRIMPI_SORTED_WALL;
+        for (e = 3u * t; e < 3u * t + 3u && net->seen[t] == 0; e++) {
             net->next[e] = net->first[net->corners[e]];
             net->first[net->corners[e]] = (uint16_t)e;
         }
     }
-    for (t = 0; t < count; t++)
-        for (k = 0; k < 3u && net->waits[t] < TERRIMPI_SORTED_WALL; k++)
-            net->waits[t] = (uint16_t)(net->waits[t] +
-                (terrimpi_sorted_beyond(net, 3u * t + k, 0) != 0xffffu ? 1u : 0u));
+}
+
+/* Writes a triangle after all that have to come before it; one that waits for itself does not. */
+static void terrimpi_sorted_write_triangle(terrimpi_sorted_net *net, uint32_t triangle)
+{
+    uint32_t waiting = 1;
+    net->path[0] = (uint16_t)triangle;
+    while (waiting > 0) {
+        uint32_t t = net->path[waiting - 1u], other;
+        if (net->seen[t] == TERRIMPI_SORTED_WALL) { /* or all sides */
+            memcpy(net->out, net->corners + 3u * t, 3u * sizeof *net->out);
+            net->out += 3;
+            net->seen[t] = TERRIMPI_SORTED_DONE;
+            waiting--;
+            continue;
+        }
+        other = terrimpi_sorted_beyond(net, 3u * t + net->seen[t]++);
+        if (other != 0xffffu && net->seen[other] == 0)
+            net->path[waiting++] = (uint16_t)other;
+        else if (other != 0xffffu && net->seen[other] != TERRIMPI_SORTED_DONE)
+            net->circles++;
+    }
 }
 
 TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex_count,
@@ -13555,7 +13539,7 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
                                                uint32_t *circles)
 {
     terrimpi_sorted_net net;
-    uint32_t count = index_count / 3u, walls, done = 0, i, faults = 0;
+    uint32_t count = index_count / 3u, i;
     TERRIMPI_REFUSE(!xyz || !eye || !indices || !scratch, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(index_count % 3u != 0 || index_count > 65535u || vertex_count > 65535u,
@@ -13567,35 +13551,23 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
     net.first = scratch;
     net.next = net.first + vertex_count;
     net.corners = net.next + index_count;
-    net.waits = net.corners + index_count;
-    net.queue = net.waits + count;
-    net.queued = net.surface = 0;
+    net.seen = net.corners + index_count;
+    net.path = net.seen + count;
+    net.out = indices;
+    net.circles = 0;
     memcpy(net.corners, indices, index_count * sizeof *indices);
     terrimpi_sorted_net_begin(&net, vertex_count, count);
-    walls = net.queued;
     for (i = 0; i < count; i++)
-        if (net.waits[i] == 0)
-            terrimpi_sorted_push(&net, i);
-    for (; done < count; done++) {
-        uint32_t t, k;
-        if (done == net.queued && done < walls + net.surface) {
-            terrimpi_sorted_push(&net, terrimpi_sorted_farthest(&net, count));
-            faults++;
-        }
-        for (t = 0; done == net.queued; t++)
-            if (net.waits[t] == TERRIMPI_SORTED_WALL)
-                terrimpi_sorted_push(&net, t);
-        t = net.queue[done];
-        memcpy(indices + 3u * done, net.corners + 3u * t, 3u * sizeof *indices);
-        for (k = 0; k < 3u && done >= walls && done < walls + net.surface; k++) {
-            uint32_t closer = terrimpi_sorted_beyond(&net, 3u * t + k, 1);
-            if (closer != 0xffffu && net.waits[closer] < TERRIMPI_SORTED_WALL &&
-                --net.waits[closer] == 0)
-                terrimpi_sorted_push(&net, closer);
-        }
-    }
+        if (net.seen[i] == TERRIMPI_SORTED_WALL && !terrimpi_sorted_faces(&net, i))
+            terrimpi_sorted_write_triangle(&net, i);
+    for (i = 0; i < count; i++)
+        if (net.seen[i] == 0)
+            terrimpi_sorted_write_triangle(&net, i);
+    for (i = 0; i < count; i++)
+        if (net.seen[i] == TERRIMPI_SORTED_WALL)
+            terrimpi_sorted_write_triangle(&net, i);
     if (circles)
-        *circles = faults;
+        *circles = net.circles;
     return TERRIMP_OK;
 }
 

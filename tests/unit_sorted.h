@@ -966,6 +966,33 @@ static void painters_order_has_the_triangles_of_the_pattern(void)
     CHECK(checked >= 3u * 16u);
 }
 
+/* Around the eye's triangle lies a ring of six, each of which hides a part of the next one. */
+static void a_circle_of_a_mesh_is_told_and_the_rest_is_in_order(void)
+{
+    static const float xyz[18] = {1.0f, 0, 0, -0.5f, 0, -0.866f, -0.5f, 0, 0.866f, 3.94f, 0, 0.695f,
+                                  -1.368f, 0, -3.759f, -2.571f, 0, 3.064f};
+    static const uint16_t ring[21] = {0, 1, 2, 1, 0, 3, 2, 1, 4, 0, 2, 5,
+                                      3, 4, 1, 4, 5, 2, 5, 3, 0};
+    static const float eye[3] = {0, 9, 0};
+    uint16_t indices[21], scratch[6 + 3 * 21];
+    uint32_t circles, first, i, k, found;
+    for (first = 0; first < 7u; first++) { /* whichever triangle is first in the mesh */
+        for (i = 0; i < 21u; i++)
+            indices[i] = ring[(i + 3u * first) % 21u];
+        CHECK(terrimp_sorted_mesh(xyz, 6, eye, indices, 21, scratch, &circles) == TERRIMP_OK);
+        CHECK(circles == 1u);
+        CHECK(memcmp(indices + 18, ring, 3u * sizeof *ring) == 0);
+        for (i = found = 0; i < 7u; i++)
+            for (k = 0; k < 7u; k++)
+                found += memcmp(indices + 3u * i, ring + 3u * k, 3u * sizeof *ring) == 0;
+        CHECK(found == 7u);
+    }
+    for (i = 0; i < 12u; i++) /* half of the ring is none */
+        indices[i] = ring[i];
+    CHECK(terrimp_sorted_mesh(xyz, 6, eye, indices, 12, scratch, &circles) == TERRIMP_OK);
+    CHECK(circles == 0 && memcmp(indices + 9, ring, 3u * sizeof *ring) == 0);
+}
+
 static void painters_order_refuses_bad_input(void)
 {
     static land l;
@@ -1862,6 +1889,7 @@ static void sorted_tests(void)
     RUN(views_that_wrap_show_what_nine_terrains_show);
     RUN(views_that_wrap_repeat_after_a_period);
     RUN(painters_order_has_the_triangles_of_the_pattern);
+    RUN(a_circle_of_a_mesh_is_told_and_the_rest_is_in_order);
     RUN(painters_order_refuses_bad_input);
     RUN(sorted_needs_no_depth_buffer_over_mountains);
     RUN(sorted_needs_no_depth_buffer_over_hills);
