@@ -18026,14 +18026,21 @@ static uint32_t terrimpi_mask_word(const uint32_t *row, uint32_t word, uint32_t 
 /* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
 static void terrimpi_mask_cull_row(const uint32_t *opaque, uint32_t width, int dx, uint32_t *row)
 {
-    uint32_t words = TERRIMP_MASK_WORDS(width), n, other = 0;
-    for (n = 0; n < words; n++) {
-        uint32_t i = dx < 0 ? n : words - 1u - n, all = row[i] | opaque[i];
-        if (i + 1u == words)
-            all &= terrimpi_mask_tail(width);
-        row[i] = all & ((dx < 0 ? all << 1 : all >> 1) | other);
-        other = dx < 0 ? all >> 31 : all << 31;
-    }
+    uint32_t words = TERRIMP_MASK_WORDS(width), i, other = 0;
+    row[words - 1u] &= terrimpi_mask_tail(width);
+    if (dx < 0)
+        for (i = 0; i < words; i++) {
+            uint32_t all = row[i] | opaque[i];
+            row[i] = all & (all << 1 | other);
+            other = all >> 31;
+        }
+    else
+        for (i = words; i-- > 0;) {
+            uint32_t all = row[i] | (i + 1u < words ? opaque[i]
+                                                    : opaque[i] & terrimpi_mask_tail(width));
+            row[i] = all & (all >> 1 | other);
+            other = all << 31;
+        }
 }
 
 /* One step of a mask of state from a layer to the next: what has neighbours at dx, dy and across
