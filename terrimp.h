@@ -926,6 +926,16 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
+/* The largest rectangle of a shape that could be allocated now, for hosts that take a smaller slot
+   rather than none.
+
+   width, height  the size wanted [Limits: 1..65536]
+   size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
+              its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
+   Cost       O(free rectangles) */
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2]);
+
 /* ==== Terrain ============================================================ >>terrain */
 
 typedef struct terrimp_terrain terrimp_terrain; /* built from a heightfield; read-only then */
@@ -6396,6 +6406,38 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
     atlas->slots[slot] = terrimpi_rect(atlas->unused, 0, 0, 0);
     atlas->unused = slot;
     terrimpi_atlas_reclaim(atlas, &freed);
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
+                                                   uint32_t height, uint32_t size[2])
+{
+    uint32_t i, best_x = 0, best_y = 0;
+    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
+                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
+    for (i = 0; i < atlas->free_count; i++) {
+        const terrimp_rect *spot = &atlas->free_rects[i];
+        uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
+        uint32_t y = terrimpi_min_u32(spot->height, atlas->desc.padding + height);
+        if (x <= atlas->desc.padding || y <= atlas->desc.padding)
+            continue;
+        x -= atlas->desc.padding;
+        y -= atlas->desc.padding;
+        if (x * height < y * width) /* both products are below 2^31 + 2^16 */
+            y = x * height / width;
+        else
+            x = y * width / height;
+        if (x > 0 && y > 0 && (x > best_x || y > best_y)) {
+            best_x = x;
+            best_y = y;
+        }
+    }
+    if (atlas->unused == atlas->desc.max_slots)
+        best_x = best_y = 0;
+    size[0] = best_x;
+    size[1] = best_y;
     return TERRIMP_OK;
 }
 
