@@ -1496,27 +1496,24 @@ typedef struct terrimp_view_desc {
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
     float fade_start;       /* [wu] from the eye: nodes that come closer are ground
-                               [Default 0 -> 2 chunk sides; in AUTO 1.4 / tolerance_px, but 1 to
-                               1.4] */
+                               [Default 0 -> 2 chunk sides; in AUTO 2 / tolerance_px, but 1 to 2] */
     float fade_end;         /* [wu] from the eye: nodes beyond it need no ground; between the two
                                impostors fade in over it [Limits: > fade_start]
                                [Default 0 -> 1.5 * fade_start; in AUTO 1.1] */
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
                                much times the root of tolerance_px, but 5 to 15 degrees] */
-    float texels_per_px;    /* sharpness of a picture when it is made. In AUTO the most: half of it
-                               where atlases are full, lives short, or captures dear beside the rest
-                               of the frame. What has no room even then is ground
-                               [Limits: 0.1..8] [Default 0 -> 2; in AUTO 2.8 over the root of
-                               tolerance_px, but 0.7 to 4] */
+    float texels_per_px;    /* sharpness of a picture when it is made
+                               [Limits: 0.1..8] [Default 0 -> 2; in AUTO 2 over the root of
+                               tolerance_px, but 0.7 to 2] */
     float impostor_px;      /* AUTO: an impostor whose side covers more pixels is split
                                [Limits: 8..4096] [Default 0 -> 320] */
     uint32_t atlas_size;    /* texels along the side of each of the host's atlas textures
                                [Limits: 64..32768] [Default 0 -> 4096] */
     uint32_t atlas_count;   /* atlas textures [Limits: 1..16] [Default 0 -> 1] */
     uint32_t max_slot;      /* texels along a side of a picture's slot at most: what would need more
-                               is coarser, and ground where half of texels_per_px would need more
-                               [Limits: 12..atlas_size] [Default 0 -> half of atlas_size] */
+                               is coarser [Limits: 12..atlas_size]
+                               [Default 0 -> half of atlas_size] */
     uint32_t max_impostors; /* pictures kept at most [Limits: 1..65534] [Default 0 -> 1024] */
     uint32_t max_ground;    /* ground nodes drawn at most; AUTO and GEOMIP coarsen the ground rather
                                than exceed it, FULL and IMPOSTOR need the chunks in sight
@@ -1630,7 +1627,8 @@ typedef struct terrimp_stats {
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
     uint64_t texels_used, texels_free; /* of all atlases */
-    uint32_t atlas_failures;     /* pictures that found no room, so far */
+    uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
+                                    are made */
     uint32_t evictions;          /* pictures given up for others, so far */
     uint32_t late;               /* nodes and pictures that pages were missing for */
     float ground_tolerance_px;   /* what max_ground and max_cost made of it */
@@ -9404,12 +9402,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          are older are torn */
 #define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
-#define TERRIMPI_VIEW_LASTS 60.0f     /* [frames] of a picture of medium sharpness */
-#define TERRIMPI_VIEW_SOFTEST 0.5f    /* of texels_per_px, that a picture has at least */
-#define TERRIMPI_VIEW_TEXELS 0.12f    /* of a frame's cost, for texels of its captures */
-#define TERRIMPI_VIEW_FILL 0.5f       /* of the atlases, that pictures in use may fill */
-#define TERRIMPI_VIEW_SHARPEST 2.8f   /* times it, when even the shortest lives have all of it */
-#define TERRIMPI_VIEW_SHARPEN 0.06f   /* of what density lacks, that a frame brings */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
 #define TERRIMPI_VIEW_FLIP 1.25f      /* how much cheaper another kind must be to be changed to */
 #define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
@@ -9508,7 +9500,6 @@ typedef struct terrimpi_frame {
     terrimp_frustum frustum;
     float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
-    float density;                 /* texels a pixel of a picture that lasts TERRIMPI_VIEW_LASTS */
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
@@ -9561,27 +9552,25 @@ static void terrimpi_view_setting(float *value, float otherwise, float low, floa
    at 4 px 0.035 of the full mesh's time at 30 dB; before that 0.075 at 32 dB.) */
 static terrimp_result terrimpi_view_settings(const terrimp_terrain *t, terrimp_view_desc *d)
 {
-    float sharp, coarse = 1.0f; /* the tolerance, where pictures follow it */
+    float coarse = 1.0f; /* the tolerance, where pictures follow it */
     const float most = TERRIMPI_FLOAT_MAX;
     float chunk = (float)t->desc.chunk_quads *
                   terrimpi_max(t->desc.field.spacing_x, t->desc.field.spacing_z);
     terrimp_result result = TERRIMP_OK;
-    int automatic = d->mode == TERRIMP_MODE_AUTO;
     terrimpi_view_setting(&d->tolerance_px, 1.0f, 0.05f, 100.0f, &result);
-    if (automatic)
+    if (d->mode == TERRIMP_MODE_AUTO)
         coarse = terrimpi_clamp(d->tolerance_px, 1.0f, 9.0f);
     terrimpi_view_setting(&d->ground_tolerance_px, terrimpi_max(0.05f, 0.5f * d->tolerance_px),
                           0.05f, 100.0f, &result);
     terrimpi_view_setting(&d->morph_ratio, 1.0f, 1.0f, TERRIMPI_MIP_MORPH_MOST, &result);
-    terrimpi_view_setting(&d->fade_start,
-                          (automatic ? terrimpi_max(1.0f, 1.4f / coarse) : 2.0f) * chunk, 0.0f,
-                          most, &result);
-    terrimpi_view_setting(&d->fade_end, (automatic ? 1.1f : 1.5f) * d->fade_start, 0.0f, most,
+    terrimpi_view_setting(&d->fade_start, terrimpi_max(1.0f, 2.0f / coarse) * chunk, 0.0f, most,
+                          &result);
+    terrimpi_view_setting(&d->fade_end,
+                          (d->mode == TERRIMP_MODE_AUTO ? 1.1f : 1.5f) * d->fade_start, 0.0f, most,
                           &result);
     terrimpi_view_setting(&d->max_angle_rad, 0.0873f * TERRIMP_SQRTF(coarse), 0.001f, 1.5f,
                           &result);
-    sharp = automatic ? 2.8f / TERRIMP_SQRTF(terrimpi_clamp(d->tolerance_px, 0.5f, 16.0f)) : 2.0f;
-    terrimpi_view_setting(&d->texels_per_px, sharp, 0.1f, 8.0f, &result);
+    terrimpi_view_setting(&d->texels_per_px, 2.0f / TERRIMP_SQRTF(coarse), 0.1f, 8.0f, &result);
     terrimpi_view_setting(&d->impostor_px, 320.0f, 8.0f, 4096.0f, &result);
     terrimpi_view_setting(&d->max_cost, 0.0f, 0.0f, most, &result);
     terrimpi_view_setting(&d->costs.draw, 40.0f, 0.0f, most, &result);
@@ -9804,10 +9793,12 @@ static terrimp_rect terrimpi_cache_rect(const terrimpi_cache *c,
     return c->atlases[slot->atlas].slots[slot->slot];
 }
 
-/* Finds room for a picture, giving up the oldest ones that this frame does not draw. */
+/* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
+   but not less than a quarter of each side, is better than none. */
 static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
                                terrimpi_cache_slot_place *slot)
 {
+    uint32_t room[2];
     do {
         for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
             if (terrimp_live_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
@@ -9815,6 +9806,13 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
                 return 1;
     } while (terrimpi_cache_evict(c));
     c->failures++;
+    for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++) {
+        terrimp_live_atlas *atlas = &c->atlases[slot->atlas];
+        terrimp_live_atlas_room(atlas, size[0], size[1], room);
+        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
+            room[0] > 2u * TERRIMPI_CAPTURE_MARGIN && room[1] > 2u * TERRIMPI_CAPTURE_MARGIN)
+            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
+    }
     return 0;
 }
 
@@ -10132,43 +10130,22 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
     return terrimpi_clamp(life, 1.0f, TERRIMPI_VIEW_LIFE);
 }
 
-/* Texels a pixel of a picture that lasts for so many frames. What lies between its texels is lost:
-   its square error is b / s^2 in a pixel that has s of them. A frame pays c s^2 / life for it.
-   For what all pictures cost together they are least off where b / s^2 falls as fast as that rises:
-   where s^4 / life is the same for all. */
-static float terrimpi_view_density(const terrimpi_frame *f, float life)
+static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 {
-    float most = f->desc->texels_per_px;
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
-        return most;
-    return terrimpi_clamp(f->density * TERRIMP_SQRTF(TERRIMP_SQRTF(life / TERRIMPI_VIEW_LASTS)),
-                          TERRIMPI_VIEW_SOFTEST * most, most);
-}
-
-/* The same for each unit of size at distance 1. */
-static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest, float density)
-{
-    return f->pixel_factor * density / terrimpi_max(closest, 1e-6f * f->desc->fade_start);
+    return f->pixel_factor * f->desc->texels_per_px /
+           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
 static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node *node,
-                                     float closest, float density, int *is_known)
+                                     float closest, int *is_known)
 {
     *is_known = 1;
     if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
-                                       (f->pixel_factor * density), is_known);
-}
-
-/* Whether a slot may be as large as the softest picture of a camera needs. */
-static int terrimpi_view_has_slot(const terrimpi_frame *f, const terrimp_capture *c)
-{
-    float side = terrimpi_max(c->tan_right - c->tan_left, c->tan_up - c->tan_down);
-    return side * f->side_px * TERRIMPI_VIEW_SOFTEST * f->desc->texels_per_px <=
-           (float)(f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN);
+                                       (f->pixel_factor * f->desc->texels_per_px), is_known);
 }
 
 /* Whether a point lies over the terrain, or beyond sides where another one goes on. */
@@ -10294,9 +10271,9 @@ static void terrimpi_view_judge(const terrimpi_frame *f, terrimpi_cache_picture 
 /* How much a picture has to be renewed: from 1 on one of the criteria of Hess 3.5 is met, or it has
    become too coarse, or far too fine. */
 static float terrimpi_view_urgency(const terrimpi_frame *f, terrimpi_cache_picture *picture,
-                                   float closest, float density)
+                                   float closest)
 {
-    float urgency, wanted = terrimpi_view_sharpness(f, closest, density);
+    float urgency, wanted = terrimpi_view_sharpness(f, closest);
     terrimpi_view_judge(f, picture);
     urgency = terrimpi_max(picture->urgency, wanted / (picture->sharpness * TERRIMPI_VIEW_COARSE));
     urgency = terrimpi_max(urgency, picture->sharpness / (wanted * TERRIMPI_VIEW_FINE));
@@ -10326,8 +10303,7 @@ typedef struct terrimpi_candidate {
     float closest;              /* [wu] from the eye to its box */
     float pixels;               /* that it covers, about */
     float urgency;              /* error of its picture over the tolerance */
-    float life;                 /* [frames] that a new picture would last, */
-    float density;              /* ... and its texels a pixel */
+    float life;                 /* [frames] that a new picture would last */
     float draw_cost, capture_cost;
     uint8_t is_short;           /* it stands for those below, whose pages are missing */
     uint8_t is_known;           /* what of the ground it would show */
@@ -10587,7 +10563,6 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
-    v.frame.density = v.desc.texels_per_px;
     v.frame.desc = &made->desc;
     v.frame.terrain = v.terrain;
     *made = v;
@@ -11122,13 +11097,12 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
 
 /* ---- ground or impostors? ---- */
 
-/* Fills in what a candidate costs. Returns 0 when no camera fits, since the eye is too close, or no
-   slot may be as large as even its softest picture. */
+/* Fills in what a candidate costs. Returns 0 when no camera fits: the eye is too close. */
 static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_cache *cache,
                                        terrimpi_candidate *c)
 {
     const terrimp_costs *costs = &f->desc->costs;
-    float k = f->side_px;
+    float k = f->side_px, density = f->desc->texels_per_px;
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
@@ -11141,27 +11115,24 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
                             f->camera.orthographic ? f->camera.forward : NULL, &camera) !=
         TERRIMP_OK)
         return 0;
-    if (!terrimpi_view_has_slot(f, &camera))
-        return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
     c->is_known = 1;
     c->pixels = k * k * (camera.tan_right - camera.tan_left) * (camera.tan_up - camera.tan_down);
     c->draw_cost = terrimpi_cost_draw(costs, (float)(mesh.index_count / 3u));
     c->life = terrimpi_view_life(f, c->node.number, c->closest);
-    c->density = terrimpi_view_density(f, c->life);
     if (c->picture && c->picture->layer_count > 0) {
         c->capture_cost = c->picture->cost;
-        c->urgency = terrimpi_max(terrimpi_view_urgency(f, c->picture, c->closest, c->density),
+        c->urgency = terrimpi_max(terrimpi_view_urgency(f, c->picture, c->closest),
                                   terrimpi_min(terrimpi_view_age(f, c->picture),
                                                TERRIMPI_VIEW_AGED * TERRIMPI_VIEW_STALE));
         return 1;
     }
     c->urgency = 1e9f;
-    source = terrimpi_view_source(f, &c->node, c->closest, c->density, &is_known);
+    source = terrimpi_view_source(f, &c->node, c->closest, &is_known);
     c->is_known = (uint8_t)is_known;
     quads = f->terrain->desc.chunk_quads << (c->node.level - source);
-    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * c->density * c->density,
+    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
     return 1;
 }
@@ -11449,16 +11420,10 @@ static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = 
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
 };
 
-/* What a frame costs: its draws, and captures in the mean frame; and what texels its pictures need
-   at a density of 1: in all, and a frame. */
-typedef struct terrimpi_frame_costs {
-    float drawn, spread, texels, captured_texels;
-} terrimpi_frame_costs;
-
 /* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
-   TERRIMPI_VIEW_FLIP. Adds to what the frame costs. */
-static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
-                                 terrimpi_frame_costs *frame)
+   TERRIMPI_VIEW_FLIP. Adds to what captures cost in the mean frame, and draws in this one. */
+static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float *spread,
+                                 float *drawn)
 {
     terrimpi_region_offer offers[TERRIMPI_VIEW_KIND_SHOWS];
     int possible[TERRIMPI_VIEW_KIND_SHOWS], kind, best = TERRIMPI_VIEW_KIND_GROUND;
@@ -11484,32 +11449,13 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
                     !v->candidates[region->first_candidate + i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
         v->kind_of[region->node] = (uint8_t)best;
-    frame->spread += offers[best].upkeep;
-    frame->drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
+    *spread += offers[best].upkeep;
+    *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
-        const terrimpi_candidate *c = &v->candidates[region->first_candidate + i];
-        float texels = c->pixels * TERRIMP_SQRTF(c->life / TERRIMPI_VIEW_LASTS);
-        frame->texels += texels;
-        frame->captured_texels += texels / c->life;
-        if (c->picture)
-            c->picture->seen = v->frame.number;
+        terrimpi_cache_picture *p = v->candidates[region->first_candidate + i].picture;
+        if (p)
+            p->seen = v->frame.number;
     }
-}
-
-/* Brings the density of pictures closer to what the atlases have room for, and a fixed share of the
-   frame's cost pays for: more than that would serve better elsewhere. */
-static void terrimpi_view_sharpen(terrimp_view *v, const terrimpi_frame_costs *frame)
-{
-    terrimpi_frame *f = &v->frame;
-    const terrimp_view_desc *d = &v->desc;
-    float side = (float)d->atlas_size, most = TERRIMPI_VIEW_SHARPEST * d->texels_per_px;
-    float screen = (float)f->camera.width_px * (float)f->camera.height_px * d->costs.impostor_px;
-    float room = TERRIMPI_VIEW_FILL * side * side * (float)d->atlas_count;
-    float paid = TERRIMPI_VIEW_TEXELS * (frame->drawn + screen) / d->costs.ground_px;
-    room = terrimpi_min(room / terrimpi_max(frame->texels, 1.0f),
-                        paid / terrimpi_max(frame->captured_texels, 1.0f));
-    room = terrimpi_min(TERRIMP_SQRTF(room), most);
-    f->density += (room - f->density) * TERRIMPI_VIEW_SHARPEN;
 }
 
 /* ---- the schedule of captures ---- */
@@ -11566,7 +11512,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_plan *plan = &job->plan;
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
-    float texels = 1.5f + f->desc->tolerance_px * c->density; /* bilinear, parallax */
+    float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
     uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;
@@ -11591,12 +11537,11 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     terrimpi_mesh_write(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
     if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->mesh_xyz,
-                              mesh.vertex_count, f->side_px * c->density, largest,
-                              &plan->camera, size) ||
-        !terrimpi_view_has_slot(f, &plan->camera))
+                              mesh.vertex_count, f->side_px * f->desc->texels_per_px, largest,
+                              &plan->camera, size))
         return 0;
     distance = terrimp_box_distance(&plan->box, plan->eye);
-    plan->source = terrimpi_view_source(f, &c->node, distance, c->density, &is_known);
+    plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
@@ -11624,7 +11569,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         terrimpi_capture_divide(f->terrain, plan, split);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
     job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
-    job->sharpness = terrimpi_view_sharpness(f, distance, c->density);
+    job->sharpness = terrimpi_view_sharpness(f, distance);
     memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
     for (i = 0; i < plan->layer_count; i++) {
@@ -11956,8 +11901,8 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
 
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
-static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
-                                        terrimpi_frame_costs *costs)
+static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
+                                        float *drawn)
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
@@ -11969,10 +11914,10 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         if (!f->camera.orthographic != !v->frame.camera.orthographic)
             terrimp_view_invalidate(v); /* no picture is of use to a camera of the other kind */
         v->frame = *f;
-        memset(costs, 0, sizeof *costs);
+        *spread = *drawn = 0.0f;
         for (i = 0; i < v->region_count; i++)
-            terrimpi_view_decide(v, &v->regions[i], costs);
-        v->cost = costs->drawn + terrimpi_min(costs->spread, TERRIMPI_VIEW_RESERVE * max_cost);
+            terrimpi_view_decide(v, &v->regions[i], spread, drawn);
+        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
@@ -11984,8 +11929,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, middle[2] = {0.0f, 0.0f};
-    terrimpi_frame_costs costs;
+    float reuse, spread, drawn, middle[2] = {0.0f, 0.0f};
     int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
@@ -12001,7 +11945,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
         return TERRIMP_E_PAGE;
     }
-    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &costs));
+    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
     view->cache.frame = frame.number;
     view->outdated = 0;
     terrimpi_view_cancel(view);
@@ -12011,10 +11955,9 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     if (!terrimpi_view_full(&view->desc))
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
-    terrimpi_view_schedule(view, costs.spread, costs.drawn);
+    terrimpi_view_schedule(view, spread, drawn);
     terrimpi_view_list(view);
     terrimpi_view_count_frame(view);
-    terrimpi_view_sharpen(view, &costs);
     return TERRIMP_OK;
 }
 

@@ -251,7 +251,6 @@ static void golden_settings(terrimp_view_desc *d, int mode, int variant, int kin
     d->costs.capture = 20.0f;
     d->costs.triangle = 4.0f;
     d->costs.ground_px = d->costs.impostor_px = 0.08f;
-    d->texels_per_px = variant == 2 ? 0.7f : 2.0f; /* slots are small there; else some are split */
     d->no_lookahead = kind == 1;
     d->no_spreading = kind == 2;
     d->ground_rule = kind % (int)TERRIMP_GEOMIP_RULE_COUNT;
