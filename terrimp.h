@@ -8504,7 +8504,7 @@ static uint32_t terrimpi_page_interleave(uint32_t x, uint32_t z)
     return out;
 }
 
-/* Where a block's pages begin, counted in pages: those above the blocks come first and. */
+/* Where a block's pages begin, counted in pages: those above the blocks come first. */
 static uint64_t terrimpi_page_first(const terrimp_quadtree *t, uint32_t block_level, uint32_t block)
 {
     return t->node_count - t->level_first[block_level + 1u] +
