@@ -9028,8 +9028,9 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain)
 {
     static const terrimpi_page_calls calls = {
-        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides, terrimpi_page_settle,
-        terrimpi_page_look_ahead, terrimpi_page_fill_ground, terrimpi_page_at};
+        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
+        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_fill_ground,
+        terrimpi_page_at};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages p;

@@ -74,7 +74,7 @@ machine() # name, prefix, flags, "judged" or ""
 # A host that opens no terrain in pages has no code of the room Residency but to find that out.
 needs_no_pages() # name, prefix, object
 {
-    found=$("$2nm" "$3" | awk '{ print $3 }' | grep -E '^terrimpi_page_' | grep -v '^terrimpi_page_of$')
+    found=$("$2nm" "$3" | awk '$3 ~ /^terrimpi_page_/ && $3 != "terrimpi_page_of" { print $3 }')
     [ -n "$found" ] || { echo "    has no code for pages"; return; }
     echo "    FAILED: the host has code for pages:" $found
     failed=1
