@@ -4532,6 +4532,9 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
+    uint32_t divides;   /* the last pass in which its node could be left for its children, */
+    uint32_t tested;    /* ... and in which it was tested: */
+    int8_t planes;      /* the frustum's that may cut a part of it off */
     uint8_t is_here;    /* the page has come and is good */
     uint8_t children;   /* nodes below that have a slot */
 } terrimpi_page_slot;
@@ -4544,6 +4547,7 @@ struct terrimp_pages {
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
+    uint32_t pass;             /* through the terrain, for one eye */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
     const struct terrimpi_page_calls *calls;
@@ -8678,6 +8682,7 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     found->node = node;
     found->used = p->frame;
     found->is_here = found->children = 0;
+    found->divides = found->tested = 0;
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8713,9 +8718,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
     return 1;
 }
 
-/* Whether a page that has just come is that of its node, and all numbers of it are what building
-   could have made. */
-static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
+/* Whether a page that has just come is that of its node, which has a record above it, and all
+   numbers of it are what building could have made. */
+static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsigned char *record)
 {
     const struct terrimp_pages *p = t->tree.pages;
     const unsigned char *page = terrimpi_page_of(p, node);
@@ -8726,7 +8731,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     memcpy(&head, page, sizeof head);
     if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
         head.node != node ||
-        memcmp(&head.record, p->calls->record(&t->tree, node), sizeof head.record) != 0 ||
+        memcmp(&head.record, record, sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
     scan.skip_voids = 0;
@@ -8738,10 +8743,12 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
+    const unsigned char *record;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
+    record = terrain->tree.pages->calls->record(&terrain->tree, node);
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node))
+    if (terrimpi_page_ok(terrain, node, record))
         return TERRIMP_OK;
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_E_BAKE;
@@ -8785,11 +8792,13 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-/* The record of a node: its parent's page has it. NULL when that is not here. */
+/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
 static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
     terrimp_node n;
-    const unsigned char *page;
+    const unsigned char *page = terrimpi_page_of(t->pages, number);
+    if (page)
+        return page + offsetof(terrimpi_page_head, record);
     if (number + 1u == t->node_count)
         return t->pages->root;
     n = terrimpi_tree_node(t, number);
@@ -8852,24 +8861,44 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
     return 0;
 }
 
+/* Planes of the frustum that may cut a part of a node off, of those that may of the one above. */
+static int terrimpi_page_planes(const terrimp_terrain *t, const terrimp_node *node,
+                                const terrimp_frustum *frustum, int planes)
+{
+    const struct terrimp_pages *p = t->tree.pages;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
+    terrimp_box box;
+    if (planes == 0 || (slot && slot->tested == p->pass))
+        return planes ? slot->planes : 0;
+    terrimpi_terrain_node_box(t, node, &box);
+    planes = terrimp_frustum_test(frustum, &box, planes);
+    if (slot) {
+        slot->tested = p->pass;
+        slot->planes = (int8_t)planes;
+    }
+    return planes;
+}
+
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
    whether all are here. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum, int reason, float urgency)
 {
+    const struct terrimp_pages *p = t->tree.pages;
+    terrimpi_page_slot *own = terrimpi_page_slot_of(p, node->number);
     terrimp_node child;
-    terrimp_box box;
     uint32_t i;
-    int all = 1;
+    int all = 1, planes;
+    if (own && own->divides == p->pass)
+        return 1;
     if (!terrimpi_page_want(&t->tree, node, reason, urgency))
         return 0;
-    for (i = 0; i < 4u; i++) {
-        if (!terrimpi_tree_quarter(&t->tree, node, i, &child))
-            continue;
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+    planes = terrimpi_page_planes(t, node, frustum, TERRIMP_PLANES_ALL);
+    for (i = 0; i < 4u && planes != TERRIMP_PLANES_OUTSIDE; i++)
+        if (terrimpi_tree_quarter(&t->tree, node, i, &child) &&
+            terrimpi_page_planes(t, &child, frustum, planes) != TERRIMP_PLANES_OUTSIDE)
             all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
-    }
+    own->divides = all ? p->pass : 0u;
     return all;
 }
 
@@ -8896,6 +8925,7 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 {
     uint32_t level, number, late = 0;
     terrimp_node below;
+    t->tree.pages->pass++;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
         terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
         terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
@@ -8922,12 +8952,11 @@ static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mi
     uint32_t i, k;
     for (i = 0; i < mip->view->draw_count; i++) {
         const terrimp_node *node = &mip->view->draws[i].node;
-        int planes = 0;
-        float measure, now, soon, eye[3];
+        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
         terrimp_box box;
         if (node->level == 0)
             continue;
-        measure = terrimpi_mip_split_ratio(mip, node, &planes);
+        measure *= measure;
         terrimpi_terrain_node_box(t, node, &box);
         for (k = 0; k < 3u; k++)
             eye[k] = mip->eye[k] + away[k];
