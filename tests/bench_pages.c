@@ -202,7 +202,7 @@ static int fly(world *w, const unsigned char *header, const terrimp_pages_info *
         camera.eye[0] += speed;
         terrimp_pages_next_frame(terrain);
         result = terrimp_view_update(view, &camera);
-        terrimp_view_wants(view, wants, 256, &count);
+        terrimp_pages_wants(terrain, wants, 256, &count);
         for (i = 0; i < count; i++) {
             terrimp_page_info page;
             void *to;

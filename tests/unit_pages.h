@@ -653,12 +653,12 @@ typedef struct paged_host {
 } paged_host;
 
 /* Returns whether anything is wanted or coming. */
-static int paged_serve(paged_host *h, terrimp_view *view)
+static int paged_serve(paged_host *h)
 {
     terrimp_want wants[64];
     uint32_t count, i, gone[64], gone_count;
     int busy;
-    CHECK(terrimp_view_wants(view, wants, 64, &count) == TERRIMP_OK);
+    CHECK(terrimp_pages_wants(h->p->opened, wants, 64, &count) == TERRIMP_OK);
     busy = count > 0;
     for (i = 0; i < count; i++) {
         terrimp_page_info info;
@@ -821,7 +821,7 @@ static void pages_settle_to_what_memory_shows(void)
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             result = terrimp_view_update(views[1], &camera);
             CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && frame < 50u));
-            if (paged_serve(&host, views[1]) || result != TERRIMP_OK)
+            if (paged_serve(&host) || result != TERRIMP_OK)
                 quiet = 0;
             if (result != TERRIMP_OK)
                 continue;
@@ -888,7 +888,7 @@ static void pages_fly_without_holes(void)
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             result = terrimp_view_update(view, &camera);
             CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && i < 40u));
-            paged_serve(&host, view);
+            paged_serve(&host);
             if (i % 100u == 60u)
                 before = host.again;
             if (i % 100u == 99u)
@@ -911,6 +911,50 @@ static void pages_fly_without_holes(void)
     p->memory = NULL;
 }
 
+/* Two views of one terrain: the list is what either alone would ask for, at the greater urgency. */
+static void pages_are_wanted_by_all_views(void)
+{
+    paged_land *p = paged_wide();
+    uint32_t turn, i, k;
+    for (turn = 0; turn < 6u && check_bad == 0; turn++) {
+        static terrimp_want wants[3][600];
+        terrimp_view *views[2];
+        uint32_t count[3], shared = 0;
+        free(p->memory);
+        paged_open(p, 1200);
+        for (i = p->l.info.node_count; i-- > p->l.info.node_count - 20u;)
+            paged_fetch(p, i);
+        for (i = 0; i < 2u; i++)
+            views[i] = paged_view(p->opened, i ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO);
+        for (k = 0; k < 3u; k++) { /* the first, the second, both */
+            check_state = CHECK_SEED + turn;
+            CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
+            for (i = 0; i < 2u; i++) {
+                terrimp_camera camera = paged_camera(&p->l, turn + i);
+                if (k == 2u || k == i)
+                    CHECK(terrimp_view_update(views[i], &camera) == TERRIMP_OK);
+            }
+            CHECK(terrimp_pages_wants(p->opened, wants[k], 600, &count[k]) == TERRIMP_OK);
+        }
+        for (k = 0; k < 2u; k++)
+            for (i = 0; i < count[k]; i++) {
+                const terrimp_want *w = &wants[k][i];
+                uint32_t at = 0;
+                while (at < count[2] && wants[2][at].node != w->node)
+                    at++;
+                CHECK(at < count[2] && wants[2][at].urgency >= w->urgency);
+                shared += k == 1u && at < count[2];
+                for (at = 0; k == 1u && at < count[0]; at++)
+                    shared -= wants[0][at].node == w->node;
+            }
+        CHECK(count[0] > 0 && count[1] > 0 && count[2] == count[0] + shared);
+        for (i = 0; i < 2u; i++)
+            terrimp_view_destroy(views[i]);
+    }
+    free(p->memory);
+    p->memory = NULL;
+}
+
 static void pages_tests(void)
 {
     RUN(bad_pages);
@@ -921,6 +965,7 @@ static void pages_tests(void)
     RUN(pages_answer_heights_and_rays);
     RUN(pages_settle_to_what_memory_shows);
     RUN(pages_fly_without_holes);
+    RUN(pages_are_wanted_by_all_views);
 }
 
 #endif
