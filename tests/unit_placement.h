@@ -132,12 +132,12 @@ static uint32_t exact_unsolved(const placing *p, float saved[PLACE_VIEWS][PLACE_
 {
     uint32_t v, i, over = 0;
     for (v = 0; v < p->desc.view_count; v++) {
-        float best[PLACE_CLUSTERS] = {0, 0, 0, 0, 0, 0, 0}, most;
+        float best[PLACE_CLUSTERS] = {0, 0, 0, 0, 0, 0, 0}, halves;
         for (i = 0; i < p->desc.candidate_count; i++)
             if ((set >> i & 1u) && saved[v][i] > best[p->candidates[i].cluster])
                 best[p->candidates[i].cluster] = saved[v][i];
-        most = fmaxf(best[6], fmaxf(best[4], best[0] + best[1]) + fmaxf(best[5], best[2] + best[3]));
-        over += p->costs[v] - most > p->desc.budget * 1.00001f;
+        halves = fmaxf(best[4], best[0] + best[1]) + fmaxf(best[5], best[2] + best[3]);
+        over += p->costs[v] - fmaxf(best[6], halves) > p->desc.budget * 1.00001f;
     }
     return over;
 }
