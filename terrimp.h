@@ -4532,9 +4532,6 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
-    uint32_t divides;   /* the last pass in which its node could be left for its children, */
-    uint32_t tested;    /* ... and in which it was tested: */
-    int8_t planes;      /* the frustum's that may cut a part of it off */
     uint8_t is_here;    /* the page has come and is good */
     uint8_t children;   /* nodes below that have a slot */
 } terrimpi_page_slot;
@@ -4547,7 +4544,7 @@ struct terrimp_pages {
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
-    uint32_t pass;             /* through the terrain, for one eye */
+    int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
     const struct terrimpi_page_calls *calls;
@@ -8682,7 +8679,6 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     found->node = node;
     found->used = p->frame;
     found->is_here = found->children = 0;
-    found->divides = found->tested = 0;
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8861,44 +8857,32 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
     return 0;
 }
 
-/* Planes of the frustum that may cut a part of a node off, of those that may of the one above. */
-static int terrimpi_page_planes(const terrimp_terrain *t, const terrimp_node *node,
-                                const terrimp_frustum *frustum, int planes)
-{
-    const struct terrimp_pages *p = t->tree.pages;
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
-    terrimp_box box;
-    if (planes == 0 || (slot && slot->tested == p->pass))
-        return planes ? slot->planes : 0;
-    terrimpi_terrain_node_box(t, node, &box);
-    planes = terrimp_frustum_test(frustum, &box, planes);
-    if (slot) {
-        slot->tested = p->pass;
-        slot->planes = (int8_t)planes;
-    }
-    return planes;
-}
-
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
-   whether all are here. */
+   whether all are here. Then the walk that finds what is in sight comes by and uses the children,
+   unless `strays` says that it may not. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum, int reason, float urgency)
 {
     const struct terrimp_pages *p = t->tree.pages;
-    terrimpi_page_slot *own = terrimpi_page_slot_of(p, node->number);
+    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
     terrimp_node child;
+    terrimp_box box;
     uint32_t i;
-    int all = 1, planes;
-    if (own && own->divides == p->pass)
-        return 1;
     if (!terrimpi_page_want(&t->tree, node, reason, urgency))
         return 0;
-    planes = terrimpi_page_planes(t, node, frustum, TERRIMP_PLANES_ALL);
-    for (i = 0; i < 4u && planes != TERRIMP_PLANES_OUTSIDE; i++)
-        if (terrimpi_tree_quarter(&t->tree, node, i, &child) &&
-            terrimpi_page_planes(t, &child, frustum, planes) != TERRIMP_PLANES_OUTSIDE)
-            all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
-    own->divides = all ? p->pass : 0u;
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
+            (!uses && terrimpi_page_of(p, child.number)))
+            continue;
+        terrimpi_terrain_node_box(t, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
+        if (!all && !uses) { /* it does not come: once more */
+            uses = 1;
+            i = 0xffffffffu;
+        }
+    }
     return all;
 }
 
@@ -8925,7 +8909,6 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 {
     uint32_t level, number, late = 0;
     terrimp_node below;
-    t->tree.pages->pass++;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
         terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
         terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
@@ -8937,10 +8920,11 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
             if (mark->measure < 1.0f ||
                 (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
                                        TERRIMP_SQRTF(mark->measure)) &&
-                 terrimpi_page_has_around(mip, &node)))
+                 (late == 0 || terrimpi_page_has_around(mip, &node))))
                 continue;
             mark->measure = 0.0f;
             late++;
+            t->tree.pages->strays = 1;
         }
     return late;
 }
@@ -10218,6 +10202,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
     const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     cull->count = cull->ground_count = cull->impostor_count = cull->hidden_count = 0;
@@ -10228,6 +10213,8 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         terrimp_box box;
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
+        if (pages)
+            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -11094,6 +11081,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
         if (pages) {
             pages->want_count = f->wants; /* those of a try before are of no use */
+            pages->strays = f->desc->hider != NULL;
             v->late = pages->calls->settle(f->terrain, &mip);
         }
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
