@@ -1318,8 +1318,8 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 
         terrimp_pages_next_frame(terrain);
         terrimp_view_update(view, &camera);
-        terrimp_view_wants(view, wants, 64, &count);   // begin these, on any thread fill what
-                                                       // begin has given; put, or fail
+        terrimp_pages_wants(terrain, wants, 64, &count); // begin these, on any thread fill what
+                                                         // begin has given; put, or fail
         terrimp_view_render(view, &draw);
 
    Begin, put and fail belong to the thread of the views, between update and render or after it. The
@@ -1397,8 +1397,32 @@ TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t n
    more. Nobody may fill it any longer. Errors: E_STATE when it has not been begun. */
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node);
 
-/* Begins a frame of all views of a terrain: what the frame before did not use may be given up. */
+/* Begins a frame of all views of a terrain: what the frame before did not use may be given up, and
+   what it wanted is forgotten. */
 TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain);
+
+/* Why a page is wanted. */
+typedef enum terrimp_want_reason {
+    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
+    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
+    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
+    TERRIMP_WANT_REASON_COUNT
+} terrimp_want_reason;
+
+typedef struct terrimp_want {
+    uint32_t node, level, bytes;
+    int reason;     /* terrimp_want_reason */
+    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
+} terrimp_want;
+
+/* The pages that the updates of this frame would have liked to have, those of all views, best
+   first, and no more than there are slots for. None of them is here or coming, and the parents of
+   all are here.
+
+   wants       [capacity] out
+   count       out: how many */
+TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
+                                               uint32_t capacity, uint32_t *count);
 
 /* Lists the pages that have been begun and that no view wanted in this frame and the one before.
 
@@ -1681,29 +1705,6 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
               here. The frame before stays
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
-
-/* Why a page is wanted. */
-typedef enum terrimp_want_reason {
-    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
-    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
-    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
-    TERRIMP_WANT_REASON_COUNT
-} terrimp_want_reason;
-
-typedef struct terrimp_want {
-    uint32_t node, level, bytes;
-    int reason;     /* terrimp_want_reason */
-    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
-} terrimp_want;
-
-/* The pages that the last update would have liked to have, best first, and no more than there are
-   slots for. None of them is here or coming, and the parents of all are here. Several views share a
-   terrain's pages: ask them all, and begin refuses what another has asked for.
-
-   wants      [capacity] out
-   count      out: how many */
-TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
-                                              uint32_t capacity, uint32_t *count);
 
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
@@ -2786,10 +2787,10 @@ typedef struct terrimp_placement {
 TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
 
 /* Chooses candidates: again and again the one that takes most off what views cost above the budget,
-   for its memory; a picture of a cluster takes the place of pictures of what is in it. Then those
-   are given back that others can stand in for. Small sets are gone through again and again, each
-   time without one of the chosen candidates or with another one to begin with, while that pays.
-   Costs count as within the budget to 1e-5 of it.
+   for its memory; a picture of a cluster takes the place of pictures of the same and of what is in
+   it. Then those are given back that others can stand in for. Small sets are gone through again and
+   again, with one or two candidates more or less, while that pays. Costs count as within the budget
+   to 1e-5 of it.
 
    scratch    aligned to 8 bytes
    shown      [gain_count] out: 1 where the candidate's picture is shown in that view, else 0. A
@@ -2798,8 +2799,8 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
    placement  out
    Errors     E_RANGE also for a parent that is not greater, or a gain of two candidates
    Cost       about O(gains + chosen * log(candidates)): scores only ever fall, so that only the
-              best one is scored anew until it stays the best. 2 s for 300,000 candidates with 2.2
-              million gains, 60 bytes of scratch memory for each of these
+              best one is scored anew until it stays the best. 1.6 s for 300,000 candidates with
+              3.1 million gains, 26 bytes of scratch memory for each of these
    Source     Jeschke 2004, section 5.7; all after the choice is ours */
 TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
                                          size_t bytes, uint8_t *shown, float *costs,
@@ -4542,6 +4543,9 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
+    uint32_t divides;   /* the last pass in which its node could be left for its children, */
+    uint32_t tested;    /* ... and in which it was tested: */
+    int8_t planes;      /* the frustum's that may cut a part of it off */
     uint8_t is_here;    /* the page has come and is good */
     uint8_t children;   /* nodes below that have a slot */
 } terrimpi_page_slot;
@@ -4554,7 +4558,28 @@ struct terrimp_pages {
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
+    uint32_t pass;             /* through the terrain, for one eye */
+    terrimp_want *wants;       /* [want_limit] of this frame */
+    uint32_t want_count, want_limit;
+    const struct terrimpi_page_calls *calls;
 };
+
+struct terrimpi_mip_frame;
+
+/* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
+   which opens none has no code of it. */
+typedef struct terrimpi_page_calls {
+    const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
+    int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
+    int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
+                   const terrimp_frustum *frustum, int reason, float urgency);
+    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
+    void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
+                       const float away[3]);
+    void (*fill_ground)(const terrimp_terrain *t, uint32_t node, float *xyz);
+    terrimp_result (*at)(const terrimp_terrain *t, float x, float z, terrimp_heightfield *ground,
+                         uint32_t *level);
+} terrimpi_page_calls;
 
 #define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
 #define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
@@ -4567,23 +4592,10 @@ static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint
                                                : NULL;
 }
 
-/* The record of a node: its parent's page has it. NULL when that is not here. */
-static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
-{
-    terrimp_node n;
-    const unsigned char *page;
-    if (number + 1u == t->node_count)
-        return t->pages->root;
-    n = terrimpi_tree_node(t, number);
-    page = terrimpi_page_of(t->pages, terrimpi_tree_parent(t, &n).number);
-    return page ? page + TERRIMPI_PAGE_CHILDREN +
-                      (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
-}
-
 /* What PICTURE asks of a node for those below it: the last number of its record. */
 static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
 {
-    return *(const float *)(const void *)(terrimpi_page_record(t, number) +
+    return *(const float *)(const void *)(t->pages->calls->record(t, number) +
                                           TERRIMPI_PAGE_RECORD - sizeof(float));
 }
 
@@ -4593,7 +4605,7 @@ static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtr
 {
     return t->nodes ? t->nodes + number
                     : (const struct terrimp_geomip_node *)(const void *)
-                          terrimpi_page_record(t, number);
+                          t->pages->calls->record(t, number);
 }
 
 /* Whether there is anything to be known of a tree's nodes. */
@@ -6686,7 +6698,8 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
 {
     if (t->meshes)
         return &t->meshes[node];
-    return &((const terrimpi_record *)(const void *)terrimpi_page_record(&t->tree, node))->mesh;
+    return &((const terrimpi_record *)(const void *)t->tree.pages->calls->record(&t->tree,
+                                                                                     node))->mesh;
 }
 
 /* The node of the built terrain that a node is, or repeats. */
@@ -7112,19 +7125,6 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     return f;
 }
 
-static void terrimpi_fill_page_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
-{
-    terrimp_heightfield f = terrimpi_page_field(t, node);
-    terrimp_node n = terrimpi_tree_node(&t->tree, node);
-    uint32_t quads = t->desc.chunk_quads, i, j;
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++) {
-            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
-            *xyz++ = terrimpi_field_sample(&f, i, j);
-            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
-        }
-}
-
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
@@ -7132,7 +7132,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
     TERRIMPI_REFUSE(capacity < 3u * terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     if (!terrain->tree.pages)
         return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
-    terrimpi_fill_page_ground(terrain, node, xyz);
+    terrain->tree.pages->calls->fill_ground(terrain, node, xyz);
     return TERRIMP_OK;
 }
 
@@ -8463,6 +8463,7 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
    is known of a node hangs on its parent's page alone. */
 
+#define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
 #define TERRIMPI_PAGES_MAGIC 0x54494d51u
 #define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
 
@@ -8609,84 +8610,6 @@ TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
     return TERRIMP_OK;
 }
 
-/* The one description of the block: sets the arrays when there is a base. */
-static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pages *p,
-                                    unsigned char *base, unsigned char **head)
-{
-    terrimpi_arena b = terrimpi_arena_at(base);
-    terrimpi_take(&b, 1, sizeof *t);
-    terrimpi_take(&b, 1, sizeof *p);
-    *head = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
-    p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
-    p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
-    p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
-    return b.ok ? b.bytes : 0;
-}
-
-TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count)
-{
-    terrimp_terrain t;
-    terrimpi_pages_head head;
-    struct terrimp_pages p;
-    unsigned char *none;
-    if (!terrimpi_within_u32(slot_count, 8u, 65534u) ||
-        terrimpi_pages_read(header, bytes, &t, &head) != TERRIMP_OK)
-        return 0;
-    p.slot_count = slot_count;
-    p.page_bytes = terrimpi_page_bytes(&t);
-    return terrimpi_pages_layout(&t, &p, NULL, &none);
-}
-
-TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
-                                              size_t bytes, uint32_t slot_count, void *memory,
-                                              size_t memory_bytes, terrimp_terrain **terrain)
-{
-    terrimp_terrain t;
-    terrimpi_pages_head head;
-    struct terrimp_pages p;
-    unsigned char *copy;
-    uint32_t i;
-    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
-    TERRIMPI_REFUSE(!terrimpi_within_u32(slot_count, 8u, 65534u), TERRIMP_E_RANGE);
-    memset(&p, 0, sizeof p);
-    p.slot_count = slot_count;
-    p.page_bytes = terrimpi_page_bytes(&t);
-    p.node_count = t.tree.node_count;
-    p.block_level = head.block_level;
-    p.stamp = head.stamp;
-    p.frame = 2;
-    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
-                                      terrimpi_pages_layout(&t, &p, NULL, &copy)));
-    if (field) {
-        terrimp_heightfield place = *field;
-        place.samples = header;
-        place.width = t.desc.field.width;
-        place.depth = t.desc.field.depth;
-        place.format = t.desc.field.format;
-        place.row_bytes = 0;
-        place.height_scale = t.desc.field.height_scale;
-        place.height_offset = t.desc.field.height_offset;
-        TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
-    }
-    t.desc.field.samples = NULL; /* there are none but those of pages */
-    t.desc.field.has_no_data = t.desc.field.wrap = 0;
-    t.tree.field = t.desc.field;
-    t.begun = t.built = t.baked = 1;
-    terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
-    memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
-    memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
-    p.root = copy + offsetof(terrimpi_pages_head, root);
-    p.lows = (const float *)(const void *)(copy + sizeof head);
-    for (i = 0; i < slot_count; i++)
-        p.slots[i].node = p.node_count;
-    t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
-    *t.tree.pages = p;
-    *(terrimp_terrain *)memory = t;
-    *terrain = (terrimp_terrain *)memory;
-    return TERRIMP_OK;
-}
-
 /* ---- pages come and go ---- */
 
 static terrimp_result terrimpi_page_check(const terrimp_terrain *t, uint32_t node, const void *out)
@@ -8770,6 +8693,7 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     found->node = node;
     found->used = p->frame;
     found->is_here = found->children = 0;
+    found->divides = found->tested = 0;
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8805,9 +8729,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
     return 1;
 }
 
-/* Whether a page that has just come is that of its node, and all numbers of it are what building
-   could have made. */
-static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
+/* Whether a page that has just come is that of its node, which has a record above it, and all
+   numbers of it are what building could have made. */
+static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsigned char *record)
 {
     const struct terrimp_pages *p = t->tree.pages;
     const unsigned char *page = terrimpi_page_of(p, node);
@@ -8818,7 +8742,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     memcpy(&head, page, sizeof head);
     if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
         head.node != node ||
-        memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
+        memcmp(&head.record, record, sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
     scan.skip_voids = 0;
@@ -8830,10 +8754,12 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
+    const unsigned char *record;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
+    record = terrain->tree.pages->calls->record(&terrain->tree, node);
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node))
+    if (terrimpi_page_ok(terrain, node, record))
         return TERRIMP_OK;
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_E_BAKE;
@@ -8851,6 +8777,7 @@ TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain)
 {
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, terrain));
     terrain->tree.pages->frame++;
+    terrain->tree.pages->want_count = 0;
     return TERRIMP_OK;
 }
 
@@ -8876,77 +8803,340 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
+/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
+static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
-    terrimpi_page_slot *slot = t->pages ? terrimpi_page_slot_of(t->pages, node) : NULL;
+    terrimp_node n;
+    const unsigned char *page = terrimpi_page_of(t->pages, number);
+    if (page)
+        return page + offsetof(terrimpi_page_head, record);
+    if (number + 1u == t->node_count)
+        return t->pages->root;
+    n = terrimpi_tree_node(t, number);
+    page = terrimpi_page_of(t->pages, terrimpi_tree_parent(t, &n).number);
+    return page ? page + TERRIMPI_PAGE_CHILDREN +
+                      (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
+}
+
+/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
+static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
+{
+    if (a->urgency > b->urgency || a->urgency < b->urgency)
+        return a->urgency > b->urgency;
+    return a->level != b->level ? a->level > b->level : a->node < b->node;
+}
+
+/* Notes that a page is of use in this frame, and those above it. If it is missing, it is wanted at
+   an urgency above 0, or the one above it that has to come first. Returns whether it is here. */
+static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+                              float urgency)
+{
+    struct terrimp_pages *p = t->pages;
+    terrimp_node n = *node;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+    terrimp_want want, *worst = p->wants;
+    uint32_t i;
+    while (!slot && n.level + 1u < t->level_count) {
+        terrimp_node above = terrimpi_tree_parent(t, &n);
+        slot = terrimpi_page_slot_of(p, above.number);
+        if (slot)
+            slot->used = p->frame; /* or it might be given up for this */
+        if (slot && slot->is_here) {
+            slot = NULL;
+            break;
+        }
+        n = above;
+    }
     if (slot)
-        slot->used = t->pages->frame;
+        slot->used = p->frame;
+    if (slot || !(urgency > 0.0f))
+        return slot && slot->is_here;
+    want.node = n.number;
+    want.level = n.level;
+    want.bytes = p->page_bytes;
+    want.reason = reason;
+    want.urgency = urgency;
+    for (i = 0; i < p->want_count; i++) {
+        if (p->wants[i].node == n.number) {
+            if (terrimpi_want_before(&want, &p->wants[i]))
+                p->wants[i] = want;
+            return 0;
+        }
+        if (terrimpi_want_before(worst, &p->wants[i]))
+            worst = &p->wants[i];
+    }
+    if (p->want_count < p->want_limit)
+        p->wants[p->want_count++] = want;
+    else if (terrimpi_want_before(&want, worst))
+        *worst = want;
+    return 0;
 }
 
-/* As terrimpi_tree_quarter, of a child in sight; the node's page is here. */
-static int terrimpi_page_quarter(const terrimp_terrain *t, const terrimp_node *node, uint32_t i,
-                                 const terrimp_frustum *frustum, terrimp_node *child)
+/* Planes of the frustum that may cut a part of a node off, of those that may of the one above. */
+static int terrimpi_page_planes(const terrimp_terrain *t, const terrimp_node *node,
+                                const terrimp_frustum *frustum, int planes)
 {
+    const struct terrimp_pages *p = t->tree.pages;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
     terrimp_box box;
-    if (!terrimpi_tree_quarter(&t->tree, node, i, child))
-        return 0;
-    terrimpi_terrain_node_box(t, child, &box);
-    return terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE;
+    if (planes == 0 || (slot && slot->tested == p->pass))
+        return planes ? slot->planes : 0;
+    terrimpi_terrain_node_box(t, node, &box);
+    planes = terrimp_frustum_test(frustum, &box, planes);
+    if (slot) {
+        slot->tested = p->pass;
+        slot->planes = (int8_t)planes;
+    }
+    return planes;
 }
 
-/* Whether a node may be left for its children: its page is here, and of these each in sight. */
+/* The same for a node and its children in sight, without which it may not be left for them. Returns
+   whether all are here. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
-                                 const terrimp_frustum *frustum)
+                                 const terrimp_frustum *frustum, int reason, float urgency)
 {
-    const terrimp_quadtree *tree = &t->tree;
+    const struct terrimp_pages *p = t->tree.pages;
+    terrimpi_page_slot *own = terrimpi_page_slot_of(p, node->number);
     terrimp_node child;
     uint32_t i;
-    int all = 1;
-    if (!tree->pages)
+    int all = 1, planes;
+    if (own && own->divides == p->pass)
         return 1;
-    if (!terrimpi_page_of(tree->pages, node->number))
+    if (!terrimpi_page_want(&t->tree, node, reason, urgency))
         return 0;
-    terrimpi_page_use(tree, node->number);
-    for (i = 0; i < 4u; i++)
-        if (terrimpi_page_quarter(t, node, i, frustum, &child)) {
-            terrimpi_page_use(tree, child.number);
-            all &= terrimpi_page_of(tree->pages, child.number) != NULL;
-        }
+    planes = terrimpi_page_planes(t, node, frustum, TERRIMP_PLANES_ALL);
+    for (i = 0; i < 4u && planes != TERRIMP_PLANES_OUTSIDE; i++)
+        if (terrimpi_tree_quarter(&t->tree, node, i, &child) &&
+            terrimpi_page_planes(t, &child, frustum, planes) != TERRIMP_PLANES_OUTSIDE)
+            all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
+    own->divides = all ? p->pass : 0u;
     return all;
 }
 
-/* ---- heights and rays ---- */
-
-/* The finest node at a position whose page is here. */
-static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z, terrimp_node *n)
+/* Whether the nodes exist that have to beside and above one that is split. */
+static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
 {
-    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, n));
-    while (!terrimpi_page_of(t->pages, n->number)) {
-        TERRIMPI_REFUSE(n->level + 1u == t->level_count, TERRIMP_E_PAGE);
-        *n = terrimpi_tree_parent(t, n);
+    terrimp_node beyond;
+    int side;
+    if (node->level + 1u == mip->tree->level_count)
+        return 1;
+    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
+        return 0;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
+            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
+            return 0;
+    return 1;
+}
+
+/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
+   neighbours still differ by one level at most. All that the split would need is wanted; and the
+   ground below the eye, which says whether it is over it. Returns how many are joined. */
+static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
+{
+    uint32_t level, number, late = 0;
+    terrimp_node below;
+    t->tree.pages->pass++;
+    if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
+        terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
+        terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
+    for (level = t->tree.level_count; level-- > 1u;)
+        for (number = mip->first[level]; number != t->tree.node_count;
+             number = mip->view->marks[number].next) {
+            terrimp_geomip_mark *mark = &mip->view->marks[number];
+            terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            if (mark->measure < 1.0f ||
+                (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
+                                       TERRIMP_SQRTF(mark->measure)) &&
+                 terrimpi_page_has_around(mip, &node)))
+                continue;
+            mark->measure = 0.0f;
+            late++;
+        }
+    return late;
+}
+
+/* Asks for the pages that ground will need when the eye has gone on by `away`. */
+static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
+                                     const float away[3])
+{
+    uint32_t i, k;
+    for (i = 0; i < mip->view->draw_count; i++) {
+        const terrimp_node *node = &mip->view->draws[i].node;
+        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
+        terrimp_box box;
+        if (node->level == 0)
+            continue;
+        measure *= measure;
+        terrimpi_terrain_node_box(t, node, &box);
+        for (k = 0; k < 3u; k++)
+            eye[k] = mip->eye[k] + away[k];
+        now = terrimp_box_distance(&box, mip->eye);
+        soon = terrimp_box_distance(&box, eye);
+        if (measure * now * now >= soon * soon)
+            terrimpi_page_divides(t, node, &mip->frustum, TERRIMP_WANT_AHEAD,
+                                  0.99f * terrimpi_min(measure, 1.0f));
     }
+}
+
+static void terrimpi_page_fill_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
+{
+    terrimp_heightfield f = terrimpi_page_field(t, node);
+    terrimp_node n = terrimpi_tree_node(&t->tree, node);
+    uint32_t quads = t->desc.chunk_quads, i, j;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++) {
+            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
+            *xyz++ = terrimpi_field_sample(&f, i, j);
+            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
+        }
+}
+
+TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
+                                               uint32_t capacity, uint32_t *count)
+{
+    struct terrimp_pages *p;
+    uint32_t i, k, gap, room = 0;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
+    TERRIMPI_REFUSE(!wants && capacity > 0, TERRIMP_E_NULL);
+    p = terrain->tree.pages;
+    for (gap = p->want_count / 2u; gap > 0; gap /= 2u)
+        for (i = gap; i < p->want_count; i++) {
+            terrimp_want moved = p->wants[i];
+            for (k = i; k >= gap && terrimpi_want_before(&moved, &p->wants[k - gap]); k -= gap)
+                p->wants[k] = p->wants[k - gap];
+            p->wants[k] = moved;
+        }
+    for (i = 0; i < p->slot_count; i++)
+        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
+    room = terrimpi_min_u32(room, capacity);
+    for (*count = i = 0; i < p->want_count && *count < room; i++)
+        if (!p->slot_of[p->wants[i].node]) /* it has not been begun since */
+            wants[(*count)++] = p->wants[i];
     return TERRIMP_OK;
 }
+
+/* The ground at a position: of the finest node whose page is here. */
+static terrimp_result terrimpi_page_at(const terrimp_terrain *t, float x, float z,
+                                       terrimp_heightfield *ground, uint32_t *level)
+{
+    terrimp_node n;
+    TERRIMPI_TRY(terrimp_quadtree_find(&t->tree, 0, x, z, &n));
+    while (!terrimpi_page_of(t->tree.pages, n.number)) {
+        TERRIMPI_REFUSE(n.level + 1u == t->tree.level_count, TERRIMP_E_PAGE);
+        n = terrimpi_tree_parent(&t->tree, &n);
+    }
+    *ground = terrimpi_page_field(t, n.number);
+    *level = n.level;
+    return TERRIMP_OK;
+}
+
+/* ---- opening ---- */
+
+/* The one description of the block: sets the arrays when there is a base. */
+static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pages *p,
+                                    unsigned char *base, unsigned char **head)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    terrimpi_take(&b, 1, sizeof *t);
+    terrimpi_take(&b, 1, sizeof *p);
+    *head = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
+    p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
+    p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
+    p->want_limit = terrimpi_min_u32(p->slot_count, TERRIMPI_PAGE_WANTS);
+    p->wants = (terrimp_want *)terrimpi_take(&b, p->want_limit, sizeof *p->wants);
+    p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
+    return b.ok ? b.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *none;
+    if (!terrimpi_within_u32(slot_count, 8u, 65534u) ||
+        terrimpi_pages_read(header, bytes, &t, &head) != TERRIMP_OK)
+        return 0;
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    return terrimpi_pages_layout(&t, &p, NULL, &none);
+}
+
+TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
+                                              size_t bytes, uint32_t slot_count, void *memory,
+                                              size_t memory_bytes, terrimp_terrain **terrain)
+{
+    static const terrimpi_page_calls calls = {
+        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
+        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_fill_ground,
+        terrimpi_page_at};
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *copy;
+    uint32_t i;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    TERRIMPI_REFUSE(!terrimpi_within_u32(slot_count, 8u, 65534u), TERRIMP_E_RANGE);
+    memset(&p, 0, sizeof p);
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    p.node_count = t.tree.node_count;
+    p.block_level = head.block_level;
+    p.stamp = head.stamp;
+    p.frame = 2;
+    p.calls = &calls;
+    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
+                                      terrimpi_pages_layout(&t, &p, NULL, &copy)));
+    if (field) {
+        terrimp_heightfield place = *field;
+        place.samples = header;
+        place.width = t.desc.field.width;
+        place.depth = t.desc.field.depth;
+        place.format = t.desc.field.format;
+        place.row_bytes = 0;
+        place.height_scale = t.desc.field.height_scale;
+        place.height_offset = t.desc.field.height_offset;
+        TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
+    }
+    t.desc.field.samples = NULL; /* there are none but those of pages */
+    t.desc.field.has_no_data = t.desc.field.wrap = 0;
+    t.tree.field = t.desc.field;
+    t.begun = t.built = t.baked = 1;
+    terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
+    memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
+    memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
+    p.root = copy + offsetof(terrimpi_pages_head, root);
+    p.lows = (const float *)(const void *)(copy + sizeof head);
+    for (i = 0; i < slot_count; i++)
+        p.slots[i].node = p.node_count;
+    t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
+    *t.tree.pages = p;
+    *(terrimp_terrain *)memory = t;
+    *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+/* ---- heights and rays ---- */
 
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
                                                   float *height, float normal[3], uint32_t *level)
 {
     terrimp_heightfield f;
-    terrimp_node n;
+    uint32_t found = 0;
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
                                              height));
     f = terrain->desc.field;
-    memset(&n, 0, sizeof n);
     if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrimpi_page_at(&terrain->tree, x, z, &n));
-        TERRIMPI_REFUSE(n.level > 0 && !level, TERRIMP_E_PAGE);
-        f = terrimpi_page_field(terrain, n.number);
+        TERRIMPI_TRY(terrain->tree.pages->calls->at(terrain, x, z, &f, &found));
+        TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
     if (normal)
         TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
     if (level)
-        *level = n.level;
+        *level = found;
     return TERRIMP_OK;
 }
 
@@ -9427,7 +9617,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
-#define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
@@ -9503,6 +9692,7 @@ typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
+    uint32_t wants;                /* of pages, before this update */
     terrimp_camera camera;         /* resolved */
     float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
     float pixel_factor;            /* K from there */
@@ -9948,6 +10138,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
+    const struct terrimp_pages *pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
@@ -9965,7 +10156,9 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
            terrimpi_max(field->spacing_x, field->spacing_z);
     if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
-    return terrimpi_page_divides(f->terrain, node, &f->frustum) ? 0 : 1 + TERRIMPI_CULL_SHORT;
+    pages = f->terrain->tree.pages;
+    return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
+               ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -10387,8 +10580,7 @@ struct terrimp_view {
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
-    terrimp_want *wants;           /* [want_limit] of a terrain in pages */
-    uint32_t want_count, want_limit, late;
+    uint32_t late;                 /* nodes and pictures that pages are missing for */
     uint32_t open;                 /* 1 + the job of which pieces are missing */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
@@ -10501,8 +10693,6 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     if (v->desc.exact_depth)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
-    v->want_limit = v->terrain->tree.pages ? TERRIMPI_VIEW_WANTS : 0u;
-    v->wants = (terrimp_want *)terrimpi_take(&l, v->want_limit, sizeof *v->wants);
     v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
                                                  sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
@@ -10830,189 +11020,6 @@ TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float di
     return TERRIMP_OK;
 }
 
-/* ---- the pages that are missing ---- */
-
-/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
-static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
-{
-    if (a->urgency > b->urgency || a->urgency < b->urgency)
-        return a->urgency > b->urgency;
-    return a->level != b->level ? a->level > b->level : a->node < b->node;
-}
-
-/* Notes that a page is of use in this frame. If it is missing it is wanted; or the one above it
-   that has to come first. */
-static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int reason,
-                               float urgency)
-{
-    const terrimp_quadtree *t = &v->terrain->tree;
-    terrimp_node n = *node, above;
-    terrimp_want want, *worst = v->wants;
-    uint32_t i;
-    while (n.level + 1u < t->level_count && !t->pages->slot_of[n.number]) {
-        above = terrimpi_tree_parent(t, &n);
-        terrimpi_page_use(t, above.number); /* or it might be given up for this */
-        if (terrimpi_page_of(t->pages, above.number))
-            break;
-        n = above;
-    }
-    terrimpi_page_use(t, n.number);
-    if (t->pages->slot_of[n.number])
-        return;
-    want.node = n.number;
-    want.level = n.level;
-    want.bytes = t->pages->page_bytes;
-    want.reason = reason;
-    want.urgency = urgency;
-    for (i = 0; i < v->want_count; i++) {
-        if (v->wants[i].node == n.number) {
-            if (terrimpi_want_before(&want, &v->wants[i]))
-                v->wants[i] = want;
-            return;
-        }
-        if (terrimpi_want_before(worst, &v->wants[i]))
-            worst = &v->wants[i];
-    }
-    if (v->want_count < v->want_limit)
-        v->wants[v->want_count++] = want;
-    else if (terrimpi_want_before(&want, worst))
-        *worst = want;
-}
-
-/* The same for a node and its children in sight. Returns whether all of them are here. */
-static int terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
-                                       const terrimp_node *node, int reason, float urgency)
-{
-    const terrimp_quadtree *t = &v->terrain->tree;
-    terrimp_node child;
-    uint32_t i;
-    int all = 1;
-    if (!t->pages)
-        return 1;
-    terrimpi_view_want(v, node, reason, urgency);
-    if (!terrimpi_page_of(t->pages, node->number))
-        return 0;
-    for (i = 0; i < 4u; i++)
-        if (terrimpi_page_quarter(v->terrain, node, i, frustum, &child)) {
-            terrimpi_view_want(v, &child, reason, urgency);
-            all &= terrimpi_page_of(t->pages, child.number) != NULL;
-        }
-    return all;
-}
-
-/* Whether the nodes exist that have to beside and above one that is split. */
-static int terrimpi_view_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
-{
-    terrimp_node beyond;
-    int side;
-    if (node->level + 1u == mip->tree->level_count)
-        return 1;
-    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
-        return 0;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
-            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
-            return 0;
-    return 1;
-}
-
-/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
-   neighbours still differ by one level at most. All that the split would need is wanted. */
-static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
-                                 const terrimpi_mip_frame *mip)
-{
-    const terrimp_quadtree *t = mip->tree;
-    uint32_t level, number;
-    v->want_count = v->late = 0;
-    if (!t->pages)
-        return;
-    terrimpi_page_use(t, t->node_count - 1u);
-    for (level = t->level_count; level-- > 1u;)
-        for (number = mip->first[level]; number != t->node_count;
-             number = v->ground.marks[number].next) {
-            terrimp_geomip_mark *mark = &v->ground.marks[number];
-            terrimp_node node = terrimpi_tree_node(t, number);
-            if (mark->measure < 1.0f)
-                continue;
-            if (terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
-                                            TERRIMP_SQRTF(mark->measure)) &&
-                terrimpi_view_has_around(mip, &node))
-                continue;
-            mark->measure = 0.0f;
-            v->late++;
-        }
-}
-
-/* Asks for the pages that ground will need soon, as the eye goes on. */
-static void terrimpi_view_look_ahead(terrimp_view *v, const terrimpi_frame *f,
-                                     const terrimpi_mip_frame *mip)
-{
-    const float *away = f->motion.away[0];
-    float frames = f->motion.frames[0] > 0.0f ? TERRIMPI_VIEW_SOON / f->motion.frames[0] : 0.0f;
-    uint32_t i, k;
-    if (!mip->tree->pages || f->desc->no_lookahead || !(terrimpi_length(away) > 0.0f))
-        return;
-    for (i = 0; i < v->ground.draw_count; i++) {
-        const terrimp_node *node = &v->ground.draws[i].node;
-        int planes = 0;
-        float measure, now, soon, eye[3];
-        terrimp_box box;
-        if (node->level == 0)
-            continue;
-        measure = terrimpi_mip_split_ratio(mip, node, &planes);
-        terrimpi_terrain_node_box(v->terrain, node, &box);
-        for (k = 0; k < 3u; k++)
-            eye[k] = f->eye[k] + away[k] * frames;
-        now = terrimp_box_distance(&box, f->eye);
-        soon = terrimp_box_distance(&box, eye);
-        if (measure * now * now >= soon * soon)
-            terrimpi_view_want_children(v, &f->frustum, node, TERRIMP_WANT_AHEAD,
-                                        0.99f * terrimpi_min(measure, 1.0f));
-    }
-}
-
-/* Whether all pages are here that a capture draws; those that are not are wanted. */
-static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
-                                   uint32_t count, float urgency)
-{
-    const terrimp_quadtree *t = &v->terrain->tree;
-    uint32_t i;
-    int all = 1;
-    for (i = 0; i < count && t->pages; i++) {
-        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
-        terrimpi_view_want(v, &node, urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE,
-                           terrimpi_min(urgency, 2.0f));
-        all &= terrimpi_page_of(t->pages, node.number) != NULL;
-    }
-    v->late += all ? 0u : 1u;
-    return all;
-}
-
-TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
-                                              uint32_t capacity, uint32_t *count)
-{
-    uint32_t i, k, gap, room = 0;
-    const struct terrimp_pages *p;
-    TERRIMPI_REFUSE(!view || !count || (!wants && capacity > 0), TERRIMP_E_NULL);
-    *count = 0;
-    p = view->terrain->tree.pages;
-    if (!p)
-        return TERRIMP_OK;
-    for (gap = view->want_count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < view->want_count; i++) {
-            terrimp_want moved = view->wants[i];
-            for (k = i; k >= gap && terrimpi_want_before(&moved, &view->wants[k - gap]); k -= gap)
-                view->wants[k] = view->wants[k - gap];
-            view->wants[k] = moved;
-        }
-    for (i = 0; i < p->slot_count; i++)
-        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
-    *count = terrimpi_min_u32(terrimpi_min_u32(view->want_count, room), capacity);
-    for (i = 0; i < *count; i++)
-        wants[i] = view->wants[i];
-    return TERRIMP_OK;
-}
-
 /* ---- the regions ---- */
 
 /* Makes the ground draw of a node in the ground cut. */
@@ -11083,7 +11090,9 @@ static void terrimpi_view_make_regions(terrimp_view *v, terrimpi_mip_frame *mip)
    tolerance. The frame before is only written over when that has succeeded. */
 static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f)
 {
+    struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
+    uint32_t i;
     if (terrimpi_view_full(&v->desc)) {
         if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
             return TERRIMP_E_CAPACITY;
@@ -11094,7 +11103,10 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
-        terrimpi_view_settle(v, f, &mip);
+        if (pages) {
+            pages->want_count = f->wants; /* those of a try before are of no use */
+            v->late = pages->calls->settle(f->terrain, &mip);
+        }
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most)
@@ -11102,7 +11114,13 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
     terrimpi_view_make_regions(v, &mip);
-    terrimpi_view_look_ahead(v, f, &mip);
+    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
+        float ahead[3];
+        for (i = 0; i < 3u; i++)
+            ahead[i] = f->motion.away[0][i] * (TERRIMPI_VIEW_SOON / f->motion.frames[0]);
+        if (terrimpi_length(ahead) > 0.0f)
+            pages->calls->look_ahead(f->terrain, &mip, ahead);
+    }
     return TERRIMP_OK;
 }
 
@@ -11233,9 +11251,9 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    if (!p || !terrimpi_tree_opens(&v->terrain->tree, node->number))
+    const terrimp_quadtree *tree = &v->terrain->tree;
+    if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
         return 0;
-    terrimpi_page_use(&v->terrain->tree, node->number);
     if (p->listed == v->frame.number) {
         v->draws[p->draw].alpha = 1.0f;
         return 1;
@@ -11501,6 +11519,21 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
+/* Whether all pages are here that a capture draws; those that are not are wanted. */
+static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
+                                   uint32_t count, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    int reason = urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE, all = 1;
+    uint32_t i;
+    for (i = 0; i < count && t->pages; i++) {
+        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
+        all &= t->pages->calls->want(t, &node, reason, terrimpi_min(urgency, 2.0f));
+    }
+    v->late += all ? 0u : 1u;
+    return all;
+}
+
 /* Finds slots for a job: those of the old picture, unless the new one is made in pieces and the old
    one is drawn meanwhile. */
 static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], terrimpi_job *job)
@@ -11529,7 +11562,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     int is_known;
     memset(job, 0, sizeof *job);
     if (c->is_short) {
-        terrimpi_view_want_children(v, &f->frustum, &c->node, TERRIMP_WANT_PICTURE, 2.0f);
+        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &f->frustum,
+                                               TERRIMP_WANT_PICTURE, 2.0f);
         v->late++;
         return 0;
     }
@@ -11949,12 +11983,12 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
-    if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
-                                                          view->terrain->tree.node_count - 1u)) {
-        terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
-        view->want_count = 0;
-        terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
-        return TERRIMP_E_PAGE;
+    if (view->terrain->tree.pages) {
+        const terrimp_quadtree *tree = &view->terrain->tree;
+        terrimp_node root = terrimpi_tree_root(tree);
+        frame.wants = tree->pages->want_count;
+        TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
+                        TERRIMP_E_PAGE);
     }
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
     view->cache.frame = frame.number;
@@ -19613,8 +19647,8 @@ static int terrimpi_place_within(const terrimpi_place_work *p, uint32_t cluster,
     return cluster == other;
 }
 
-/* What a picture would take off a view's cost: less what pictures of its parts have, whose place
-   it takes; nothing when one already shows all of it. */
+/* What a picture would take off a view's cost: less what pictures of the same cluster or its parts
+   have, whose place it takes; nothing when one of a larger cluster shows it. */
 static float terrimpi_place_net(const terrimpi_place_work *p, uint32_t gain)
 {
     const terrimp_place_gain *g = &p->desc->gains[gain];
@@ -19622,10 +19656,10 @@ static float terrimpi_place_net(const terrimpi_place_work *p, uint32_t gain)
     float net = g->saved;
     for (i = p->first[g->view]; i != TERRIMPI_PLACE_NONE; i = p->next[i]) {
         uint32_t other = p->desc->candidates[p->owner[i]].cluster;
-        if (terrimpi_place_within(p, cluster, other))
-            return 0.0f;
         if (terrimpi_place_within(p, other, cluster))
             net -= p->desc->gains[i].saved;
+        else if (terrimpi_place_within(p, cluster, other))
+            return 0.0f;
     }
     return net;
 }
@@ -19695,7 +19729,7 @@ static void terrimpi_place_toggle(terrimpi_place_work *p, uint32_t gain)
     p->costs[g->view] += g->saved;
 }
 
-/* Shows a picture in a view, in place of the pictures of its parts. */
+/* Shows a picture in a view, in place of those of the same cluster and its parts. */
 static void terrimpi_place_show(terrimpi_place_work *p, uint32_t gain)
 {
     uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i, after;
@@ -19885,28 +19919,29 @@ static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *ou
     terrimpi_place_sum(p, out);
 }
 
-/* Attempts to do without each chosen candidate, and to begin with each other one, as long as that
-   pays and work is left to spend. */
+/* Attempts to do the reverse with one or two candidates, to be made or not, as long as that pays
+   and work is left to spend: each candidate alone, then all pairs. Each time all others are chosen
+   anew, and then once more beginning with those that are made now. */
 static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *best)
 {
-    uint32_t n = p->desc->candidate_count, i = 0, since = 0;
+    uint32_t n = p->desc->candidate_count, turn = 0, i;
     uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
-    for (; since < n && tries > 0; i = i + 1u < n ? i + 1u : 0u, since++) {
+    while (n > 0 && turn / 2u / n <= n / 2u && tries-- > 0) {
+        uint32_t a = turn / 2u % n, b = (a + turn / 2u / n) % n;
         terrimp_placement attempt;
-        uint8_t wish = p->wish[i];
-        p->wish[i] = terrimpi_place_uses(p, p->best, i) ? TERRIMPI_PLACE_NEVER
-                                                        : TERRIMPI_PLACE_FIRST;
-        if (p->wish[i] == wish)
-            continue;
+        for (i = 0; i < n; i++) {
+            int made = terrimpi_place_uses(p, p->best, i), reverse = i == a || i == b;
+            p->wish[i] = reverse ? (made ? TERRIMPI_PLACE_NEVER : TERRIMPI_PLACE_FIRST)
+                                 : (made && turn % 2u ? TERRIMPI_PLACE_FIRST : 0);
+        }
         terrimpi_place_attempt(p, &attempt);
-        tries--;
+        turn++;
         if (attempt.unsolved < best->unsolved ||
             (attempt.unsolved == best->unsolved && attempt.memory < best->memory)) {
             *best = attempt;
             memcpy(p->best, p->shown, p->desc->gain_count);
-            since = 0;
-        } else
-            p->wish[i] = wish;
+            turn = 0;
+        }
     }
 }
 

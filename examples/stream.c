@@ -85,12 +85,12 @@ static void *read_pages(void *shared)
 }
 
 /* After an update: takes what has come, gives up what nobody wants any more, asks for the rest. */
-static void serve(reader *r, terrimp_terrain *terrain, terrimp_view *view)
+static void serve(reader *r, terrimp_terrain *terrain)
 {
     terrimp_want wants[MOST];
     uint32_t gone[MOST], gone_count = 0, count = 0, i, k;
     terrimp_pages_withdrawn(terrain, gone, MOST, &gone_count);
-    terrimp_view_wants(view, wants, MOST, &count);
+    terrimp_pages_wants(terrain, wants, MOST, &count);
     pthread_mutex_lock(&r->lock);
     for (i = 0; i < MOST; i++) {
         job *j = &r->jobs[i];
@@ -247,7 +247,7 @@ int main(int argc, char **argv)
             sum = render(view);
         took = now() - before;
         worst = took > worst ? took : worst;
-        serve(&r, terrain, view);
+        serve(&r, terrain);
         memset(&stats, 0, sizeof stats);
         terrimp_view_get_stats(view, &stats);
         late += result != TERRIMP_OK || stats.late > 0;
