@@ -12466,8 +12466,9 @@ static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *f
     *first = s->bounds[along][0];
     *last = s->bounds[along][1];
     for (i = 0; i < s->side_count; i++) {
-        int32_t n = along == 0 ? s->sides[i].x : s->sides[i].z, m = s->sides[i].x + s->sides[i].z - n;
-        int32_t most = (int32_t)(s->sides[i].at >> s->top) + 1 + m * (m > 0 ? row + 1 : row);
+        const terrimp_sorted_side *side = &s->sides[i];
+        int32_t n = along == 0 ? side->x : side->z, m = side->x + side->z - n;
+        int32_t most = (int32_t)(side->at >> s->top) + 1 + m * (m > 0 ? row + 1 : row);
         if (n > 0)
             *first = terrimpi_sorted_larger(*first, -most / n - 1);
         else if (n < 0)
@@ -12904,8 +12905,8 @@ static void terrimpi_sorted_triangle(terrimp_sorted_square *out, int a, int b, i
 }
 
 /* Whether of the two sides of the plane through two places of a square the one with the half's
-   corner comes first in the order. In the half that is not turned it is to the right of the way from
-   the first place to the second. */
+   corner comes first in the order. In the half that is not turned it is to the right of the way
+   from the first place to the second. */
 static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_sorted_cell *c,
                                         int a, int b, int turned)
 {
@@ -12918,7 +12919,8 @@ static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_s
    these cuts off a triangle with the corner; what is left of two has its corner at the first.
    places: of the vertices. */
 static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out,
-                                 const uint8_t places[6], int corner, int begin, int end, int turned)
+                                 const uint8_t places[6], int corner, int begin, int end,
+                                 int turned)
 {
     int a = begin, b = end ? end : 3;
     int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], places[a], places[b],
@@ -12945,13 +12947,12 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
         return;
     }
     out->triangle_count = 0;
-    for (i = 0; i < 2; i++)
-        if (i != first)
-            terrimpi_sorted_half(s, out, places, 1, middle[TERRIMP_SIDE_Z0], middle[TERRIMP_SIDE_X1],
-                                 0);
-        else
-            terrimpi_sorted_half(s, out, places, 2, middle[TERRIMP_SIDE_X0], middle[TERRIMP_SIDE_Z1],
-                                 1);
+    for (i = 0; i < 2; i++) {
+        int turned = i == first;
+        terrimpi_sorted_half(s, out, places, 1 + turned,
+                             middle[turned ? TERRIMP_SIDE_X0 : TERRIMP_SIDE_Z0],
+                             middle[turned ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_X1], turned);
+    }
 }
 
 /* Cuts off what of the present square is beyond the last sample. */
