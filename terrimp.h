@@ -11589,7 +11589,8 @@ static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], ter
 }
 
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
-   `room` triangles it may be cut, if no other one is. Returns 0 when it cannot be made. */
+   `room` triangles it may be cut, if no other one is; 0: it only asks for its pages. Returns 0 when
+   it cannot be made. */
 static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, uint32_t room,
                                 terrimpi_job *job)
 {
@@ -11631,7 +11632,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
@@ -11786,6 +11787,14 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
+/* Asks for the pages of a picture that has to wait: so they come meanwhile, and stay. */
+static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
+{
+    terrimpi_job job;
+    if (v->terrain->tree.pages && c->urgency >= 1.0f)
+        terrimpi_job_prepare(v, c, 0, &job);
+}
+
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
@@ -11797,8 +11806,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
-        (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
-        !terrimpi_job_prepare(v, c, room, job))
+        (d->max_capture_texels && s->texels >= d->max_capture_texels)) {
+        terrimpi_view_await(v, c);
+        return 0;
+    }
+    if (!terrimpi_job_prepare(v, c, room, job))
         return 0;
     room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
