@@ -7105,10 +7105,16 @@ static size_t terrimpi_terrain_ground_vertices(const terrimp_terrain *t)
     return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
-/* The samples of a page, [chunk_quads + 1]^2 in 16 bits. */
+/* The samples of a page, [chunk_quads + 1]^2. */
 static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node)
 {
     return terrimpi_corners_of(t, node) + t->index_limit / 4u;
+}
+
+/* Bytes of a sample in a page: as the field's, but two at least. */
+static uint32_t terrimpi_page_sample_bytes(const terrimp_heightfield *field)
+{
+    return field->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
 }
 
 /* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
@@ -7118,8 +7124,8 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     terrimp_heightfield f = t->desc.field;
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     f.samples = terrimpi_page_samples(t, node);
-    f.format = f.format == TERRIMP_FORMAT_S16 ? f.format : TERRIMP_FORMAT_U16;
-    f.row_bytes = 2u * (t->desc.chunk_quads + 1u);
+    f.row_bytes = terrimpi_page_sample_bytes(&f) * (t->desc.chunk_quads + 1u);
+    f.format = f.format == TERRIMP_FORMAT_U8 ? TERRIMP_FORMAT_U16 : f.format;
     f.origin_x = terrimpi_terrain_x(t, p.x);
     f.origin_z = terrimpi_terrain_z(t, p.z);
     f.spacing_x *= (float)(1u << p.level);
@@ -8512,7 +8518,7 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 {
     uint32_t side = t->desc.chunk_quads + 1u;
     uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
-                     t->index_limit + 2u * side * side;
+                     t->index_limit + terrimpi_page_sample_bytes(&t->desc.field) * side * side;
     return (bytes + 15u) / 16u * 16u;
 }
 
@@ -8600,7 +8606,6 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     head->bake.bytes != TERRIMP_PAGES_HEADER_BYTES ||
                     terrimpi_bake_hash(header) != head->bake.checksum ||
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
-                    t->desc.field.format == TERRIMP_FORMAT_F32 ||
                     head->block_level >= t->tree.level_count ||
                     terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
@@ -16946,8 +16951,7 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     memset(&t, 0, sizeof t);
     TERRIMPI_TRY(terrimp_terrain_desc_resolve(&d.terrain, &t.desc));
     TERRIMPI_REFUSE(!terrimpi_terrain_count(&t), TERRIMP_E_OVERFLOW);
-    TERRIMPI_REFUSE(t.desc.field.format == TERRIMP_FORMAT_F32 ||
-                    !(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
     top = t.tree.level_count - 1u;
     TERRIMPI_DEFAULT(d.block_level, t.desc.field.width <= 4097u && t.desc.field.depth <= 4097u
                                         ? top : 4u);
@@ -17165,17 +17169,19 @@ static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t
 }
 
 /* Copies the samples of a node of the part into its page. */
-static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n, uint16_t *out)
+static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n,
+                                    unsigned char *out)
 {
     const terrimp_quadtree *t = &w->part->tree;
-    uint32_t i, j, quads = t->chunk_quads;
+    uint32_t i, j, quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field);
     for (j = 0; j <= quads; j++) {
-        const void *row = terrimpi_field_row(&t->field, terrimpi_tree_row(t, n->level,
-                                                                          n->z * quads + j));
-        for (i = 0; i <= quads; i++) {
+        const unsigned char *row = (const unsigned char *)terrimpi_field_row(
+            &t->field, terrimpi_tree_row(t, n->level, n->z * quads + j));
+        for (i = 0; i <= quads; i++, out += size) {
             uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
-            *out++ = t->field.format == TERRIMP_FORMAT_U8 ? ((const uint8_t *)row)[x]
-                                                          : ((const uint16_t *)row)[x];
+            uint16_t wide = row[t->field.format == TERRIMP_FORMAT_U8 ? x : 0];
+            memcpy(out, t->field.format == TERRIMP_FORMAT_U8 ? (const void *)&wide : row + x * size,
+                   size);
         }
     }
 }
@@ -17210,7 +17216,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
     at += 4u * t->vertex_limit;
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
-    terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
+    terrimpi_paging_samples(w, n, w->page + at + t->index_limit);
     memcpy(w->page, &head, sizeof head);
     head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
@@ -17296,13 +17302,13 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
 {
     const terrimp_quadtree *t = &w->part->tree;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t quads = t->chunk_quads, i, j, x, z;
+    uint32_t quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field), i, j, x, z;
     terrimpi_page_head head;
     const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
                                 4u * w->whole.vertex_limit + w->whole.index_limit;
     TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
     for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++, from += 2) {
+        for (i = 0; i <= quads; i++, from += size) {
             uint16_t sample;
             x = terrimpi_tree_col(t, 0, n->x * quads + i);
             z = terrimpi_tree_row(t, 0, n->z * quads + j);
@@ -17310,7 +17316,7 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
             if (t->field.format == TERRIMP_FORMAT_U8)
                 w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
             else
-                memcpy(w->samples + ((size_t)z * t->field.width + x) * 2u, &sample, sizeof sample);
+                memcpy(w->samples + ((size_t)z * t->field.width + x) * size, from, size);
         }
     t->nodes[n->number] = head.record.ground;
     w->part->meshes[n->number] = head.record.mesh;
@@ -17329,7 +17335,7 @@ static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uin
     uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
     uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
     uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
-    uint16_t line[256]; /* either is 1 */
+    float line[256]; /* of any format; either is 1 */
     for (k = 0; k < cols * rows; k += 256u) {
         f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
         f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
