@@ -1325,8 +1325,8 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    Begin, put and fail belong to the thread of the views, between update and render or after it. The
    pages that a frame uses stay where they are until the next frame's update. A page lies in its
    slot until another needs it, and what the host has made of it is good as long: a mesh has its
-   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Views of modes AUTO and
-   GEOMIP draw pages, without morph_ratio and hider. */
+   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Walls and visible sets are
+   those of the same terrain in memory. Views draw pages without morph_ratio. */
 
 #define TERRIMP_PAGES_VERSION 1u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
@@ -4543,9 +4543,6 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
-    uint32_t divides;   /* the last pass in which its node could be left for its children, */
-    uint32_t tested;    /* ... and in which it was tested: */
-    int8_t planes;      /* the frustum's that may cut a part of it off */
     uint8_t is_here;    /* the page has come and is good */
     uint8_t children;   /* nodes below that have a slot */
 } terrimpi_page_slot;
@@ -4558,7 +4555,7 @@ struct terrimp_pages {
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
-    uint32_t pass;             /* through the terrain, for one eye */
+    int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
     const struct terrimpi_page_calls *calls;
@@ -4577,8 +4574,9 @@ typedef struct terrimpi_page_calls {
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
                        const float away[3]);
     void (*fill_ground)(const terrimp_terrain *t, uint32_t node, float *xyz);
-    terrimp_result (*at)(const terrimp_terrain *t, float x, float z, terrimp_heightfield *ground,
+    terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
                          uint32_t *level);
+    float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
 } terrimpi_page_calls;
 
 #define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
@@ -4964,6 +4962,7 @@ typedef struct terrimpi_mip_frame {
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
     float relief;              /* what measures are multiplied with */
+    float whole;               /* [wu] so close to the eye all is split; below 0: all in sight */
     float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
@@ -5094,14 +5093,18 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
     terrimp_box box;
     split2 = f->tree->pages ? terrimpi_mip_distance(f, node->level, node->number)
                             : f->view->distances[node->number];
-    if (!(split2 > 0.0f))
+    if (!(split2 > 0.0f) && !(f->whole > 0.0f) && !(f->whole < 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
+    if (f->whole > 0.0f && terrimpi_mip_distance2(&box, f->eye) < f->whole * f->whole)
+        return TERRIMPI_MIP_MOST;
     if (*planes) {
         *planes = terrimp_frustum_test(&f->frustum, &box, *planes);
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    if (f->whole < 0.0f)
+        return TERRIMPI_MIP_MOST;
     if (split2 >= TERRIMPI_MIP_MOST)
         return split2; /* at no distance; or it cannot be drawn at all */
     terrimpi_camera_grow(&box, f->reach);
@@ -5334,6 +5337,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
+    f.whole = 0.0f;
     terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
@@ -7718,6 +7722,13 @@ static uint32_t terrimpi_stand_last(const terrimp_quadtree *tree, uint32_t axis)
     return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
 }
 
+/* A sample; HORIZON_ALL when its page is not here. */
+static float terrimpi_stand_sample(const terrimp_quadtree *tree, uint32_t x, uint32_t z)
+{
+    return tree->pages ? tree->pages->calls->sample(tree, x, z)
+                       : terrimpi_field_sample(&tree->field, x, z);
+}
+
 /* The highest that the ground can be within so many quads of the eye: of each quad the highest
    corner or, if that is less, how far its triangles rise there. */
 static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *tree,
@@ -7735,10 +7746,10 @@ static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *
     }
     for (j = from[1]; j <= to[1]; j++)
         for (i = from[0]; i <= to[0]; i++) {
-            float a = terrimpi_field_sample(&tree->field, i, j), u, v, low, high;
-            float b = terrimpi_field_sample(&tree->field, i + 1u, j);
-            float c = terrimpi_field_sample(&tree->field, i, j + 1u);
-            float d = terrimpi_field_sample(&tree->field, i + 1u, j + 1u);
+            float a = terrimpi_stand_sample(tree, i, j), u, v, low, high;
+            float b = terrimpi_stand_sample(tree, i + 1u, j);
+            float c = terrimpi_stand_sample(tree, i, j + 1u);
+            float d = terrimpi_stand_sample(tree, i + 1u, j + 1u);
             u = (float)((int32_t)s->quad[0] - (int32_t)i) + s->within[0];
             v = (float)((int32_t)s->quad[1] - (int32_t)j) + s->within[1];
             low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
@@ -7763,7 +7774,7 @@ static int terrimpi_stand_clip(terrimp_stand *s, const terrimp_quadtree *tree,
     s->clipped[0] = quads[0] = reach / field->spacing_x;
     s->clipped[1] = quads[1] = reach / field->spacing_z;
     s->steepest = TERRIMPI_HORIZON_NONE;
-    if (tree->nodes[tree->node_count - 1u].high < s->eye - 2.0f * reach)
+    if (terrimpi_tree_kept(tree, tree->node_count - 1u)->high < s->eye - 2.0f * reach)
         return 1;
     top += terrimpi_stand_top(s, tree, quads) + 2.0f * s->error * reach;
     if (top >= s->eye)
@@ -7799,12 +7810,22 @@ static int terrimpi_stand_over(terrimp_stand *s, const terrimp_quadtree *tree, c
     return 1;
 }
 
+/* The height of the ground below an eye; returns 0 when its page is not here. */
+static int terrimpi_stand_ground(const terrimp_quadtree *tree, const float eye[3], float *ground)
+{
+    terrimp_heightfield field = tree->field;
+    uint32_t level = 0;
+    return (!tree->pages || tree->pages->calls->at(tree, eye[0], eye[2], &field, &level) ==
+                                TERRIMP_OK) &&
+           level == 0 && terrimp_heightfield_height(&field, eye[0], eye[2], ground) == TERRIMP_OK;
+}
+
 /* Looks at what a camera stands over. Returns 0 when nothing is hidden from it. */
 static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
                                 const terrimp_camera *camera, const terrimp_capture *capture,
                                 float error, float low)
 {
-    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    const terrimp_geomip_node *all = terrimpi_tree_kept(tree, tree->node_count - 1u);
     float ground;
     s->eye = camera->eye[1];
     s->error = error;
@@ -7812,8 +7833,7 @@ static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
                             terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
     return !camera->orthographic && !(camera->reach > 0.0f) &&
            terrimpi_stand_over(s, tree, camera->eye) &&
-           terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) ==
-               TERRIMP_OK &&
+           terrimpi_stand_ground(tree, camera->eye, &ground) &&
            s->eye > ground + s->low && terrimpi_stand_clip(s, tree, capture);
 }
 
@@ -7856,7 +7876,7 @@ TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
 
 static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const void *walls)
 {
-    TERRIMPI_REFUSE(!tree || !walls || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!tree || !walls || !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     return TERRIMP_OK;
 }
@@ -7902,12 +7922,14 @@ static float terrimpi_walls_lowest(const terrimp_walls *w, uint32_t axis, uint32
 
 /* ---- walls as an eye sees them ---- */
 
-/* The sample where line `line` of an axis crosses line `other` of the other one. */
+/* The sample where line `line` of an axis crosses line `other` of the other one: what is not here
+   hides nothing. */
 static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
                                      uint32_t other)
 {
-    return axis == 0 ? terrimpi_field_sample(&h->hider.tree->field, line, other)
-                     : terrimpi_field_sample(&h->hider.tree->field, other, line);
+    float height = terrimpi_stand_sample(h->hider.tree, axis == 0 ? line : other,
+                                         axis == 0 ? other : line);
+    return height < TERRIMPI_HORIZON_ALL ? height : TERRIMPI_HORIZON_NONE;
 }
 
 /* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
@@ -8075,13 +8097,13 @@ static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, floa
    one that is closest to the eye. */
 static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
 {
-    const terrimp_geomip_node *heights = &h->hider.tree->nodes[node->number];
+    const terrimp_geomip_node *heights = terrimpi_tree_kept(h->hider.tree, node->number);
     uint32_t quads = h->hider.tree->chunk_quads << node->level, k, first;
     float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
     float x = (float)((int32_t)(node->x * quads) - (int32_t)h->stand.quad[0]) - h->stand.within[0];
     float z = (float)((int32_t)(node->z * quads) - (int32_t)h->stand.quad[1]) - h->stand.within[1];
     const unsigned char *tops;
-    if (h->blind || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
+    if (h->blind || !heights || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
         return 0;
     if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->stand.eye))
         return 1;
@@ -8275,15 +8297,15 @@ TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
 static float terrimpi_horizon_node_error(const terrimp_quadtree *tree, const terrimp_node *n,
                                          int morphs)
 {
-    const terrimp_geomip_node *nodes = tree->nodes;
+    const terrimp_geomip_node *own = terrimpi_tree_kept(tree, n->number);
     uint32_t quads = tree->chunk_quads << n->level, part = (1u << n->level) - 1u;
     uint32_t last_x = tree->field.width - 1u, last_z = tree->field.depth - 1u;
     if (((n->x + 1u) * quads >= last_x && (last_x & part)) ||
         ((n->z + 1u) * quads >= last_z && (last_z & part)))
-        return nodes[n->number].high - nodes[n->number].low;
+        return own->high - own->low;
     if (morphs && n->level + 1u < tree->level_count)
-        return nodes[terrimpi_tree_parent(tree, n).number].error;
-    return nodes[n->number].error;
+        return terrimpi_tree_kept(tree, terrimpi_tree_parent(tree, n).number)->error;
+    return own->error;
 }
 
 /* The same for a draw, which at coarse borders is drawn as those beside it. */
@@ -8380,7 +8402,8 @@ static uint32_t terrimpi_sets_level_nodes(const terrimp_quadtree *tree, uint32_t
 /* What ground and nodes may be off their samples, with the rounding of heights [wu]. */
 static float terrimpi_sets_low(const terrimp_sets *s)
 {
-    const terrimp_geomip_node *all = &s->hider.tree->nodes[s->hider.tree->node_count - 1u];
+    const terrimp_geomip_node *all =
+        terrimpi_tree_kept(s->hider.tree, s->hider.tree->node_count - 1u);
     float most = terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high));
     return s->low + 1e-6f * (2.0f * most + s->reach);
 }
@@ -8399,9 +8422,11 @@ static int terrimpi_sets_begin(terrimp_hider *hider, const terrimp_camera *camer
         return 0;
     cell = terrimpi_tree_at(tree, s->cell_level, s->stand.quad[0] / quads,
                             s->stand.quad[1] / quads);
+    if (!terrimpi_tree_kept(tree, cell.number))
+        return 0;
     s->row = s->codes + (size_t)(cell.number - tree->level_first[cell.level]) *
                             terrimpi_sets_level_nodes(tree, s->node_level);
-    s->code = terrimpi_sets_code(s, tree->nodes[cell.number].low, s->stand.eye);
+    s->code = terrimpi_sets_code(s, terrimpi_tree_kept(tree, cell.number)->low, s->stand.eye);
     return 1;
 }
 
@@ -8423,7 +8448,7 @@ static int terrimpi_sets_hides(terrimp_hider *hider, const terrimp_node *node)
         &s->stand, (float)((int32_t)(node->x * quads) - (int32_t)s->stand.quad[0]) -
                        s->stand.within[0],
         (float)((int32_t)(node->z * quads) - (int32_t)s->stand.quad[1]) - s->stand.within[1],
-        (float)quads, tree->nodes[node->number].low - s->stand.low);
+        (float)quads, terrimpi_tree_kept(tree, node->number)->low - s->stand.low);
 }
 
 TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets)
@@ -8441,8 +8466,9 @@ TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrim
 TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree)
 {
     const terrimp_geomip_node *all;
-    TERRIMPI_REFUSE(!sets || !tree || !tree->nodes || !sets->codes, TERRIMP_E_NULL);
-    all = &tree->nodes[tree->node_count - 1u];
+    TERRIMPI_REFUSE(!sets || !tree || !sets->codes || !terrimpi_tree_is_built(tree),
+                    TERRIMP_E_NULL);
+    all = terrimpi_tree_kept(tree, tree->node_count - 1u);
     TERRIMPI_REFUSE(!terrimpi_finite2(sets->error, sets->low) || !terrimpi_finite(sets->reach),
                     TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(terrimp_sets_bytes(tree, sets) == 0 || !(sets->low >= 0.0f) ||
@@ -8693,7 +8719,6 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     found->node = node;
     found->used = p->frame;
     found->is_here = found->children = 0;
-    found->divides = found->tested = 0;
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8872,44 +8897,32 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
     return 0;
 }
 
-/* Planes of the frustum that may cut a part of a node off, of those that may of the one above. */
-static int terrimpi_page_planes(const terrimp_terrain *t, const terrimp_node *node,
-                                const terrimp_frustum *frustum, int planes)
-{
-    const struct terrimp_pages *p = t->tree.pages;
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
-    terrimp_box box;
-    if (planes == 0 || (slot && slot->tested == p->pass))
-        return planes ? slot->planes : 0;
-    terrimpi_terrain_node_box(t, node, &box);
-    planes = terrimp_frustum_test(frustum, &box, planes);
-    if (slot) {
-        slot->tested = p->pass;
-        slot->planes = (int8_t)planes;
-    }
-    return planes;
-}
-
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
-   whether all are here. */
+   whether all are here. Then the walk that finds what is in sight comes by and uses the children,
+   unless `strays` says that it may not. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum, int reason, float urgency)
 {
     const struct terrimp_pages *p = t->tree.pages;
-    terrimpi_page_slot *own = terrimpi_page_slot_of(p, node->number);
+    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
     terrimp_node child;
+    terrimp_box box;
     uint32_t i;
-    int all = 1, planes;
-    if (own && own->divides == p->pass)
-        return 1;
     if (!terrimpi_page_want(&t->tree, node, reason, urgency))
         return 0;
-    planes = terrimpi_page_planes(t, node, frustum, TERRIMP_PLANES_ALL);
-    for (i = 0; i < 4u && planes != TERRIMP_PLANES_OUTSIDE; i++)
-        if (terrimpi_tree_quarter(&t->tree, node, i, &child) &&
-            terrimpi_page_planes(t, &child, frustum, planes) != TERRIMP_PLANES_OUTSIDE)
-            all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
-    own->divides = all ? p->pass : 0u;
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
+            (!uses && terrimpi_page_of(p, child.number)))
+            continue;
+        terrimpi_terrain_node_box(t, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
+        if (!all && !uses) { /* it does not come: once more */
+            uses = 1;
+            i = 0xffffffffu;
+        }
+    }
     return all;
 }
 
@@ -8936,7 +8949,6 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 {
     uint32_t level, number, late = 0;
     terrimp_node below;
-    t->tree.pages->pass++;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
         terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
         terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
@@ -8948,10 +8960,11 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
             if (mark->measure < 1.0f ||
                 (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
                                        TERRIMP_SQRTF(mark->measure)) &&
-                 terrimpi_page_has_around(mip, &node)))
+                 (late == 0 || terrimpi_page_has_around(mip, &node))))
                 continue;
             mark->measure = 0.0f;
             late++;
+            t->tree.pages->strays = 1;
         }
     return late;
 }
@@ -9016,19 +9029,38 @@ TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp
     return TERRIMP_OK;
 }
 
+/* The terrain that pages belong to: terrimp_pages_open puts them behind it. */
+static const terrimp_terrain *terrimpi_page_terrain(const terrimp_quadtree *t)
+{
+    return (const terrimp_terrain *)(const void *)t->pages - 1;
+}
+
 /* The ground at a position: of the finest node whose page is here. */
-static terrimp_result terrimpi_page_at(const terrimp_terrain *t, float x, float z,
+static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z,
                                        terrimp_heightfield *ground, uint32_t *level)
 {
     terrimp_node n;
-    TERRIMPI_TRY(terrimp_quadtree_find(&t->tree, 0, x, z, &n));
-    while (!terrimpi_page_of(t->tree.pages, n.number)) {
-        TERRIMPI_REFUSE(n.level + 1u == t->tree.level_count, TERRIMP_E_PAGE);
-        n = terrimpi_tree_parent(&t->tree, &n);
+    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, &n));
+    while (!terrimpi_page_of(t->pages, n.number)) {
+        TERRIMPI_REFUSE(n.level + 1u == t->level_count, TERRIMP_E_PAGE);
+        n = terrimpi_tree_parent(t, &n);
     }
-    *ground = terrimpi_page_field(t, n.number);
+    *ground = terrimpi_page_field(terrimpi_page_terrain(t), n.number);
     *level = n.level;
     return TERRIMP_OK;
+}
+
+/* A sample; HORIZON_ALL when its page is not here. */
+static float terrimpi_page_sample(const terrimp_quadtree *t, uint32_t x, uint32_t z)
+{
+    uint32_t i = terrimpi_min_u32(x / t->chunk_quads, t->level_x[0] - 1u);
+    uint32_t j = terrimpi_min_u32(z / t->chunk_quads, t->level_z[0] - 1u);
+    terrimp_node n = terrimpi_tree_at(t, 0, i, j);
+    terrimp_heightfield f;
+    if (!terrimpi_page_of(t->pages, n.number))
+        return TERRIMPI_HORIZON_ALL;
+    f = terrimpi_page_field(terrimpi_page_terrain(t), n.number);
+    return terrimpi_field_sample(&f, x - i * t->chunk_quads, z - j * t->chunk_quads);
 }
 
 /* ---- opening ---- */
@@ -9070,7 +9102,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     static const terrimpi_page_calls calls = {
         terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
         terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_fill_ground,
-        terrimpi_page_at};
+        terrimpi_page_at,         terrimpi_page_sample};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages p;
@@ -9129,7 +9161,7 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
                                              height));
     f = terrain->desc.field;
     if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrain->tree.pages->calls->at(terrain, x, z, &f, &found));
+        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
         TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
@@ -9827,7 +9859,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages &&
-                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.hider), TERRIMP_E_RANGE);
+                    d.morph_ratio > 1.0f, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -10148,13 +10180,13 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0; /* too much of what a picture may be off goes to how far eyes are apart */
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
-        (f->terrain->real && /* and it is no repetition of a whole node */
-         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0))
+    if (f->terrain->real && /* and it is no repetition of a whole node */
+        terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0)
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
+    if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
+        closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
     pages = f->terrain->tree.pages;
     return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
@@ -10229,6 +10261,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
     const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     cull->count = cull->ground_count = cull->impostor_count = cull->hidden_count = 0;
@@ -10239,6 +10272,8 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         terrimp_box box;
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
+        if (pages)
+            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -11093,7 +11128,13 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
     uint32_t i;
-    if (terrimpi_view_full(&v->desc)) {
+    mip.whole = 0.0f;
+    if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
+        const terrimp_heightfield *field = &f->terrain->desc.field;
+        mip.whole = v->desc.mode == TERRIMP_MODE_FULL
+                        ? -1.0f : v->desc.fade_start + 4.0f * (float)v->terrain->desc.chunk_quads *
+                                      terrimpi_max(field->spacing_x, field->spacing_z);
+    } else if (terrimpi_view_full(&v->desc)) {
         if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
             return TERRIMP_E_CAPACITY;
         terrimpi_view_make_regions(v, NULL);
@@ -11105,15 +11146,16 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
         if (pages) {
             pages->want_count = f->wants; /* those of a try before are of no use */
+            pages->strays = f->desc->hider != NULL;
             v->late = pages->calls->settle(f->terrain, &mip);
         }
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
-        if (v->ground_scale >= most)
+        if (v->ground_scale >= most || mip.whole < 0.0f)
             return TERRIMP_E_CAPACITY;
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
-    terrimpi_view_make_regions(v, &mip);
+    terrimpi_view_make_regions(v, mip.whole < 0.0f && v->late == 0 ? NULL : &mip);
     if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
         float ahead[3];
         for (i = 0; i < 3u; i++)
@@ -11547,7 +11589,8 @@ static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], ter
 }
 
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
-   `room` triangles it may be cut, if no other one is. Returns 0 when it cannot be made. */
+   `room` triangles it may be cut, if no other one is; 0: it only asks for its pages. Returns 0 when
+   it cannot be made. */
 static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, uint32_t room,
                                 terrimpi_job *job)
 {
@@ -11589,7 +11632,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
@@ -11744,6 +11787,14 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
+/* Asks for the pages of a picture that has to wait: so they come meanwhile, and stay. */
+static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
+{
+    terrimpi_job job;
+    if (v->terrain->tree.pages && c->urgency >= 1.0f)
+        terrimpi_job_prepare(v, c, 0, &job);
+}
+
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
@@ -11755,8 +11806,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
-        (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
-        !terrimpi_job_prepare(v, c, room, job))
+        (d->max_capture_texels && s->texels >= d->max_capture_texels)) {
+        terrimpi_view_await(v, c);
+        return 0;
+    }
+    if (!terrimpi_job_prepare(v, c, room, job))
         return 0;
     room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
