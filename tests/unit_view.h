@@ -540,7 +540,7 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
     CHECK(terrimp_terrain_get_mesh(f->l->terrain, command->node, &mesh) == TERRIMP_OK);
     step = mesh.vertex_count / 5u + 1u;
     for (i = 0; i < mesh.vertex_count; i += step) {
-        double p[3], seen[4], clip[4], out[4], x, y;
+        double p[3], seen[4], clip[4], out[4], x, y, depth;
         double rim = 0.01 + 4e-5 * (double)(capture->slot.width + capture->slot.height), rim_y;
         int shown = 0, k;
         oracle_widen(f->l->xyz + (size_t)(command->base_vertex + i) * 3u, p);
@@ -548,6 +548,9 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
             p[k] -= (double)command->eye[k];
         oracle_transform(view, p, seen);
         oracle_transform4(capture->projection, seen, clip);
+        depth = clip[2] / clip[3]; /* as the picture has it */
+        if (!f->camera.depth_zero_to_one)
+            depth = 0.5 * depth + 0.5;
         oracle_transform(command->texture_matrix, p, out);
         x = out[0] / out[3] * size - (double)capture->slot.x;
         y = out[1] / out[3] * size - (double)capture->slot.y;
@@ -559,8 +562,9 @@ static void check_texture(const flight *f, const terrimp_impostor_command *comma
         CHECK(fabs(y - (clip[1] / clip[3] * 0.5 + 0.5) * (double)capture->slot.height) < rim_y);
         if (f->desc.exact_depth) { /* and back */
             double in_atlas[3], place[4];
-            for (k = 0; k < 3; k++)
-                in_atlas[k] = out[k] / out[3];
+            in_atlas[0] = out[0] / out[3];
+            in_atlas[1] = out[1] / out[3];
+            in_atlas[2] = depth;
             oracle_transform(command->place_matrix, in_atlas, place);
             for (k = 0; k < 3; k++)
                 CHECK(fabs(place[k] / place[3] + (double)f->middle[k] -
@@ -1419,6 +1423,7 @@ static void flights_with_split_pictures_keep_every_law(void)
     d.max_angle_rad = 0.5f;
     d.costs.capture = d.costs.impostor_px = 1e-3f;
     d.costs.ground_px = 10.0f;
+    d.exact_depth = 1;
     if (land_build(&l)) {
         (void)fly_and_check(&l, &d, 150, &flight_room);
         CHECK(flight_room.total_splits > 2);
