@@ -1517,8 +1517,8 @@ typedef struct terrimp_view_desc {
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
                                much times the root of tolerance_px, but 5 to 15 degrees] */
-    float texels_per_px;    /* sharpness of a picture when it is made; 0.7 of it where the atlases are
-                               full: what has no room even then is ground
+    float texels_per_px;    /* sharpness of a picture when it is made; 0.7 of it where the atlases
+                               are full: what has no room even then is ground
                                [Limits: 0.1..8] [Default 0 -> 2; in AUTO 2 over the root of
                                tolerance_px, but 0.7 to 2] */
     float impostor_px;      /* AUTO: an impostor whose side covers more pixels is split
@@ -11497,7 +11497,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     }
 }
 
-/* The texels a pixel that the next frame's pictures get: all alike what the atlases have room for. */
+/* The texels a pixel that the next frame's pictures get: what the atlases have room for. */
 static float terrimpi_view_density(const terrimp_view_desc *d, float pixels)
 {
     float side = (float)d->atlas_size;
