@@ -18809,19 +18809,26 @@ static void terrimpi_depth_match(terrimpi_depth *d)
     }
 }
 
+/* The corner at one end of a side of a cell: the same one as at that end of the opposite side of
+   the cell beside it. */
+static uint32_t terrimpi_depth_end(uint32_t cell, uint32_t side, uint32_t end)
+{
+    return 4u * cell + (side % 2u ? end : 2u * end) + (side < 2u ? 1u << side : 0u);
+}
+
 /* Makes one vertex of all corners that connected cells share, with the layers common to them. */
 static void terrimpi_depth_connect(terrimpi_depth *d)
 {
     uint32_t i, k;
     for (i = 0; i < 4u * d->cell_count; i++)
         d->joined[i] = i;
-    for (i = 0; i < d->cell_count; i++) {
-        uint32_t right = d->beside[4u * i], above = d->beside[4u * i + 1u];
-        for (k = 0; k < 2u && right != TERRIMPI_DEPTH_END; k++)
-            terrimpi_depth_join(d->joined, 4u * i + 1u + 2u * k, 4u * right + 2u * k);
-        for (k = 0; k < 2u && above != TERRIMPI_DEPTH_END; k++)
-            terrimpi_depth_join(d->joined, 4u * i + 2u + k, 4u * above + k);
-    }
+    for (i = 0; i < d->cell_count; i++)
+        for (k = 0; k < 4u; k++) {
+            uint32_t side = k / 2u, beside = d->beside[4u * i + side];
+            if (beside != TERRIMPI_DEPTH_END)
+                terrimpi_depth_join(d->joined, terrimpi_depth_end(i, side, k % 2u),
+                                    terrimpi_depth_end(beside, side + 2u, k % 2u));
+        }
     d->corner_count = 0;
     for (i = 0; i < 4u * d->cell_count; i++) {
         const terrimpi_depth_cell *c = &d->cells[i / 4u];
@@ -18868,6 +18875,25 @@ static void terrimpi_depth_stretch(terrimpi_depth *d, uint32_t cell)
     for (i = 0; i < 4u && !(low && high); i++)
         terrimpi_depth_fix(&d->corners[d->vertex_of[4u * cell + i]],
                            low || (!high && (upright ? i & 1u : i >> 1)));
+}
+
+/* Where a fold begins one cell touches two in the texel beside it, but goes on in the closer one
+   only: the side of the other one reaches up to it, or eyes could see between them. */
+static void terrimpi_depth_reach(terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    uint32_t side, other, k;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+        if (texel == TERRIMPI_DEPTH_END || d->beside[4u * cell + side] != TERRIMPI_DEPTH_END)
+            continue;
+        for (other = d->first_cell[texel]; other < d->first_cell[texel + 1u]; other++)
+            for (k = 0; k < 2u && terrimpi_depth_touch(c, &d->cells[other]); k++) {
+                uint32_t from = d->vertex_of[terrimpi_depth_end(cell, side, k)];
+                uint32_t to = d->vertex_of[terrimpi_depth_end(other, (side + 2u) % 4u, k)];
+                d->corners[from].at[2] = d->corners[to].at[2];
+            }
+    }
 }
 
 static uint32_t terrimpi_depth_triangle_add(terrimpi_depth *d, uint32_t a, uint32_t b, uint32_t c,
@@ -19022,6 +19048,8 @@ static void terrimpi_depth_first_mesh(terrimpi_depth *d)
     uint32_t i, k, point = 0;
     for (i = 0; i < d->cell_count; i++)
         terrimpi_depth_stretch(d, i);
+    for (i = 0; i < d->cell_count; i++)
+        terrimpi_depth_reach(d, i);
     memset(d->at, 0xff, d->corner_count * sizeof *d->at);
     memset(d->joined, 0xff, d->cell_count * sizeof *d->joined); /* from here on: its spine */
     d->triangle_count = 0;
@@ -19227,8 +19255,8 @@ static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s
     return 1;
 }
 
-/* Whether an edge of a star may collapse as far as its topology goes: borders and seams move by no
-   more than the tolerance in the picture. */
+/* Whether an edge of a star may collapse as far as its topology goes: seams move by no more than
+   the tolerance in the picture, borders by a texel: more would show eyes what is behind them. */
 static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
                               uint32_t n, const terrimpi_depth_star *t)
 {
@@ -19242,13 +19270,13 @@ static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, u
         return 0;
     for (i = 0; i < s->other_count; i++)
         if (s->open_count && s->open[i] && i != n) {
-            float flat[3][3];
+            int border = s->shared[n] == 1u && s->shared[i] == 1u;
+            float flat[3][3], limit = border ? terrimpi_min(d->tolerance, 1.0f) : d->tolerance;
             memcpy(flat[0], terrimpi_depth_at(d, from), sizeof flat[0]);
             memcpy(flat[1], terrimpi_depth_at(d, s->others[n]), sizeof flat[0]);
             memcpy(flat[2], terrimpi_depth_at(d, s->others[i]), sizeof flat[0]);
             flat[0][2] = flat[1][2] = flat[2][2] = 0.0f;
-            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <=
-                   d->tolerance * d->tolerance;
+            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <= limit * limit;
         }
     return 1;
 }
