@@ -18922,7 +18922,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
     for (k = 0; k < 2u; k++) {
         uint32_t o = d->beside[4u * cell + k + 2u], *v;
         if (o >= cell || spines[o] == TERRIMPI_DEPTH_END || d->cells[o].k0 != c->k0 ||
-            d->cells[o].k1 != c->k1)
+            d->cells[o].k1 != c->k1 || d->cells[o].sheet != c->sheet)
             continue;
         v = d->triangles[spines[o] + 1u].corner; /* 2, 1, 3 */
         if (d->corners[v[0]].at[k] < d->corners[v[2]].at[k]) {
@@ -19008,13 +19008,13 @@ static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t tria
     d->triangles[triangle].points = point;
 }
 
-/* The closer of a cell's two triangles to an opaque texel's middle, if that is closer than the one
-   that is known. */
+/* The closer of a pair of triangles to an opaque texel's middle, if that is closer than the one that
+   is known. */
 static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_point *p,
-                                  uint32_t cell, uint32_t *best, float *least)
+                                  uint32_t pair, uint32_t *best, float *least)
 {
     uint32_t t;
-    for (t = 2u * cell; t < 2u * cell + 2u; t++) {
+    for (t = pair; t < pair + 2u; t++) {
         float gap = terrimpi_depth_gap(d, p, d->triangles[t].corner);
         if (gap < *least) {
             *least = gap;
@@ -19024,28 +19024,33 @@ static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_
 }
 
 /* Finds a triangle for an opaque texel: of its own cell, else of those in the texels beside it,
-   else a spine. */
-static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point)
+   else of a spine. */
+static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point, int give)
 {
     const terrimpi_depth_cell *c = &d->cells[cell];
+    const terrimpi_depth_point *p = &d->points[point];
     float limit = d->tolerance * d->tolerance, least = TERRIMPI_FLOAT_MAX;
     uint32_t best = 0, side, i;
-    terrimpi_depth_closer(d, &d->points[point], cell, &best, &least);
+    terrimpi_depth_closer(d, p, 2u * cell, &best, &least);
     for (side = 0; side < 4u && least > limit; side++) {
         uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
         for (i = texel == TERRIMPI_DEPTH_END ? 0u : d->first_cell[texel];
              texel != TERRIMPI_DEPTH_END && i < d->first_cell[texel + 1u]; i++)
-            terrimpi_depth_closer(d, &d->points[point], i, &best, &least);
+            terrimpi_depth_closer(d, p, 2u * i, &best, &least);
     }
     if (least > limit && d->joined[cell] == TERRIMPI_DEPTH_END)
         terrimpi_depth_spine(d, cell);
-    terrimpi_depth_give(d, point, least > limit ? d->joined[cell] : best);
+    if (least > limit)
+        terrimpi_depth_closer(d, p, d->joined[cell], &best, &least);
+    if (give)
+        terrimpi_depth_give(d, point, best);
 }
 
 /* Two triangles for each cell, and the opaque texels that they stand for. */
 static void terrimpi_depth_first_mesh(terrimpi_depth *d)
 {
-    uint32_t i, k, point = 0;
+    uint32_t i, k, point;
+    int give;
     for (i = 0; i < d->cell_count; i++)
         terrimpi_depth_stretch(d, i);
     for (i = 0; i < d->cell_count; i++)
@@ -19058,15 +19063,16 @@ static void terrimpi_depth_first_mesh(terrimpi_depth *d)
         terrimpi_depth_triangle_add(d, v[0], v[1], v[2], d->cells[i].sheet);
         terrimpi_depth_triangle_add(d, v[3], v[2], v[1], d->cells[i].sheet);
     }
-    for (i = 0; i < d->cell_count; i++)
-        for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
-            terrimpi_depth_point *p = &d->points[point];
-            p->x = d->cells[i].x;
-            p->y = d->cells[i].y;
-            p->k = (uint16_t)k;
-            if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
-                terrimpi_depth_attach(d, i, point++);
-        }
+    for (give = 0; give < 2; give++) /* when all spines are as long as they come to be */
+        for (i = 0, point = 0; i < d->cell_count; i++)
+            for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
+                terrimpi_depth_point *p = &d->points[point];
+                p->x = d->cells[i].x;
+                p->y = d->cells[i].y;
+                p->k = (uint16_t)k;
+                if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
+                    terrimpi_depth_attach(d, i, point++, give);
+            }
 }
 
 /* Deals the cells out to sheets: each is what can be reached from its first cell over shared edges
