@@ -18939,7 +18939,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
         v->at[0] = (float)c->x + 0.5f;
         v->at[1] = (float)c->y + 0.5f;
         v->at[1u - level] += k & 1u ? 0.5f : -0.5f;
-        v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
+        v->at[2] = k & 2u ? (float)c->k1 + 0.5f : terrimpi_max(0.0f, (float)c->k0 - 0.5f);
         d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
     }
     spines[cell] = terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
