@@ -19008,7 +19008,7 @@ static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t tria
     d->triangles[triangle].points = point;
 }
 
-/* The closer of a pair of triangles to an opaque texel's middle, if that is closer than the one that
+/* The closer of a pair of triangles to an opaque texel's middle, if it is closer than the one that
    is known. */
 static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_point *p,
                                   uint32_t pair, uint32_t *best, float *least)
