@@ -19031,7 +19031,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
         v->at[0] = (float)c->x + 0.5f;
         v->at[1] = (float)c->y + 0.5f;
         v->at[1u - level] += k & 1u ? 0.5f : -0.5f;
-        v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
+        v->at[2] = k & 2u ? (float)c->k1 + 0.5f : terrimpi_max(0.0f, (float)c->k0 - 0.5f);
         d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
     }
     spines[cell] = terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
@@ -19100,7 +19100,7 @@ static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t tria
     d->triangles[triangle].points = point;
 }
 
-/* The closer of a pair of triangles to an opaque texel's middle, if that is closer than the one that
+/* The closer of a pair of triangles to an opaque texel's middle, if it is closer than the one that
    is known. */
 static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_point *p,
                                   uint32_t pair, uint32_t *best, float *least)
