@@ -18881,19 +18881,26 @@ static void terrimpi_depth_match(terrimpi_depth *d)
     }
 }
 
+/* The corner at one end of a side of a cell: the same one as at that end of the opposite side of
+   the cell beside it. */
+static uint32_t terrimpi_depth_end(uint32_t cell, uint32_t side, uint32_t end)
+{
+    return 4u * cell + (side % 2u ? end : 2u * end) + (side < 2u ? 1u << side : 0u);
+}
+
 /* Makes one vertex of all corners that connected cells share, with the layers common to them. */
 static void terrimpi_depth_connect(terrimpi_depth *d)
 {
     uint32_t i, k;
     for (i = 0; i < 4u * d->cell_count; i++)
         d->joined[i] = i;
-    for (i = 0; i < d->cell_count; i++) {
-        uint32_t right = d->beside[4u * i], above = d->beside[4u * i + 1u];
-        for (k = 0; k < 2u && right != TERRIMPI_DEPTH_END; k++)
-            terrimpi_depth_join(d->joined, 4u * i + 1u + 2u * k, 4u * right + 2u * k);
-        for (k = 0; k < 2u && above != TERRIMPI_DEPTH_END; k++)
-            terrimpi_depth_join(d->joined, 4u * i + 2u + k, 4u * above + k);
-    }
+    for (i = 0; i < d->cell_count; i++)
+        for (k = 0; k < 4u; k++) {
+            uint32_t side = k / 2u, beside = d->beside[4u * i + side];
+            if (beside != TERRIMPI_DEPTH_END)
+                terrimpi_depth_join(d->joined, terrimpi_depth_end(i, side, k % 2u),
+                                    terrimpi_depth_end(beside, side + 2u, k % 2u));
+        }
     d->corner_count = 0;
     for (i = 0; i < 4u * d->cell_count; i++) {
         const terrimpi_depth_cell *c = &d->cells[i / 4u];
@@ -18942,6 +18949,25 @@ static void terrimpi_depth_stretch(terrimpi_depth *d, uint32_t cell)
                            low || (!high && (upright ? i & 1u : i >> 1)));
 }
 
+/* Where a fold begins one cell touches two in the texel beside it, but goes on in the closer one
+   only: the side of the other one reaches up to it, or eyes could see between them. */
+static void terrimpi_depth_reach(terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    uint32_t side, other, k;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+        if (texel == TERRIMPI_DEPTH_END || d->beside[4u * cell + side] != TERRIMPI_DEPTH_END)
+            continue;
+        for (other = d->first_cell[texel]; other < d->first_cell[texel + 1u]; other++)
+            for (k = 0; k < 2u && terrimpi_depth_touch(c, &d->cells[other]); k++) {
+                uint32_t from = d->vertex_of[terrimpi_depth_end(cell, side, k)];
+                uint32_t to = d->vertex_of[terrimpi_depth_end(other, (side + 2u) % 4u, k)];
+                d->corners[from].at[2] = d->corners[to].at[2];
+            }
+    }
+}
+
 static uint32_t terrimpi_depth_triangle_add(terrimpi_depth *d, uint32_t a, uint32_t b, uint32_t c,
                                             uint32_t sheet)
 {
@@ -18968,7 +18994,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
     for (k = 0; k < 2u; k++) {
         uint32_t o = d->beside[4u * cell + k + 2u], *v;
         if (o >= cell || spines[o] == TERRIMPI_DEPTH_END || d->cells[o].k0 != c->k0 ||
-            d->cells[o].k1 != c->k1)
+            d->cells[o].k1 != c->k1 || d->cells[o].sheet != c->sheet)
             continue;
         v = d->triangles[spines[o] + 1u].corner; /* 2, 1, 3 */
         if (d->corners[v[0]].at[k] < d->corners[v[2]].at[k]) {
@@ -18985,7 +19011,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
         v->at[0] = (float)c->x + 0.5f;
         v->at[1] = (float)c->y + 0.5f;
         v->at[1u - level] += k & 1u ? 0.5f : -0.5f;
-        v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
+        v->at[2] = k & 2u ? (float)c->k1 + 0.5f : terrimpi_max(0.0f, (float)c->k0 - 0.5f);
         d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
     }
     spines[cell] = terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
@@ -19054,13 +19080,13 @@ static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t tria
     d->triangles[triangle].points = point;
 }
 
-/* The closer of a cell's two triangles to an opaque texel's middle, if that is closer than the one
-   that is known. */
+/* The closer of a pair of triangles to an opaque texel's middle, if it is closer than the one that
+   is known. */
 static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_point *p,
-                                  uint32_t cell, uint32_t *best, float *least)
+                                  uint32_t pair, uint32_t *best, float *least)
 {
     uint32_t t;
-    for (t = 2u * cell; t < 2u * cell + 2u; t++) {
+    for (t = pair; t < pair + 2u; t++) {
         float gap = terrimpi_depth_gap(d, p, d->triangles[t].corner);
         if (gap < *least) {
             *least = gap;
@@ -19070,30 +19096,37 @@ static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_
 }
 
 /* Finds a triangle for an opaque texel: of its own cell, else of those in the texels beside it,
-   else a spine. */
-static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point)
+   else of a spine. */
+static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point, int give)
 {
     const terrimpi_depth_cell *c = &d->cells[cell];
+    const terrimpi_depth_point *p = &d->points[point];
     float limit = d->tolerance * d->tolerance, least = TERRIMPI_FLOAT_MAX;
     uint32_t best = 0, side, i;
-    terrimpi_depth_closer(d, &d->points[point], cell, &best, &least);
+    terrimpi_depth_closer(d, p, 2u * cell, &best, &least);
     for (side = 0; side < 4u && least > limit; side++) {
         uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
         for (i = texel == TERRIMPI_DEPTH_END ? 0u : d->first_cell[texel];
              texel != TERRIMPI_DEPTH_END && i < d->first_cell[texel + 1u]; i++)
-            terrimpi_depth_closer(d, &d->points[point], i, &best, &least);
+            terrimpi_depth_closer(d, p, 2u * i, &best, &least);
     }
     if (least > limit && d->joined[cell] == TERRIMPI_DEPTH_END)
         terrimpi_depth_spine(d, cell);
-    terrimpi_depth_give(d, point, least > limit ? d->joined[cell] : best);
+    if (least > limit)
+        terrimpi_depth_closer(d, p, d->joined[cell], &best, &least);
+    if (give)
+        terrimpi_depth_give(d, point, best);
 }
 
 /* Two triangles for each cell, and the opaque texels that they stand for. */
 static void terrimpi_depth_first_mesh(terrimpi_depth *d)
 {
-    uint32_t i, k, point = 0;
+    uint32_t i, k, point;
+    int give;
     for (i = 0; i < d->cell_count; i++)
         terrimpi_depth_stretch(d, i);
+    for (i = 0; i < d->cell_count; i++)
+        terrimpi_depth_reach(d, i);
     memset(d->at, 0xff, d->corner_count * sizeof *d->at);
     memset(d->joined, 0xff, d->cell_count * sizeof *d->joined); /* from here on: its spine */
     d->triangle_count = 0;
@@ -19102,15 +19135,16 @@ static void terrimpi_depth_first_mesh(terrimpi_depth *d)
         terrimpi_depth_triangle_add(d, v[0], v[1], v[2], d->cells[i].sheet);
         terrimpi_depth_triangle_add(d, v[3], v[2], v[1], d->cells[i].sheet);
     }
-    for (i = 0; i < d->cell_count; i++)
-        for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
-            terrimpi_depth_point *p = &d->points[point];
-            p->x = d->cells[i].x;
-            p->y = d->cells[i].y;
-            p->k = (uint16_t)k;
-            if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
-                terrimpi_depth_attach(d, i, point++);
-        }
+    for (give = 0; give < 2; give++) /* when all spines are as long as they come to be */
+        for (i = 0, point = 0; i < d->cell_count; i++)
+            for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
+                terrimpi_depth_point *p = &d->points[point];
+                p->x = d->cells[i].x;
+                p->y = d->cells[i].y;
+                p->k = (uint16_t)k;
+                if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
+                    terrimpi_depth_attach(d, i, point++, give);
+            }
 }
 
 /* Deals the cells out to sheets: each is what can be reached from its first cell over shared edges
@@ -19299,8 +19333,8 @@ static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s
     return 1;
 }
 
-/* Whether an edge of a star may collapse as far as its topology goes: borders and seams move by no
-   more than the tolerance in the picture. */
+/* Whether an edge of a star may collapse as far as its topology goes: seams move by no more than
+   the tolerance in the picture, borders by a texel: more would show eyes what is behind them. */
 static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
                               uint32_t n, const terrimpi_depth_star *t)
 {
@@ -19314,13 +19348,13 @@ static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, u
         return 0;
     for (i = 0; i < s->other_count; i++)
         if (s->open_count && s->open[i] && i != n) {
-            float flat[3][3];
+            int border = s->shared[n] == 1u && s->shared[i] == 1u;
+            float flat[3][3], limit = border ? terrimpi_min(d->tolerance, 1.0f) : d->tolerance;
             memcpy(flat[0], terrimpi_depth_at(d, from), sizeof flat[0]);
             memcpy(flat[1], terrimpi_depth_at(d, s->others[n]), sizeof flat[0]);
             memcpy(flat[2], terrimpi_depth_at(d, s->others[i]), sizeof flat[0]);
             flat[0][2] = flat[1][2] = flat[2][2] = 0.0f;
-            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <=
-                   d->tolerance * d->tolerance;
+            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <= limit * limit;
         }
     return 1;
 }
