@@ -926,16 +926,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
-/* The largest rectangle of a shape that could be allocated now, for hosts that take a smaller slot
-   rather than none.
-
-   width, height  the size wanted [Limits: 1..65536]
-   size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
-              its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
-   Cost       O(free rectangles) */
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2]);
-
 /* ==== Terrain ============================================================ >>terrain */
 
 typedef struct terrimp_terrain terrimp_terrain; /* built from a heightfield; read-only then */
@@ -1527,7 +1517,8 @@ typedef struct terrimp_view_desc {
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
                                much times the root of tolerance_px, but 5 to 15 degrees] */
-    float texels_per_px;    /* sharpness of a picture when it is made
+    float texels_per_px;    /* sharpness of a picture when it is made; 0.7 of it where the atlases
+                               are full: what has no room even then is ground
                                [Limits: 0.1..8] [Default 0 -> 2; in AUTO 2 over the root of
                                tolerance_px, but 0.7 to 2] */
     float impostor_px;      /* AUTO: an impostor whose side covers more pixels is split
@@ -1536,8 +1527,8 @@ typedef struct terrimp_view_desc {
                                [Limits: 64..32768] [Default 0 -> 4096] */
     uint32_t atlas_count;   /* atlas textures [Limits: 1..16] [Default 0 -> 1] */
     uint32_t max_slot;      /* texels along a side of a picture's slot at most: what would need more
-                               is coarser [Limits: 12..atlas_size]
-                               [Default 0 -> half of atlas_size] */
+                               is coarser, and ground where 0.7 texels_per_px would need more
+                               [Limits: 12..atlas_size] [Default 0 -> half of atlas_size] */
     uint32_t max_impostors; /* pictures kept at most [Limits: 1..65534] [Default 0 -> 1024] */
     uint32_t max_ground;    /* ground nodes drawn at most; AUTO and GEOMIP coarsen the ground rather
                                than exceed it, FULL and IMPOSTOR need the chunks in sight
@@ -1604,7 +1595,9 @@ typedef struct terrimp_impostor_command {
     float place_matrix[16]; /* with exact_depth: takes (s / q, t / q, d, 1), d the depth that the
                              picture has there, 0..1, to the place relative to the frame's eye,
                              times a factor. For a host that keeps the depth of its atlases and
-                             writes that place's own: see terrimp_place_matrix. Else 0 */
+                             writes the farther of that place's depth and the mesh's own, which
+                             is in front of a slope that was hidden from the picture, but behind
+                             the ridge that hid it: see terrimp_place_matrix. Else 0 */
     float offset[2];      /* [wu] as for ground */
 } terrimp_impostor_command;
 
@@ -1651,8 +1644,7 @@ typedef struct terrimp_stats {
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
     uint64_t texels_used, texels_free; /* of all atlases */
-    uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
-                                    are made */
+    uint32_t atlas_failures;     /* pictures that found no room, so far */
     uint32_t evictions;          /* pictures given up for others, so far */
     uint32_t late;               /* nodes and pictures that pages were missing for */
     float ground_tolerance_px;   /* what max_ground and max_cost made of it */
@@ -6434,38 +6426,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2])
-{
-    uint32_t i, best_x = 0, best_y = 0;
-    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
-                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
-    for (i = 0; i < atlas->free_count; i++) {
-        const terrimp_rect *spot = &atlas->free_rects[i];
-        uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
-        uint32_t y = terrimpi_min_u32(spot->height, atlas->desc.padding + height);
-        if (x <= atlas->desc.padding || y <= atlas->desc.padding)
-            continue;
-        x -= atlas->desc.padding;
-        y -= atlas->desc.padding;
-        if (x * height < y * width) /* both products are below 2^31 + 2^16 */
-            y = x * height / width;
-        else
-            x = y * width / height;
-        if (x > 0 && y > 0 && (x > best_x || y > best_y)) {
-            best_x = x;
-            best_y = y;
-        }
-    }
-    if (atlas->unused == atlas->desc.max_slots)
-        best_x = best_y = 0;
-    size[0] = best_x;
-    size[1] = best_y;
-    return TERRIMP_OK;
-}
-
 /* ==== Terrain ============================================================ >>impl-terrain */
 /* Based on: Hess 2010, sections 3.1, 4.2 and 6.5 (coarse meshes, skirts, meshes for many chunks);
    de Boer 2000, section 2.2 (quadtree).
@@ -9640,6 +9600,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          are older are torn */
 #define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
+#define TERRIMPI_VIEW_FILL 0.7f       /* of the atlases, that pictures in use may fill, */
+#define TERRIMPI_VIEW_SOFTEST 0.7f    /* ... with so much of texels_per_px at least */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
 #define TERRIMPI_VIEW_FLIP 1.25f      /* how much cheaper another kind must be to be changed to */
 #define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
@@ -9738,6 +9700,7 @@ typedef struct terrimpi_frame {
     terrimp_frustum frustum;
     float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
+    float density;                 /* texels a pixel of what is captured */
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
@@ -10031,12 +9994,10 @@ static terrimp_rect terrimpi_cache_rect(const terrimpi_cache *c,
     return c->atlases[slot->atlas].slots[slot->slot];
 }
 
-/* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
-   but not less than a quarter of each side, is better than none. */
+/* Finds room for a picture, giving up the oldest ones that this frame does not draw. */
 static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
                                terrimpi_cache_slot_place *slot)
 {
-    uint32_t room[2];
     do {
         for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
             if (terrimp_live_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
@@ -10044,13 +10005,6 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
                 return 1;
     } while (terrimpi_cache_evict(c));
     c->failures++;
-    for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++) {
-        terrimp_live_atlas *atlas = &c->atlases[slot->atlas];
-        terrimp_live_atlas_room(atlas, size[0], size[1], room);
-        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
-            room[0] > 2u * TERRIMPI_CAPTURE_MARGIN && room[1] > 2u * TERRIMPI_CAPTURE_MARGIN)
-            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
-    }
     return 0;
 }
 
@@ -10376,8 +10330,7 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
 
 static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 {
-    return f->pixel_factor * f->desc->texels_per_px /
-           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
+    return f->pixel_factor * f->density / terrimpi_max(closest, 1e-6f * f->desc->fade_start);
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
@@ -10389,7 +10342,15 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
-                                       (f->pixel_factor * f->desc->texels_per_px), is_known);
+                                       (f->pixel_factor * f->density), is_known);
+}
+
+/* Whether a slot may be as large as the softest picture of a camera. */
+static int terrimpi_view_has_slot(const terrimpi_frame *f, const terrimp_capture *c)
+{
+    float side = terrimpi_max(c->tan_right - c->tan_left, c->tan_up - c->tan_down);
+    return side * f->side_px * TERRIMPI_VIEW_SOFTEST * f->desc->texels_per_px <=
+           (float)(f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN);
 }
 
 /* Whether a point lies over the terrain, or beyond sides where another one goes on. */
@@ -10804,6 +10765,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
+    v.frame.density = v.desc.texels_per_px;
     v.frame.desc = &made->desc;
     v.frame.terrain = v.terrain;
     *made = v;
@@ -11173,12 +11135,13 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
 
 /* ---- ground or impostors? ---- */
 
-/* Fills in what a candidate costs. Returns 0 when no camera fits: the eye is too close. */
+/* Fills in what a candidate costs. Returns 0 when no camera fits, since the eye is too close, or no
+   slot. */
 static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_cache *cache,
                                        terrimpi_candidate *c)
 {
     const terrimp_costs *costs = &f->desc->costs;
-    float k = f->side_px, density = f->desc->texels_per_px;
+    float k = f->side_px;
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
@@ -11189,7 +11152,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 0;
     if (terrimpi_camera_fit(&box, f->camera.eye,
                             f->camera.orthographic ? f->camera.forward : NULL, &camera) !=
-        TERRIMP_OK)
+            TERRIMP_OK || !terrimpi_view_has_slot(f, &camera))
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
@@ -11208,7 +11171,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     source = terrimpi_view_source(f, &c->node, c->closest, &is_known);
     c->is_known = (uint8_t)is_known;
     quads = f->terrain->desc.chunk_quads << (c->node.level - source);
-    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
+    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * f->density * f->density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
     return 1;
 }
@@ -11496,10 +11459,16 @@ static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = 
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
 };
 
+/* What a frame costs: its draws, and captures in the mean frame; and the pixels that are wanted of
+   pictures. */
+typedef struct terrimpi_frame_sums {
+    float drawn, spread, pixels;
+} terrimpi_frame_sums;
+
 /* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
-   TERRIMPI_VIEW_FLIP. Adds to what captures cost in the mean frame, and draws in this one. */
-static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float *spread,
-                                 float *drawn)
+   TERRIMPI_VIEW_FLIP. Adds it to the frame's sums. */
+static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
+                                 terrimpi_frame_sums *sums)
 {
     terrimpi_region_offer offers[TERRIMPI_VIEW_KIND_SHOWS];
     int possible[TERRIMPI_VIEW_KIND_SHOWS], kind, best = TERRIMPI_VIEW_KIND_GROUND;
@@ -11525,13 +11494,23 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
                     !v->candidates[region->first_candidate + i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
         v->kind_of[region->node] = (uint8_t)best;
-    *spread += offers[best].upkeep;
-    *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
+    sums->spread += offers[best].upkeep;
+    sums->drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
-        terrimpi_cache_picture *p = v->candidates[region->first_candidate + i].picture;
-        if (p)
-            p->seen = v->frame.number;
+        const terrimpi_candidate *c = &v->candidates[region->first_candidate + i];
+        sums->pixels += c->pixels;
+        if (c->picture)
+            c->picture->seen = v->frame.number;
     }
+}
+
+/* The texels a pixel that the next frame's pictures get: what the atlases have room for. */
+static float terrimpi_view_density(const terrimp_view_desc *d, float pixels)
+{
+    float side = (float)d->atlas_size;
+    float room = TERRIMPI_VIEW_FILL * side * side * (float)d->atlas_count;
+    return terrimpi_clamp(TERRIMP_SQRTF(room / terrimpi_max(pixels, 1.0f)),
+                          TERRIMPI_VIEW_SOFTEST * d->texels_per_px, d->texels_per_px);
 }
 
 /* ---- the schedule of captures ---- */
@@ -11604,7 +11583,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_plan *plan = &job->plan;
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
-    float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
+    float texels = 1.5f + f->desc->tolerance_px * f->density; /* bilinear, parallax */
     uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;
@@ -11630,8 +11609,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     terrimpi_mesh_write(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
     if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->mesh_xyz,
-                              mesh.vertex_count, f->side_px * f->desc->texels_per_px, largest,
-                              &plan->camera, size))
+                              mesh.vertex_count, f->side_px * f->density, largest,
+                              &plan->camera, size) ||
+        !terrimpi_view_has_slot(f, &plan->camera))
         return 0;
     distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
@@ -12005,8 +11985,8 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
 
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
-static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
-                                        float *drawn)
+static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
+                                        terrimpi_frame_sums *sums)
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
@@ -12018,10 +11998,10 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         if (!f->camera.orthographic != !v->frame.camera.orthographic)
             terrimp_view_invalidate(v); /* no picture is of use to a camera of the other kind */
         v->frame = *f;
-        *spread = *drawn = 0.0f;
+        memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->region_count; i++)
-            terrimpi_view_decide(v, &v->regions[i], spread, drawn);
-        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+            terrimpi_view_decide(v, &v->regions[i], sums);
+        v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
@@ -12033,7 +12013,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, spread, drawn, middle[2] = {0.0f, 0.0f};
+    terrimpi_frame_sums sums;
+    float reuse, middle[2] = {0.0f, 0.0f};
     int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
@@ -12049,7 +12030,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
                         TERRIMP_E_PAGE);
     }
-    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
+    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
     terrimpi_view_cancel(view);
@@ -12059,9 +12040,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     if (!terrimpi_view_full(&view->desc))
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
-    terrimpi_view_schedule(view, spread, drawn);
+    terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
     terrimpi_view_count_frame(view);
+    view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
 
@@ -12093,6 +12075,7 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
         }
         terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                          p->texture_matrix[i]);
+        camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
         if (v->cache.places)
             terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                            v->cache.places[p - v->cache.pictures].matrix[i]);
@@ -18907,19 +18890,26 @@ static void terrimpi_depth_match(terrimpi_depth *d)
     }
 }
 
+/* The corner at one end of a side of a cell: the same one as at that end of the opposite side of
+   the cell beside it. */
+static uint32_t terrimpi_depth_end(uint32_t cell, uint32_t side, uint32_t end)
+{
+    return 4u * cell + (side % 2u ? end : 2u * end) + (side < 2u ? 1u << side : 0u);
+}
+
 /* Makes one vertex of all corners that connected cells share, with the layers common to them. */
 static void terrimpi_depth_connect(terrimpi_depth *d)
 {
     uint32_t i, k;
     for (i = 0; i < 4u * d->cell_count; i++)
         d->joined[i] = i;
-    for (i = 0; i < d->cell_count; i++) {
-        uint32_t right = d->beside[4u * i], above = d->beside[4u * i + 1u];
-        for (k = 0; k < 2u && right != TERRIMPI_DEPTH_END; k++)
-            terrimpi_depth_join(d->joined, 4u * i + 1u + 2u * k, 4u * right + 2u * k);
-        for (k = 0; k < 2u && above != TERRIMPI_DEPTH_END; k++)
-            terrimpi_depth_join(d->joined, 4u * i + 2u + k, 4u * above + k);
-    }
+    for (i = 0; i < d->cell_count; i++)
+        for (k = 0; k < 4u; k++) {
+            uint32_t side = k / 2u, beside = d->beside[4u * i + side];
+            if (beside != TERRIMPI_DEPTH_END)
+                terrimpi_depth_join(d->joined, terrimpi_depth_end(i, side, k % 2u),
+                                    terrimpi_depth_end(beside, side + 2u, k % 2u));
+        }
     d->corner_count = 0;
     for (i = 0; i < 4u * d->cell_count; i++) {
         const terrimpi_depth_cell *c = &d->cells[i / 4u];
@@ -18968,6 +18958,25 @@ static void terrimpi_depth_stretch(terrimpi_depth *d, uint32_t cell)
                            low || (!high && (upright ? i & 1u : i >> 1)));
 }
 
+/* Where a fold begins one cell touches two in the texel beside it, but goes on in the closer one
+   only: the side of the other one reaches up to it, or eyes could see between them. */
+static void terrimpi_depth_reach(terrimpi_depth *d, uint32_t cell)
+{
+    const terrimpi_depth_cell *c = &d->cells[cell];
+    uint32_t side, other, k;
+    for (side = 0; side < 4u; side++) {
+        uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
+        if (texel == TERRIMPI_DEPTH_END || d->beside[4u * cell + side] != TERRIMPI_DEPTH_END)
+            continue;
+        for (other = d->first_cell[texel]; other < d->first_cell[texel + 1u]; other++)
+            for (k = 0; k < 2u && terrimpi_depth_touch(c, &d->cells[other]); k++) {
+                uint32_t from = d->vertex_of[terrimpi_depth_end(cell, side, k)];
+                uint32_t to = d->vertex_of[terrimpi_depth_end(other, (side + 2u) % 4u, k)];
+                d->corners[from].at[2] = d->corners[to].at[2];
+            }
+    }
+}
+
 static uint32_t terrimpi_depth_triangle_add(terrimpi_depth *d, uint32_t a, uint32_t b, uint32_t c,
                                             uint32_t sheet)
 {
@@ -18994,7 +19003,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
     for (k = 0; k < 2u; k++) {
         uint32_t o = d->beside[4u * cell + k + 2u], *v;
         if (o >= cell || spines[o] == TERRIMPI_DEPTH_END || d->cells[o].k0 != c->k0 ||
-            d->cells[o].k1 != c->k1)
+            d->cells[o].k1 != c->k1 || d->cells[o].sheet != c->sheet)
             continue;
         v = d->triangles[spines[o] + 1u].corner; /* 2, 1, 3 */
         if (d->corners[v[0]].at[k] < d->corners[v[2]].at[k]) {
@@ -19011,7 +19020,7 @@ static void terrimpi_depth_spine(terrimpi_depth *d, uint32_t cell)
         v->at[0] = (float)c->x + 0.5f;
         v->at[1] = (float)c->y + 0.5f;
         v->at[1u - level] += k & 1u ? 0.5f : -0.5f;
-        v->at[2] = (float)(k & 2u ? c->k1 : c->k0);
+        v->at[2] = k & 2u ? (float)c->k1 + 0.5f : terrimpi_max(0.0f, (float)c->k0 - 0.5f);
         d->at[d->corner_count++] = TERRIMPI_DEPTH_END;
     }
     spines[cell] = terrimpi_depth_triangle_add(d, first, first + 1u, first + 2u, c->sheet);
@@ -19080,13 +19089,13 @@ static void terrimpi_depth_give(terrimpi_depth *d, uint32_t point, uint32_t tria
     d->triangles[triangle].points = point;
 }
 
-/* The closer of a cell's two triangles to an opaque texel's middle, if that is closer than the one
-   that is known. */
+/* The closer of a pair of triangles to an opaque texel's middle, if it is closer than the one that
+   is known. */
 static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_point *p,
-                                  uint32_t cell, uint32_t *best, float *least)
+                                  uint32_t pair, uint32_t *best, float *least)
 {
     uint32_t t;
-    for (t = 2u * cell; t < 2u * cell + 2u; t++) {
+    for (t = pair; t < pair + 2u; t++) {
         float gap = terrimpi_depth_gap(d, p, d->triangles[t].corner);
         if (gap < *least) {
             *least = gap;
@@ -19096,30 +19105,37 @@ static void terrimpi_depth_closer(const terrimpi_depth *d, const terrimpi_depth_
 }
 
 /* Finds a triangle for an opaque texel: of its own cell, else of those in the texels beside it,
-   else a spine. */
-static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point)
+   else of a spine. */
+static void terrimpi_depth_attach(terrimpi_depth *d, uint32_t cell, uint32_t point, int give)
 {
     const terrimpi_depth_cell *c = &d->cells[cell];
+    const terrimpi_depth_point *p = &d->points[point];
     float limit = d->tolerance * d->tolerance, least = TERRIMPI_FLOAT_MAX;
     uint32_t best = 0, side, i;
-    terrimpi_depth_closer(d, &d->points[point], cell, &best, &least);
+    terrimpi_depth_closer(d, p, 2u * cell, &best, &least);
     for (side = 0; side < 4u && least > limit; side++) {
         uint32_t texel = terrimpi_depth_texel(d, c->x, c->y, side);
         for (i = texel == TERRIMPI_DEPTH_END ? 0u : d->first_cell[texel];
              texel != TERRIMPI_DEPTH_END && i < d->first_cell[texel + 1u]; i++)
-            terrimpi_depth_closer(d, &d->points[point], i, &best, &least);
+            terrimpi_depth_closer(d, p, 2u * i, &best, &least);
     }
     if (least > limit && d->joined[cell] == TERRIMPI_DEPTH_END)
         terrimpi_depth_spine(d, cell);
-    terrimpi_depth_give(d, point, least > limit ? d->joined[cell] : best);
+    if (least > limit)
+        terrimpi_depth_closer(d, p, d->joined[cell], &best, &least);
+    if (give)
+        terrimpi_depth_give(d, point, best);
 }
 
 /* Two triangles for each cell, and the opaque texels that they stand for. */
 static void terrimpi_depth_first_mesh(terrimpi_depth *d)
 {
-    uint32_t i, k, point = 0;
+    uint32_t i, k, point;
+    int give;
     for (i = 0; i < d->cell_count; i++)
         terrimpi_depth_stretch(d, i);
+    for (i = 0; i < d->cell_count; i++)
+        terrimpi_depth_reach(d, i);
     memset(d->at, 0xff, d->corner_count * sizeof *d->at);
     memset(d->joined, 0xff, d->cell_count * sizeof *d->joined); /* from here on: its spine */
     d->triangle_count = 0;
@@ -19128,15 +19144,16 @@ static void terrimpi_depth_first_mesh(terrimpi_depth *d)
         terrimpi_depth_triangle_add(d, v[0], v[1], v[2], d->cells[i].sheet);
         terrimpi_depth_triangle_add(d, v[3], v[2], v[1], d->cells[i].sheet);
     }
-    for (i = 0; i < d->cell_count; i++)
-        for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
-            terrimpi_depth_point *p = &d->points[point];
-            p->x = d->cells[i].x;
-            p->y = d->cells[i].y;
-            p->k = (uint16_t)k;
-            if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
-                terrimpi_depth_attach(d, i, point++);
-        }
+    for (give = 0; give < 2; give++) /* when all spines are as long as they come to be */
+        for (i = 0, point = 0; i < d->cell_count; i++)
+            for (k = d->cells[i].k0; k <= d->cells[i].k1; k++) {
+                terrimpi_depth_point *p = &d->points[point];
+                p->x = d->cells[i].x;
+                p->y = d->cells[i].y;
+                p->k = (uint16_t)k;
+                if (terrimpi_depth_set(d->desc, d->desc->visible, p->x, p->y, k))
+                    terrimpi_depth_attach(d, i, point++, give);
+            }
 }
 
 /* Deals the cells out to sheets: each is what can be reached from its first cell over shared edges
@@ -19325,8 +19342,8 @@ static int terrimpi_depth_covers(terrimpi_depth *d, const terrimpi_depth_star *s
     return 1;
 }
 
-/* Whether an edge of a star may collapse as far as its topology goes: borders and seams move by no
-   more than the tolerance in the picture. */
+/* Whether an edge of a star may collapse as far as its topology goes: seams move by no more than
+   the tolerance in the picture, borders by a texel: more would show eyes what is behind them. */
 static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, uint32_t from,
                               uint32_t n, const terrimpi_depth_star *t)
 {
@@ -19340,13 +19357,13 @@ static int terrimpi_depth_may(terrimpi_depth *d, const terrimpi_depth_star *s, u
         return 0;
     for (i = 0; i < s->other_count; i++)
         if (s->open_count && s->open[i] && i != n) {
-            float flat[3][3];
+            int border = s->shared[n] == 1u && s->shared[i] == 1u;
+            float flat[3][3], limit = border ? terrimpi_min(d->tolerance, 1.0f) : d->tolerance;
             memcpy(flat[0], terrimpi_depth_at(d, from), sizeof flat[0]);
             memcpy(flat[1], terrimpi_depth_at(d, s->others[n]), sizeof flat[0]);
             memcpy(flat[2], terrimpi_depth_at(d, s->others[i]), sizeof flat[0]);
             flat[0][2] = flat[1][2] = flat[2][2] = 0.0f;
-            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <=
-                   d->tolerance * d->tolerance;
+            return terrimpi_depth_to_edge(flat[0], flat[1], flat[2]) <= limit * limit;
         }
     return 1;
 }
@@ -20376,8 +20393,8 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
           terrimp_texture_coordinates take positions relative to the eye of the picture;
           exact_depth; terrimp_view_set; a hider, which hides what lies behind ridges; first what
           draws, then what builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement.
-          Gone: the pair of atlases (a benchmark has it), evict, query, rect and reset of the live
-          atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
+          Gone: the pair of atlases (a benchmark has it), evict, query, rect, reset and room of the
+          live atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
           terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any
