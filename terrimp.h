@@ -1361,6 +1361,16 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t bytes, uint32_t slot_count, void *memory,
                                               size_t memory_bytes, terrimp_terrain **terrain);
 
+/* Goes on after an edit: the blocks that reach to what was edited, and the end, have been built
+   anew. All pages are given up, and come again; what views show of it is theirs to be told
+   (terrimp_view_touch).
+
+   header      [bytes] as it is now
+   Errors      E_STATE while a page is coming; E_BAKE when the header is damaged or of another file:
+               nothing has changed */
+TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
+                                               size_t bytes);
+
 typedef enum terrimp_page_state {
     TERRIMP_PAGE_ABSENT = 0,
     TERRIMP_PAGE_COMING, /* begun, and neither put nor failed */
@@ -4550,7 +4560,8 @@ typedef struct terrimpi_page_slot {
 struct terrimp_pages {
     terrimpi_page_slot *slots; /* [slot_count] */
     unsigned char *pages;      /* [slot_count][page_bytes] */
-    const unsigned char *root; /* the record of the root */
+    unsigned char *header;     /* a copy */
+    const unsigned char *root; /* the record of the root in it */
     const float *lows;         /* heights of the floor's vertices */
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
@@ -9144,6 +9155,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
     memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
     memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
+    p.header = copy;
     p.root = copy + offsetof(terrimpi_pages_head, root);
     p.lows = (const float *)(const void *)(copy + sizeof head);
     for (i = 0; i < slot_count; i++)
@@ -9152,6 +9164,28 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     *t.tree.pages = p;
     *(terrimp_terrain *)memory = t;
     *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
+                                               size_t bytes)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages *p;
+    uint32_t i;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, header));
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    p = terrain->tree.pages;
+    TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
+    for (i = 0; i < p->slot_count; i++)
+        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].is_here, TERRIMP_E_STATE);
+    memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
+    terrain->sample_low = t.sample_low;
+    terrain->sample_high = t.sample_high;
+    memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
+    for (i = 0; i < p->slot_count; i++)
+        p->slots[i].node = p->node_count;
     return TERRIMP_OK;
 }
 

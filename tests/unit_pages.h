@@ -295,6 +295,69 @@ static void pages_are_built_in_any_order(void)
     }
 }
 
+/* After an edit: blocks that reach to it are built anew, others are as they were; old pages are
+   refused, and the new ones say what memory does. */
+static void pages_are_edited(void)
+{
+    uint32_t turn;
+    for (turn = 0; turn < 3u; turn++) {
+        paged_land p;
+        unsigned char header[TERRIMP_PAGES_HEADER_BYTES], *old;
+        size_t scratch_bytes;
+        void *scratch;
+        uint16_t *samples;
+        uint32_t i, x, z, width = 8u * random_range(16, 24), depth = random_range(90, 150), block;
+        uint32_t root, rebuilt = 0;
+        terrimp_rect edit;
+        terrimp_page_info info;
+        void *page;
+        if (!paged_prepare(&p, width, depth, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2) ||
+            !paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
+            return;
+        paged_fetch_all(&p);
+        old = (unsigned char *)malloc(p.bytes);
+        memcpy(old, p.file, p.bytes);
+        edit.x = random_range(0, width - 9u), edit.y = random_range(0, depth - 9u);
+        edit.width = edit.height = 8u;
+        samples = (uint16_t *)(void *)(uintptr_t)p.l.desc.field.samples;
+        for (z = edit.y; z < edit.y + 8u; z++)
+            for (x = edit.x; x < edit.x + 8u; x++)
+                samples[z * width + x] = (uint16_t)(samples[z * width + x] / 2u);
+        for (block = 0; block < p.block_count; block++) { /* of 32 x 32 quads, and some more */
+            uint32_t across = (width - 2u) / 32u + 1u;
+            x = block % across * 32u, z = block / across * 32u;
+            if (edit.x + 8u + 8u < x || edit.x > x + 32u + 8u || edit.y + 8u + 8u < z ||
+                edit.y > z + 32u + 8u)
+                continue;
+            CHECK(paged_build_block(&p, block) == TERRIMP_OK);
+            rebuilt++;
+        }
+        CHECK(rebuilt > 0 && rebuilt < p.block_count && paged_build_end(&p) == TERRIMP_OK);
+        scratch_bytes = terrimp_terrain_scratch_bytes(&p.l.desc);
+        scratch = malloc(scratch_bytes);
+        CHECK(terrimp_terrain_rebuild(p.l.terrain, &edit, scratch, scratch_bytes) ==
+              TERRIMP_OK);
+        memcpy(header, p.file, sizeof header);
+        header[100] ^= 1u;
+        CHECK(terrimp_pages_renew(p.opened, header, sizeof header) == TERRIMP_E_BAKE);
+        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes) == TERRIMP_OK);
+        root = p.l.info.node_count - 1u;
+        CHECK(!paged_is_here(&p, root));
+        CHECK(terrimp_page_begin(p.opened, root, &page) == TERRIMP_OK);
+        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes) == TERRIMP_E_STATE);
+        CHECK(terrimp_page_get_info(p.opened, root, &info) == TERRIMP_OK);
+        memcpy(page, old + info.offset, info.bytes);
+        CHECK(terrimp_page_put(p.opened, root) ==
+              (memcmp(page, p.file + info.offset, info.bytes) ? TERRIMP_E_BAKE : TERRIMP_OK));
+        for (i = root + 1u; i-- > 0;)
+            CHECK(paged_is_here(&p, i) || paged_fetch(&p, i) == TERRIMP_OK);
+        check_pages_say_the_same(&p, 2);
+        free(scratch);
+        free(old);
+        paged_free(&p);
+    }
+}
+
 /* Everything that can be wrong with a page that comes, or with when it comes. */
 static void pages_that_are_no_good_are_refused(void)
 {
@@ -1053,6 +1116,7 @@ static void pages_tests(void)
     RUN(bad_pages);
     RUN(pages_say_what_memory_does);
     RUN(pages_are_built_in_any_order);
+    RUN(pages_are_edited);
     RUN(pages_that_are_no_good_are_refused);
     RUN(pages_are_closed_upwards);
     RUN(pages_answer_heights_and_rays);
