@@ -5418,8 +5418,8 @@ static float terrimpi_mip_move(const terrimpi_mip_ground *g, uint32_t level, uin
 }
 
 /* The moves of a node's vertex (i, j); (i0, j0) is the node's first one on the lattice. */
-static void terrimpi_mip_vertex(const terrimpi_mip_ground *g, uint32_t level, uint32_t i0, uint32_t j0,
-                                uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
+static void terrimpi_mip_vertex(const terrimpi_mip_ground *g, uint32_t level, uint32_t i0,
+                                uint32_t j0, uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
 {
     uint32_t last = g->tree->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
     int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
