@@ -9644,8 +9644,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
-#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; when costs fall with the square
-                                         of that, for max_cost */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; for max_cost, from which costs fall
+                                         with the square of the tolerance, at least so much */
+#define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
@@ -11642,7 +11643,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->in_pieces = f->desc->max_capture_triangles ||
                      ((job->triangles > room ||
                        (f->desc->max_cost > 0.0f &&
-                        c->capture_cost > costs->triangle * (float)room)) && !v->open);
+                        terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
+                                              (float)job->triangles) >
+                            costs->triangle * (float)room)) && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -11998,6 +12001,17 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
+/* What max_cost leaves for captures: those of the mean frame, up to a share of it, and the smallest
+   piece of the picture that has been begun. */
+static float terrimpi_view_reserve(const terrimp_view *v, float spread)
+{
+    float least = (float)terrimpi_spending_least(&v->frame), piece = 0.0f;
+    if (v->open)
+        piece = v->jobs[0].cost * terrimpi_min(least / (float)v->jobs[0].triangles, 1.0f);
+    return terrimpi_max(terrimpi_min(spread, TERRIMPI_VIEW_RESERVE * v->desc.max_cost),
+                        terrimpi_min(piece, 2.0f * TERRIMPI_VIEW_RESERVE * v->desc.max_cost));
+}
+
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
 static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
@@ -12005,9 +12019,10 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    float finer = max_cost > 0.0f ? TERRIMP_SQRTF(v->cost / max_cost) : TERRIMPI_VIEW_FINER;
     uint32_t tries, i;
-    if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
-        v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
+    if (finer <= TERRIMPI_VIEW_FINER)
+        v->ground_scale = terrimpi_max(1.0f, scale * terrimpi_max(finer, TERRIMPI_VIEW_FINEST));
     for (tries = 0;; tries++) {
         TERRIMPI_TRY(terrimpi_view_cut(v, f));
         if (!f->camera.orthographic != !v->frame.camera.orthographic)
@@ -12016,11 +12031,14 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         *spread = *drawn = 0.0f;
         for (i = 0; i < v->region_count; i++)
             terrimpi_view_decide(v, &v->regions[i], spread, drawn);
-        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+        v->cost = *drawn + terrimpi_view_reserve(v, *spread);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
-        v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
+        finer = v->ground_scale;
+        v->ground_scale *= TERRIMPI_VIEW_DEARER;
+        if (finer < scale)
+            v->ground_scale = terrimpi_min(v->ground_scale, scale);
     }
 }
 
