@@ -1110,8 +1110,8 @@ static void depth_meshes_keep_to_their_layers_and_these_to_them(void)
         check_depth_mesh(&d, &m);
         check_depth_sheets(&m);
         CHECK(m.index_count / 3 < m.first_triangle_count / (i == 1 ? 500 : 4));
-        gaps = depth_mesh_gaps(&m, 600, &met);
-        CHECK(met > 300 && gaps <= (i == 1 ? 0 : met / 200));
+        gaps = depth_mesh_gaps(&m, 6000, &met);
+        CHECK(met > 3000 && gaps <= (i == 0 ? met / 2500 : 0)); /* borders move by a texel */
     }
 }
 
