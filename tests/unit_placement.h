@@ -7,6 +7,10 @@
 enum { PLACE_VIEWS = 12, PLACE_CANDIDATES = 14, PLACE_GAINS = PLACE_VIEWS * PLACE_CANDIDATES,
        PLACE_CLUSTERS = 7 };
 
+#ifndef PLACE_SETS
+#define PLACE_SETS 800 /* -DPLACE_SETS=n compares so many with the exact answer */
+#endif
+
 /* Four leaves in two groups under one root. */
 static const uint32_t place_parents[PLACE_CLUSTERS] = {4, 4, 5, 5, 6, 6, 6};
 
@@ -121,55 +125,105 @@ static void placements_are_what_they_say(void)
     CHECK(unsolved > 10 && unsolved < 250 && chosen > 300);
 }
 
-/* The most that a set takes off a view: each cluster by one picture, or by its parts. */
-static float exact_saving(const placing *p, uint32_t set, uint32_t view)
+/* How many views a set of candidates leaves unsolved, with the most that it can take off each:
+   every cluster by one picture, or by its parts. */
+static uint32_t exact_unsolved(const placing *p, float saved[PLACE_VIEWS][PLACE_CANDIDATES],
+                               uint32_t set)
 {
-    float best[PLACE_CLUSTERS] = {0, 0, 0, 0, 0, 0, 0};
-    uint32_t i, k;
+    uint32_t v, i, over = 0;
+    for (v = 0; v < p->desc.view_count; v++) {
+        float best[PLACE_CLUSTERS] = {0, 0, 0, 0, 0, 0, 0}, halves;
+        for (i = 0; i < p->desc.candidate_count; i++)
+            if ((set >> i & 1u) && saved[v][i] > best[p->candidates[i].cluster])
+                best[p->candidates[i].cluster] = saved[v][i];
+        halves = fmaxf(best[4], best[0] + best[1]) + fmaxf(best[5], best[2] + best[3]);
+        over += p->costs[v] - fmaxf(best[6], halves) > p->desc.budget * 1.00001f;
+    }
+    return over;
+}
+
+/* The least memory of all sets that leave as few views unsolved as all candidates together. */
+static float exact_placing(const placing *p, uint32_t *unsolved)
+{
+    static float memory[1u << PLACE_CANDIDATES];
+    float saved[PLACE_VIEWS][PLACE_CANDIDATES] = {{0}}, least = 1e30f;
+    uint32_t set, i, k, all = (1u << p->desc.candidate_count) - 1u;
     for (i = 0; i < p->desc.candidate_count; i++)
-        for (k = 0; (set >> i & 1u) && k < p->candidates[i].gain_count; k++) {
+        for (k = 0; k < p->candidates[i].gain_count; k++) {
             const terrimp_place_gain *g = &p->gains[p->candidates[i].first_gain + k];
-            if (g->view == view && g->saved > best[p->candidates[i].cluster])
-                best[p->candidates[i].cluster] = g->saved;
+            saved[g->view][i] = g->saved;
         }
-    return fmaxf(best[6], fmaxf(best[4], best[0] + best[1]) + fmaxf(best[5], best[2] + best[3]));
+    *unsolved = exact_unsolved(p, saved, all);
+    for (set = 0; set <= all; set++) {
+        for (i = 0; set && !(set >> i & 1u); i++) {}
+        memory[set] = set ? memory[set & (set - 1u)] + p->candidates[i].memory : 0.0f;
+        if (memory[set] < least && exact_unsolved(p, saved, set) == *unsolved)
+            least = memory[set];
+    }
+    return least;
 }
 
 /* Against all sets of candidates: as many views are solved, with nearly as little memory. */
 static void placements_take_little_more_memory_than_the_exact_answer(void)
 {
     placing *p = &place_room;
-    double sum = 0.0;
-    int n, count = 0, close = 0;
-    for (n = 0; n < 80; n++) {
+    int n, count = 0;
+    for (n = 0; n < PLACE_SETS; n++) {
         terrimp_placement out;
-        float least = 1e30f;
-        uint32_t set, v, i, fewest = 99;
+        uint32_t fewest;
+        float least;
         random_placing(p);
         CHECK(run_placing(p, &out) == TERRIMP_OK);
-        for (set = 0; set < 1u << p->desc.candidate_count; set++) {
-            float memory = 0.0f;
-            uint32_t over = 0;
-            for (i = 0; i < p->desc.candidate_count; i++)
-                memory += set >> i & 1u ? p->candidates[i].memory : 0.0f;
-            if (fewest == 0 && memory >= least)
-                continue;
-            for (v = 0; v < p->desc.view_count; v++)
-                over += p->costs[v] - exact_saving(p, set, v) > p->desc.budget * 1.00001f;
-            if (over < fewest || (over == fewest && memory < least)) {
-                fewest = over;
-                least = memory;
-            }
-        }
+        least = exact_placing(p, &fewest);
         CHECK(out.unsolved == fewest);
         if (fewest || !(least > 0.0f))
-            continue;
-        CHECK(out.memory >= least * 0.9999f && out.memory < least * 1.3f);
-        sum += (double)(out.memory / least);
-        close += out.memory <= least * 1.05f;
+            continue; /* views above the budget are lowered as far as pictures can */
+        CHECK(out.memory >= least * 0.9999f && out.memory <= least * 1.05f);
         count++;
     }
-    CHECK(count > 20 && sum < 1.02 * count && close >= count * 85 / 100);
+    CHECK(count > PLACE_SETS / 4);
+}
+
+/* A better picture of what is shown already takes the place of the other one: the first of two
+   views is solved by a small picture that is not good enough for the second. So many of these that
+   attempts to do better would not find it. */
+static void better_pictures_take_the_place_of_others(void)
+{
+    enum { COPIES = 10000 };
+    static terrimp_place_candidate candidates[2 * COPIES];
+    static terrimp_place_gain gains[3 * COPIES];
+    static float costs[2 * COPIES], left[2 * COPIES];
+    static uint8_t shown[3 * COPIES];
+    terrimp_place_desc d;
+    terrimp_placement out;
+    uint32_t i, bad = 0;
+    void *scratch;
+    memset(&d, 0, sizeof d);
+    d.candidates = candidates;
+    d.gains = gains;
+    d.parents = place_parents;
+    d.costs = costs;
+    d.cluster_count = PLACE_CLUSTERS;
+    d.candidate_count = d.view_count = 2 * COPIES;
+    d.gain_count = 3 * COPIES;
+    d.budget = 10.0f;
+    for (i = 0; i < 2 * COPIES; i++) {
+        costs[i] = 15.0f;
+        candidates[i].first_gain = i / 2 * 3 + i % 2 * 2;
+        candidates[i].gain_count = 2 - i % 2;
+        candidates[i].memory = i % 2 ? 3.0f : 1.0f;
+    }
+    for (i = 0; i < 3 * COPIES; i++) {
+        gains[i].view = i / 3 * 2 + (i % 3 > 0);
+        gains[i].saved = i % 3 == 1 ? 4.9f : 5.0f;
+    }
+    scratch = malloc(terrimp_place_scratch_bytes(&d));
+    CHECK(scratch && terrimp_place(&d, scratch, terrimp_place_scratch_bytes(&d), shown, left,
+                                   &out) == TERRIMP_OK);
+    free(scratch);
+    for (i = 0; i < 3 * COPIES; i++)
+        bad += shown[i] != (i % 3 != 1);
+    CHECK(bad == 0 && out.unsolved == 0);
 }
 
 static void placement_refuses(void)
@@ -496,6 +550,7 @@ static void placement_tests(void)
 {
     RUN(placements_are_what_they_say);
     RUN(placements_take_little_more_memory_than_the_exact_answer);
+    RUN(better_pictures_take_the_place_of_others);
     RUN(placement_refuses);
     RUN(prepared_views_keep_within_their_budget);
     RUN(prepared_sets_refuse);
