@@ -167,7 +167,8 @@ static float exact_placing(const placing *p, uint32_t *unsolved)
 static void placements_take_little_more_memory_than_the_exact_answer(void)
 {
     placing *p = &place_room;
-    int n, count = 0;
+    float worst = 0.0f;
+    int n, count = 0, more = 0;
     for (n = 0; n < PLACE_SETS; n++) {
         terrimp_placement out;
         uint32_t fewest;
@@ -175,13 +176,17 @@ static void placements_take_little_more_memory_than_the_exact_answer(void)
         random_placing(p);
         CHECK(run_placing(p, &out) == TERRIMP_OK);
         least = exact_placing(p, &fewest);
-        CHECK(out.unsolved == fewest);
+        more += out.unsolved != fewest;
         if (fewest || !(least > 0.0f))
             continue; /* views above the budget are lowered as far as pictures can */
-        CHECK(out.memory >= least * 0.9999f && out.memory <= least * 1.05f);
+        CHECK(out.memory >= least * 0.9999f);
+        worst = fmaxf(worst, out.memory / least);
         count++;
     }
-    CHECK(count > PLACE_SETS / 4);
+    CHECK(count > PLACE_SETS / 4 && more == 0 && worst <= 1.05f);
+    CHECK_NOTE("random sets", PLACE_SETS);
+    CHECK_NOTE("that leave more views unsolved than the exact answer", more);
+    CHECK_NOTE("most memory, of the exact answer's, where that solves all", (double)worst);
 }
 
 /* A better picture of what is shown already takes the place of the other one: the first of two
@@ -273,6 +278,10 @@ static void placement_refuses(void)
 }
 
 /* ---- a prepared set for a terrain ---- */
+
+#ifndef PREPARE_EYES
+#define PREPARE_EYES 1000 /* -DPREPARE_EYES=n: so many random views */
+#endif
 
 enum { PREPARE_CANDIDATES = 100000, PREPARE_GAINS = 2000000, PREPARE_VIEWS = 4096,
        PREPARE_NODES = 400 };
@@ -423,7 +432,7 @@ static void prepared_views_keep_within_their_budget(void)
     terrimpi_prepare p;
     static uint8_t whole[PREPARE_NODES], below[PREPARE_NODES], shown[PREPARE_NODES];
     float highest = 0.0f, budget;
-    uint32_t i, n, solved = 0, drawn = 0;
+    uint32_t i, n, solved = 0, drawn = 0, over = 0;
     prepare_begin(&l, &d, &s);
     prepare_run(&d, &s);
     check_prepared(&d, &s);
@@ -438,7 +447,7 @@ static void prepared_views_keep_within_their_budget(void)
     p.nodes = s.cluster_count;
     p.whole = whole;
     p.below = below;
-    for (n = 0; n < 1000; n++) {
+    for (n = 0; n < PREPARE_EYES; n++) {
         float eye[3], direction = random_float(0.0f, 6.2831f), cost;
         uint32_t x, z, view;
         terrimp_box cell;
@@ -460,17 +469,21 @@ static void prepared_views_keep_within_their_budget(void)
         terrimpi_prepare_ground(&p, &cell);
         cost = prepare_frame(&d, shown, whole, s.cluster_count - 1, eye, direction);
         CHECK(cost <= prepare_left[view] + 1.0f);
-        CHECK(cost <= budget + 1.0f || prepare_left[view] > budget);
+        over += cost > budget + 1.0f && !(prepare_left[view] > budget);
         solved += prepare_left[view] <= budget * 1.0001f;
         drawn += cost > 0.5f * prepare_left[view];
     }
-    CHECK(solved > 900 && drawn > 500);
+    CHECK(over == 0 && solved > PREPARE_EYES * 9 / 10 && drawn > PREPARE_EYES / 2);
+    CHECK_NOTE("random views", PREPARE_EYES);
+    CHECK_NOTE("over the budget, where their set says within", over);
+    CHECK_NOTE("of cells that are reported as unsolved", PREPARE_EYES - solved);
     for (i = 0, n = 0; i < s.candidate_count; i++) /* a set for each cell needs more */
         if (s.pictures[i].level == 0)
             s.candidates[n++] = s.candidates[i];
     s.candidate_count = n;
     prepare_place(&s, budget, &single);
     CHECK(shared.memory < 0.25f * single.memory);
+    CHECK_NOTE("memory, of a set for each cell", (double)(shared.memory / single.memory));
     land_free(&l);
 }
 
