@@ -1325,8 +1325,8 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    Begin, put and fail belong to the thread of the views, between update and render or after it. The
    pages that a frame uses stay where they are until the next frame's update. A page lies in its
    slot until another needs it, and what the host has made of it is good as long: a mesh has its
-   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Views of modes AUTO and
-   GEOMIP draw pages, without morph_ratio and hider. */
+   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Walls and visible sets are
+   those of the same terrain in memory. Views draw pages without morph_ratio. */
 
 #define TERRIMP_PAGES_VERSION 1u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
@@ -1801,7 +1801,7 @@ typedef int64_t terrimp_sorted_int;
 
 enum {
     TERRIMP_SORTED_LEVELS = 11,  /* of pages of 1024 quads */
-    TERRIMP_SORTED_SIDES = 16,   /* of a footprint, at most */
+    TERRIMP_SORTED_SIDES = 8,    /* of a footprint, at most */
     TERRIMP_SORTED_ABSENT = 255  /* the level of a page of which nothing is here */
 };
 
@@ -1861,10 +1861,27 @@ typedef struct terrimp_sorted_square {
     int32_t page_x, page_z; /* column and row of its page, from the origin on, any sign */
     uint8_t level;          /* 2^level quads along a side */
     uint8_t texture_level;  /* of the page */
-    uint8_t vertex_count, triangle_count; /* up to 8 and 6 */
-    uint8_t indices[18];    /* of triangles, in order */
-    terrimp_sorted_vertex vertices[8]; /* its corners (0, 0), (1, 0), (0, 1), (1, 1); middles */
+    uint8_t vertex_count, triangle_count; /* up to 6 and 4 */
+    uint8_t indices[12];    /* of triangles, in order */
+    terrimp_sorted_vertex vertices[6]; /* its corners (0, 0), (1, 0), (0, 1), (1, 1); middles */
 } terrimp_sorted_square;
+
+/* Private: a square on the way to the present one, and the 3 x 3 places at which its quarters have
+   their corners: column + 4 * row. */
+typedef struct terrimp_sorted_cell {
+    int32_t at[2];                     /* its first sample, from that of its page on */
+    terrimp_sorted_int away[2][3];     /* units from the eye to the places along each axis */
+    terrimp_sorted_height heights[11]; /* of the places, before scale and offset */
+    uint16_t sides;                    /* of the footprint that cross it */
+    uint8_t child, order;              /* quarters that were looked at; which of them is first */
+} terrimp_sorted_cell;
+
+/* Private: a side of the footprint, inside of which x * its x + z * its z + at >= 0. */
+typedef struct terrimp_sorted_side {
+    terrimp_sorted_int at;
+    int32_t x, z;
+    int32_t fall, rise; /* of that, at most, across a square of a sample */
+} terrimp_sorted_side;
 
 /* The state of a terrain and of its frame. The caller's, 2 KiB; all but two are private. */
 typedef struct terrimp_sorted {
@@ -1884,8 +1901,8 @@ typedef struct terrimp_sorted {
     terrimp_sorted_int whole[TERRIMP_SORTED_LEVELS]; /* up to here a vertex has its own height */
     float fade[TERRIMP_SORTED_LEVELS]; /* 1 / (split of the next level - whole) */
     terrimp_sorted_int texel_steps[2]; /* squared: where level 1 begins, and where it is left */
-    uint32_t side_count;         /* of the footprint: sides[0] x + sides[1] z + sides[2] >= 0 */
-    terrimp_sorted_int sides[TERRIMP_SORTED_SIDES][3];
+    uint32_t side_count;
+    terrimp_sorted_side sides[TERRIMP_SORTED_SIDES];
     int32_t bounds[2][2];        /* of the footprint: first and last page along each axis */
     int32_t rows, row, cols, col, first_col, page_row; /* pages that there are, and are done */
     int32_t corner[2];           /* first sample of the page */
@@ -1893,15 +1910,9 @@ typedef struct terrimp_sorted {
     int partial;                 /* not all of it is in the field, or here, or beside it */
     uint8_t side_levels[4];      /* from which on heights along its sides are here */
     int32_t last[2];             /* column and row of the page's last sample in the field */
-    int depth;                   /* of the stack; -1: empty */
-    struct {
-        int32_t at[2];
-        uint16_t sides;          /* of the footprint that cross it */
-        uint16_t child;
-    } stack[TERRIMP_SORTED_LEVELS + 1];
-    int32_t at[2];               /* the present square */
-    uint32_t level;
-    terrimp_sorted_int away;     /* squared, of its closest point */
+    int depth;                   /* of the stack, above which the present square is; -1: empty */
+    terrimp_sorted_cell stack[TERRIMP_SORTED_LEVELS];
+    terrimp_sorted_int away;     /* squared, of the present square's closest point */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1933,7 +1944,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 
    squares    [capacity] out
    Returns    how many; less than capacity, or 0, at the end of the frame
-   Cost       110 to 150 cycles a triangle of a processor of 2020, whatever came before
+   Cost       70 to 100 cycles a triangle of a processor of 2020, whatever came before
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
@@ -4544,6 +4555,7 @@ struct terrimp_pages {
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
+    int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
     const struct terrimpi_page_calls *calls;
@@ -4562,8 +4574,9 @@ typedef struct terrimpi_page_calls {
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
                        const float away[3]);
     void (*fill_ground)(const terrimp_terrain *t, uint32_t node, float *xyz);
-    terrimp_result (*at)(const terrimp_terrain *t, float x, float z, terrimp_heightfield *ground,
+    terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
                          uint32_t *level);
+    float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
 } terrimpi_page_calls;
 
 #define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
@@ -4949,6 +4962,7 @@ typedef struct terrimpi_mip_frame {
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
     float relief;              /* what measures are multiplied with */
+    float whole;               /* [wu] so close to the eye all is split; below 0: all in sight */
     float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
@@ -5079,14 +5093,18 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
     terrimp_box box;
     split2 = f->tree->pages ? terrimpi_mip_distance(f, node->level, node->number)
                             : f->view->distances[node->number];
-    if (!(split2 > 0.0f))
+    if (!(split2 > 0.0f) && !(f->whole > 0.0f) && !(f->whole < 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
+    if (f->whole > 0.0f && terrimpi_mip_distance2(&box, f->eye) < f->whole * f->whole)
+        return TERRIMPI_MIP_MOST;
     if (*planes) {
         *planes = terrimp_frustum_test(&f->frustum, &box, *planes);
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    if (f->whole < 0.0f)
+        return TERRIMPI_MIP_MOST;
     if (split2 >= TERRIMPI_MIP_MOST)
         return split2; /* at no distance; or it cannot be drawn at all */
     terrimpi_camera_grow(&box, f->reach);
@@ -5319,6 +5337,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
+    f.whole = 0.0f;
     terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
@@ -7703,6 +7722,13 @@ static uint32_t terrimpi_stand_last(const terrimp_quadtree *tree, uint32_t axis)
     return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
 }
 
+/* A sample; HORIZON_ALL when its page is not here. */
+static float terrimpi_stand_sample(const terrimp_quadtree *tree, uint32_t x, uint32_t z)
+{
+    return tree->pages ? tree->pages->calls->sample(tree, x, z)
+                       : terrimpi_field_sample(&tree->field, x, z);
+}
+
 /* The highest that the ground can be within so many quads of the eye: of each quad the highest
    corner or, if that is less, how far its triangles rise there. */
 static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *tree,
@@ -7720,10 +7746,10 @@ static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *
     }
     for (j = from[1]; j <= to[1]; j++)
         for (i = from[0]; i <= to[0]; i++) {
-            float a = terrimpi_field_sample(&tree->field, i, j), u, v, low, high;
-            float b = terrimpi_field_sample(&tree->field, i + 1u, j);
-            float c = terrimpi_field_sample(&tree->field, i, j + 1u);
-            float d = terrimpi_field_sample(&tree->field, i + 1u, j + 1u);
+            float a = terrimpi_stand_sample(tree, i, j), u, v, low, high;
+            float b = terrimpi_stand_sample(tree, i + 1u, j);
+            float c = terrimpi_stand_sample(tree, i, j + 1u);
+            float d = terrimpi_stand_sample(tree, i + 1u, j + 1u);
             u = (float)((int32_t)s->quad[0] - (int32_t)i) + s->within[0];
             v = (float)((int32_t)s->quad[1] - (int32_t)j) + s->within[1];
             low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
@@ -7748,7 +7774,7 @@ static int terrimpi_stand_clip(terrimp_stand *s, const terrimp_quadtree *tree,
     s->clipped[0] = quads[0] = reach / field->spacing_x;
     s->clipped[1] = quads[1] = reach / field->spacing_z;
     s->steepest = TERRIMPI_HORIZON_NONE;
-    if (tree->nodes[tree->node_count - 1u].high < s->eye - 2.0f * reach)
+    if (terrimpi_tree_kept(tree, tree->node_count - 1u)->high < s->eye - 2.0f * reach)
         return 1;
     top += terrimpi_stand_top(s, tree, quads) + 2.0f * s->error * reach;
     if (top >= s->eye)
@@ -7784,12 +7810,22 @@ static int terrimpi_stand_over(terrimp_stand *s, const terrimp_quadtree *tree, c
     return 1;
 }
 
+/* The height of the ground below an eye; returns 0 when its page is not here. */
+static int terrimpi_stand_ground(const terrimp_quadtree *tree, const float eye[3], float *ground)
+{
+    terrimp_heightfield field = tree->field;
+    uint32_t level = 0;
+    return (!tree->pages || tree->pages->calls->at(tree, eye[0], eye[2], &field, &level) ==
+                                TERRIMP_OK) &&
+           level == 0 && terrimp_heightfield_height(&field, eye[0], eye[2], ground) == TERRIMP_OK;
+}
+
 /* Looks at what a camera stands over. Returns 0 when nothing is hidden from it. */
 static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
                                 const terrimp_camera *camera, const terrimp_capture *capture,
                                 float error, float low)
 {
-    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    const terrimp_geomip_node *all = terrimpi_tree_kept(tree, tree->node_count - 1u);
     float ground;
     s->eye = camera->eye[1];
     s->error = error;
@@ -7797,8 +7833,7 @@ static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
                             terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
     return !camera->orthographic && !(camera->reach > 0.0f) &&
            terrimpi_stand_over(s, tree, camera->eye) &&
-           terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) ==
-               TERRIMP_OK &&
+           terrimpi_stand_ground(tree, camera->eye, &ground) &&
            s->eye > ground + s->low && terrimpi_stand_clip(s, tree, capture);
 }
 
@@ -7841,7 +7876,7 @@ TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
 
 static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const void *walls)
 {
-    TERRIMPI_REFUSE(!tree || !walls || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!tree || !walls || !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     return TERRIMP_OK;
 }
@@ -7887,12 +7922,14 @@ static float terrimpi_walls_lowest(const terrimp_walls *w, uint32_t axis, uint32
 
 /* ---- walls as an eye sees them ---- */
 
-/* The sample where line `line` of an axis crosses line `other` of the other one. */
+/* The sample where line `line` of an axis crosses line `other` of the other one: what is not here
+   hides nothing. */
 static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
                                      uint32_t other)
 {
-    return axis == 0 ? terrimpi_field_sample(&h->hider.tree->field, line, other)
-                     : terrimpi_field_sample(&h->hider.tree->field, other, line);
+    float height = terrimpi_stand_sample(h->hider.tree, axis == 0 ? line : other,
+                                         axis == 0 ? other : line);
+    return height < TERRIMPI_HORIZON_ALL ? height : TERRIMPI_HORIZON_NONE;
 }
 
 /* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
@@ -8060,13 +8097,13 @@ static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, floa
    one that is closest to the eye. */
 static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
 {
-    const terrimp_geomip_node *heights = &h->hider.tree->nodes[node->number];
+    const terrimp_geomip_node *heights = terrimpi_tree_kept(h->hider.tree, node->number);
     uint32_t quads = h->hider.tree->chunk_quads << node->level, k, first;
     float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
     float x = (float)((int32_t)(node->x * quads) - (int32_t)h->stand.quad[0]) - h->stand.within[0];
     float z = (float)((int32_t)(node->z * quads) - (int32_t)h->stand.quad[1]) - h->stand.within[1];
     const unsigned char *tops;
-    if (h->blind || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
+    if (h->blind || !heights || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
         return 0;
     if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->stand.eye))
         return 1;
@@ -8260,15 +8297,15 @@ TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
 static float terrimpi_horizon_node_error(const terrimp_quadtree *tree, const terrimp_node *n,
                                          int morphs)
 {
-    const terrimp_geomip_node *nodes = tree->nodes;
+    const terrimp_geomip_node *own = terrimpi_tree_kept(tree, n->number);
     uint32_t quads = tree->chunk_quads << n->level, part = (1u << n->level) - 1u;
     uint32_t last_x = tree->field.width - 1u, last_z = tree->field.depth - 1u;
     if (((n->x + 1u) * quads >= last_x && (last_x & part)) ||
         ((n->z + 1u) * quads >= last_z && (last_z & part)))
-        return nodes[n->number].high - nodes[n->number].low;
+        return own->high - own->low;
     if (morphs && n->level + 1u < tree->level_count)
-        return nodes[terrimpi_tree_parent(tree, n).number].error;
-    return nodes[n->number].error;
+        return terrimpi_tree_kept(tree, terrimpi_tree_parent(tree, n).number)->error;
+    return own->error;
 }
 
 /* The same for a draw, which at coarse borders is drawn as those beside it. */
@@ -8365,7 +8402,8 @@ static uint32_t terrimpi_sets_level_nodes(const terrimp_quadtree *tree, uint32_t
 /* What ground and nodes may be off their samples, with the rounding of heights [wu]. */
 static float terrimpi_sets_low(const terrimp_sets *s)
 {
-    const terrimp_geomip_node *all = &s->hider.tree->nodes[s->hider.tree->node_count - 1u];
+    const terrimp_geomip_node *all =
+        terrimpi_tree_kept(s->hider.tree, s->hider.tree->node_count - 1u);
     float most = terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high));
     return s->low + 1e-6f * (2.0f * most + s->reach);
 }
@@ -8384,9 +8422,11 @@ static int terrimpi_sets_begin(terrimp_hider *hider, const terrimp_camera *camer
         return 0;
     cell = terrimpi_tree_at(tree, s->cell_level, s->stand.quad[0] / quads,
                             s->stand.quad[1] / quads);
+    if (!terrimpi_tree_kept(tree, cell.number))
+        return 0;
     s->row = s->codes + (size_t)(cell.number - tree->level_first[cell.level]) *
                             terrimpi_sets_level_nodes(tree, s->node_level);
-    s->code = terrimpi_sets_code(s, tree->nodes[cell.number].low, s->stand.eye);
+    s->code = terrimpi_sets_code(s, terrimpi_tree_kept(tree, cell.number)->low, s->stand.eye);
     return 1;
 }
 
@@ -8408,7 +8448,7 @@ static int terrimpi_sets_hides(terrimp_hider *hider, const terrimp_node *node)
         &s->stand, (float)((int32_t)(node->x * quads) - (int32_t)s->stand.quad[0]) -
                        s->stand.within[0],
         (float)((int32_t)(node->z * quads) - (int32_t)s->stand.quad[1]) - s->stand.within[1],
-        (float)quads, tree->nodes[node->number].low - s->stand.low);
+        (float)quads, terrimpi_tree_kept(tree, node->number)->low - s->stand.low);
 }
 
 TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets)
@@ -8426,8 +8466,9 @@ TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrim
 TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree)
 {
     const terrimp_geomip_node *all;
-    TERRIMPI_REFUSE(!sets || !tree || !tree->nodes || !sets->codes, TERRIMP_E_NULL);
-    all = &tree->nodes[tree->node_count - 1u];
+    TERRIMPI_REFUSE(!sets || !tree || !sets->codes || !terrimpi_tree_is_built(tree),
+                    TERRIMP_E_NULL);
+    all = terrimpi_tree_kept(tree, tree->node_count - 1u);
     TERRIMPI_REFUSE(!terrimpi_finite2(sets->error, sets->low) || !terrimpi_finite(sets->reach),
                     TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(terrimp_sets_bytes(tree, sets) == 0 || !(sets->low >= 0.0f) ||
@@ -8713,9 +8754,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
     return 1;
 }
 
-/* Whether a page that has just come is that of its node, and all numbers of it are what building
-   could have made. */
-static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
+/* Whether a page that has just come is that of its node, which has a record above it, and all
+   numbers of it are what building could have made. */
+static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsigned char *record)
 {
     const struct terrimp_pages *p = t->tree.pages;
     const unsigned char *page = terrimpi_page_of(p, node);
@@ -8726,7 +8767,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     memcpy(&head, page, sizeof head);
     if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
         head.node != node ||
-        memcmp(&head.record, p->calls->record(&t->tree, node), sizeof head.record) != 0 ||
+        memcmp(&head.record, record, sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
     scan.skip_voids = 0;
@@ -8738,10 +8779,12 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
+    const unsigned char *record;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
+    record = terrain->tree.pages->calls->record(&terrain->tree, node);
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node))
+    if (terrimpi_page_ok(terrain, node, record))
         return TERRIMP_OK;
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_E_BAKE;
@@ -8785,11 +8828,13 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-/* The record of a node: its parent's page has it. NULL when that is not here. */
+/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
 static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
     terrimp_node n;
-    const unsigned char *page;
+    const unsigned char *page = terrimpi_page_of(t->pages, number);
+    if (page)
+        return page + offsetof(terrimpi_page_head, record);
     if (number + 1u == t->node_count)
         return t->pages->root;
     n = terrimpi_tree_node(t, number);
@@ -8853,22 +8898,30 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
 }
 
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
-   whether all are here. */
+   whether all are here. Then the walk that finds what is in sight comes by and uses the children,
+   unless `strays` says that it may not. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimp_frustum *frustum, int reason, float urgency)
 {
+    const struct terrimp_pages *p = t->tree.pages;
+    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
     terrimp_node child;
     terrimp_box box;
     uint32_t i;
-    int all = 1;
     if (!terrimpi_page_want(&t->tree, node, reason, urgency))
         return 0;
     for (i = 0; i < 4u; i++) {
-        if (!terrimpi_tree_quarter(&t->tree, node, i, &child))
+        if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
+            (!uses && terrimpi_page_of(p, child.number)))
             continue;
         terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
-            all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
+        if (!all && !uses) { /* it does not come: once more */
+            uses = 1;
+            i = 0xffffffffu;
+        }
     }
     return all;
 }
@@ -8907,10 +8960,11 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
             if (mark->measure < 1.0f ||
                 (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
                                        TERRIMP_SQRTF(mark->measure)) &&
-                 terrimpi_page_has_around(mip, &node)))
+                 (late == 0 || terrimpi_page_has_around(mip, &node))))
                 continue;
             mark->measure = 0.0f;
             late++;
+            t->tree.pages->strays = 1;
         }
     return late;
 }
@@ -8922,12 +8976,11 @@ static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mi
     uint32_t i, k;
     for (i = 0; i < mip->view->draw_count; i++) {
         const terrimp_node *node = &mip->view->draws[i].node;
-        int planes = 0;
-        float measure, now, soon, eye[3];
+        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
         terrimp_box box;
         if (node->level == 0)
             continue;
-        measure = terrimpi_mip_split_ratio(mip, node, &planes);
+        measure *= measure;
         terrimpi_terrain_node_box(t, node, &box);
         for (k = 0; k < 3u; k++)
             eye[k] = mip->eye[k] + away[k];
@@ -8976,19 +9029,38 @@ TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp
     return TERRIMP_OK;
 }
 
+/* The terrain that pages belong to: terrimp_pages_open puts them behind it. */
+static const terrimp_terrain *terrimpi_page_terrain(const terrimp_quadtree *t)
+{
+    return (const terrimp_terrain *)(const void *)t->pages - 1;
+}
+
 /* The ground at a position: of the finest node whose page is here. */
-static terrimp_result terrimpi_page_at(const terrimp_terrain *t, float x, float z,
+static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z,
                                        terrimp_heightfield *ground, uint32_t *level)
 {
     terrimp_node n;
-    TERRIMPI_TRY(terrimp_quadtree_find(&t->tree, 0, x, z, &n));
-    while (!terrimpi_page_of(t->tree.pages, n.number)) {
-        TERRIMPI_REFUSE(n.level + 1u == t->tree.level_count, TERRIMP_E_PAGE);
-        n = terrimpi_tree_parent(&t->tree, &n);
+    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, &n));
+    while (!terrimpi_page_of(t->pages, n.number)) {
+        TERRIMPI_REFUSE(n.level + 1u == t->level_count, TERRIMP_E_PAGE);
+        n = terrimpi_tree_parent(t, &n);
     }
-    *ground = terrimpi_page_field(t, n.number);
+    *ground = terrimpi_page_field(terrimpi_page_terrain(t), n.number);
     *level = n.level;
     return TERRIMP_OK;
+}
+
+/* A sample; HORIZON_ALL when its page is not here. */
+static float terrimpi_page_sample(const terrimp_quadtree *t, uint32_t x, uint32_t z)
+{
+    uint32_t i = terrimpi_min_u32(x / t->chunk_quads, t->level_x[0] - 1u);
+    uint32_t j = terrimpi_min_u32(z / t->chunk_quads, t->level_z[0] - 1u);
+    terrimp_node n = terrimpi_tree_at(t, 0, i, j);
+    terrimp_heightfield f;
+    if (!terrimpi_page_of(t->pages, n.number))
+        return TERRIMPI_HORIZON_ALL;
+    f = terrimpi_page_field(terrimpi_page_terrain(t), n.number);
+    return terrimpi_field_sample(&f, x - i * t->chunk_quads, z - j * t->chunk_quads);
 }
 
 /* ---- opening ---- */
@@ -9030,7 +9102,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     static const terrimpi_page_calls calls = {
         terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
         terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_fill_ground,
-        terrimpi_page_at};
+        terrimpi_page_at,         terrimpi_page_sample};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages p;
@@ -9089,7 +9161,7 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
                                              height));
     f = terrain->desc.field;
     if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrain->tree.pages->calls->at(terrain, x, z, &f, &found));
+        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
         TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
@@ -9787,7 +9859,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages &&
-                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.hider), TERRIMP_E_RANGE);
+                    d.morph_ratio > 1.0f, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -10108,13 +10180,13 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0; /* too much of what a picture may be off goes to how far eyes are apart */
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
-        (f->terrain->real && /* and it is no repetition of a whole node */
-         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0))
+    if (f->terrain->real && /* and it is no repetition of a whole node */
+        terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0)
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
+    if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
+        closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
     pages = f->terrain->tree.pages;
     return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
@@ -10189,6 +10261,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
     const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     cull->count = cull->ground_count = cull->impostor_count = cull->hidden_count = 0;
@@ -10199,6 +10272,8 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         terrimp_box box;
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
+        if (pages)
+            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -11053,7 +11128,13 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
     uint32_t i;
-    if (terrimpi_view_full(&v->desc)) {
+    mip.whole = 0.0f;
+    if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
+        const terrimp_heightfield *field = &f->terrain->desc.field;
+        mip.whole = v->desc.mode == TERRIMP_MODE_FULL
+                        ? -1.0f : v->desc.fade_start + 4.0f * (float)v->terrain->desc.chunk_quads *
+                                      terrimpi_max(field->spacing_x, field->spacing_z);
+    } else if (terrimpi_view_full(&v->desc)) {
         if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
             return TERRIMP_E_CAPACITY;
         terrimpi_view_make_regions(v, NULL);
@@ -11065,15 +11146,16 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
         if (pages) {
             pages->want_count = f->wants; /* those of a try before are of no use */
+            pages->strays = f->desc->hider != NULL;
             v->late = pages->calls->settle(f->terrain, &mip);
         }
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
-        if (v->ground_scale >= most)
+        if (v->ground_scale >= most || mip.whole < 0.0f)
             return TERRIMP_E_CAPACITY;
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
-    terrimpi_view_make_regions(v, &mip);
+    terrimpi_view_make_regions(v, mip.whole < 0.0f && v->late == 0 ? NULL : &mip);
     if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
         float ahead[3];
         for (i = 0; i < 3u; i++)
@@ -11507,7 +11589,8 @@ static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], ter
 }
 
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
-   `room` triangles it may be cut, if no other one is. Returns 0 when it cannot be made. */
+   `room` triangles it may be cut, if no other one is; 0: it only asks for its pages. Returns 0 when
+   it cannot be made. */
 static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, uint32_t room,
                                 terrimpi_job *job)
 {
@@ -11549,7 +11632,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
@@ -11704,6 +11787,14 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
+/* Asks for the pages of a picture that has to wait: so they come meanwhile, and stay. */
+static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
+{
+    terrimpi_job job;
+    if (v->terrain->tree.pages && c->urgency >= 1.0f)
+        terrimpi_job_prepare(v, c, 0, &job);
+}
+
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
@@ -11715,8 +11806,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
-        (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
-        !terrimpi_job_prepare(v, c, room, job))
+        (d->max_capture_texels && s->texels >= d->max_capture_texels)) {
+        terrimpi_view_await(v, c);
+        return 0;
+    }
+    if (!terrimpi_job_prepare(v, c, room, job))
         return 0;
     room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
@@ -12153,7 +12247,8 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
    sqrt(5) sides of its own level farther away than split[a + 1] while it is there, its neighbours
    less than sqrt(2) sides more, 1.83 sides of theirs, and up to 1.875 of them beyond the place
    where their level begins vertices have their own height. So a height is a function of the place
-   and of the eye alone, for both pages at a border too, and a continuous one of the eye.
+   and of the eye alone, for both pages at a border too, and a continuous one of the eye. It is made
+   once for all quarters of a square: their corners are the 3 x 3 places of the square.
 
    All distances are whole numbers of units of 1/8 sample or less: the same on every machine. */
 
@@ -12271,21 +12366,22 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
 
 /* ---- the footprint ---- */
 
-/* Points in plan, in samples from the corner of the eye's page. */
+/* Points in plan, in samples from the corner of the eye's page, and the rectangle around them. */
 typedef struct terrimpi_sorted_hull {
-    float at[16][2];
+    float at[16][2], low[2], high[2];
     int count;
-    float farthest; /* from the corner, along an axis */
 } terrimpi_sorted_hull;
 
 static void terrimpi_sorted_hull_add(terrimpi_sorted_hull *hull, const float a[3], const float b[3],
                                      float part)
 {
+    int k, first = hull->count == 0;
     float *at = hull->at[hull->count++];
-    at[0] = a[0] + (b[0] - a[0]) * part;
-    at[1] = a[2] + (b[2] - a[2]) * part;
-    hull->farthest = terrimpi_max(hull->farthest, terrimpi_max(terrimpi_abs(at[0]),
-                                                               terrimpi_abs(at[1])));
+    for (k = 0; k < 2; k++) {
+        at[k] = a[2 * k] + (b[2 * k] - a[2 * k]) * part;
+        hull->low[k] = first ? at[k] : terrimpi_min(hull->low[k], at[k]);
+        hull->high[k] = first ? at[k] : terrimpi_max(hull->high[k], at[k]);
+    }
 }
 
 /* Adds where an edge of the frustum ends or leaves the heights that there are. */
@@ -12319,7 +12415,6 @@ static void terrimpi_sorted_hull_frustum(const terrimp_sorted_desc *d, const ter
             corner[i][k] = eye[k] + way * z_far / size;
         }
     hull->count = 0;
-    hull->farthest = 0.0f;
     for (i = 0; i < 4; i++) {
         terrimpi_sorted_hull_edge(hull, eye, corner[i], d->low, d->high);
         terrimpi_sorted_hull_edge(hull, corner[i], corner[(i + 1) & 3], d->low, d->high);
@@ -12345,21 +12440,24 @@ static int terrimpi_sorted_hull_next(const terrimpi_sorted_hull *hull, int from)
     return best;
 }
 
-/* A side of the footprint: its direction is rounded, but none of the points is left outside, nor
-   what is within a sample of them. */
-static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *hull, float x,
-                                 float z)
+/* A side of the footprint, between two points: its direction is rounded, but none of the points is
+   left outside, nor what is within a sample of them. */
+static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *hull, int from,
+                                 int to)
 {
+    float x = hull->at[to][0] - hull->at[from][0], z = hull->at[to][1] - hull->at[from][1];
     float size = 8192.0f / terrimpi_max(terrimpi_abs(x), terrimpi_abs(z)), least = 0.0f;
-    terrimp_sorted_int *side = s->sides[s->side_count++];
+    terrimp_sorted_side *side = &s->sides[s->side_count++];
     int i;
-    side[0] = (terrimp_sorted_int)(-z * size);
-    side[1] = (terrimp_sorted_int)(x * size);
+    side->x = (int32_t)(-z * size);
+    side->z = (int32_t)(x * size);
     for (i = 0; i < hull->count; i++) {
-        float at = (float)side[0] * hull->at[i][0] + (float)side[1] * hull->at[i][1];
+        float at = (float)side->x * hull->at[i][0] + (float)side->z * hull->at[i][1];
         least = i == 0 ? at : terrimpi_min(least, at);
     }
-    side[2] = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
+    side->at = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
+    side->fall = (side->x < 0 ? -side->x : 0) + (side->z < 0 ? -side->z : 0);
+    side->rise = side->x + side->z + side->fall;
 }
 
 static int32_t terrimpi_sorted_larger(int32_t a, int32_t b) { return a > b ? a : b; }
@@ -12375,50 +12473,41 @@ static int32_t terrimpi_sorted_floor(float value)
 static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_hull *hull)
 {
     float page = (float)s->desc.page_quads;
-    int i, k, first = 0, from, to, least[2] = { 0, 0 }, most[2] = { 0, 0 };
-    s->side_count = 0;
-    for (i = 0; i < hull->count; i++)
-        for (k = 0; k < 2; k++) {
-            const float *p = hull->at[i], *q = hull->at[least[k]];
-            least[k] = p[k] < q[k] || (p[k] == q[k] && p[1 - k] < q[1 - k]) ? i : least[k];
-            most[k] = hull->at[i][k] > hull->at[most[k]][k] ? i : most[k];
-        }
+    int i, k, first = 0, from, to;
     for (k = 0; k < 2; k++) {
-        s->bounds[k][0] = terrimpi_sorted_floor((hull->at[least[k]][k] - 1.0f) / page);
-        s->bounds[k][1] = terrimpi_sorted_floor((hull->at[most[k]][k] + 1.0f) / page);
+        s->bounds[k][0] = terrimpi_sorted_floor((hull->low[k] - 1.0f) / page);
+        s->bounds[k][1] = terrimpi_sorted_floor((hull->high[k] + 1.0f) / page);
     }
-    for (from = first = least[0]; s->side_count < TERRIMP_SORTED_SIDES; from = to) {
-        float x, z;
+    for (i = 1; i < hull->count; i++) {
+        const float *p = hull->at[i], *q = hull->at[first];
+        first = p[0] < q[0] || (p[0] == q[0] && p[1] < q[1]) ? i : first;
+    }
+    s->side_count = 0;
+    from = first;
+    do {
         to = terrimpi_sorted_hull_next(hull, from);
-        x = hull->at[to][0] - hull->at[from][0];
-        z = hull->at[to][1] - hull->at[from][1];
-        if (to == from || !(x * x + z * z > 0.0f))
+        if (to == from)
             return;
-        terrimpi_sorted_side(s, hull, x, z);
-        if (to == first)
-            return;
-    }
+        terrimpi_sorted_side(s, hull, from, to);
+        from = to;
+    } while (to != first && s->side_count < TERRIMP_SORTED_SIDES);
 }
 
-/* Which of the sides of a mask cross a square; -1: it is outside of one. */
-static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], int32_t size,
-                                 uint32_t mask)
+/* Which of a square's sides of the footprint cross it; -1: it is outside of one. */
+static int terrimpi_sorted_sides(const terrimp_sorted *s, const terrimp_sorted_cell *c,
+                                 uint32_t level)
 {
-    uint32_t i, crossing = 0;
-    for (i = 0; mask >> i; i++) {
-        const terrimp_sorted_int *n = s->sides[i];
-        terrimp_sorted_int here, most, least;
-        if (!(mask >> i & 1u))
-            continue;
-        here = n[0] * at[0] + n[1] * at[1] + n[2];
-        most = here + (n[0] > 0 ? n[0] : 0) * size + (n[1] > 0 ? n[1] : 0) * size;
-        least = here + (n[0] < 0 ? n[0] : 0) * size + (n[1] < 0 ? n[1] : 0) * size;
-        if (most < 0)
-            return -1;
-        if (least < 0)
-            crossing |= 1u << i;
-    }
-    return (int)crossing;
+    terrimp_sorted_int x = s->corner[0] + c->at[0], z = s->corner[1] + c->at[1];
+    const terrimp_sorted_side *side = s->sides;
+    int bit, mask = c->sides, crossing = 0;
+    for (bit = 1; bit <= mask; bit <<= 1, side++)
+        if (mask & bit) {
+            terrimp_sorted_int here = side->x * x + side->z * z + side->at;
+            if (here + ((terrimp_sorted_int)side->rise << level) < 0)
+                return -1;
+            crossing |= here < (terrimp_sorted_int)side->fall << level ? bit : 0;
+        }
+    return crossing;
 }
 
 /* First and last page of a row that the footprint can touch, or one more: sides are divided in
@@ -12426,14 +12515,14 @@ static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], i
 static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *first,
                                 int32_t *last)
 {
-    int along = s->row_axis, across = 1 - along;
+    int along = s->row_axis;
     uint32_t i;
     *first = s->bounds[along][0];
     *last = s->bounds[along][1];
     for (i = 0; i < s->side_count; i++) {
-        int32_t n = (int32_t)s->sides[i][along], m = (int32_t)s->sides[i][across];
-        int32_t most = (int32_t)(s->sides[i][2] >> s->top) + 1 +
-                       m * (m > 0 ? row + 1 : row);
+        const terrimp_sorted_side *side = &s->sides[i];
+        int32_t n = along == 0 ? side->x : side->z, m = side->x + side->z - n;
+        int32_t most = (int32_t)(side->at >> s->top) + 1 + m * (m > 0 ? row + 1 : row);
         if (n > 0)
             *first = terrimpi_sorted_larger(*first, -most / n - 1);
         else if (n < 0)
@@ -12443,14 +12532,10 @@ static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *f
 
 /* ---- levels ---- */
 
-/* The square of the distance, along an axis, from the eye to an interval of samples. */
-static terrimp_sorted_int terrimpi_sorted_away(const terrimp_sorted *s, int axis, int32_t low,
-                                               int32_t size)
+/* The way along an axis from the eye to the closest point of an interval. */
+static terrimp_sorted_int terrimpi_sorted_nearest(terrimp_sorted_int begin, terrimp_sorted_int end)
 {
-    terrimp_sorted_int before = low * s->unit[axis] - s->eye[axis];
-    terrimp_sorted_int beyond = before + size * s->unit[axis];
-    terrimp_sorted_int away = before > 0 ? before : beyond < 0 ? beyond : 0;
-    return away * away;
+    return begin > 0 ? begin : end < 0 ? end : 0;
 }
 
 /* The square of a number of units, or more than any distance. */
@@ -12481,22 +12566,156 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
+static uint32_t terrimpi_sorted_level(const terrimp_sorted *s)
+{
+    return s->top - (uint32_t)(s->depth + 1);
+}
+
 /* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
-   nodes. None is when even the neighbour that is closest, by a side, is not. */
+   nodes. Only one that is closer than the square can be, across the side that faces the eye: one
+   along each axis at most. */
 static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
-    const int32_t *at = s->at;
-    uint32_t level = s->level;
-    int32_t size = 1 << level;
-    terrimp_sorted_int x, z, split = s->split[level] - s->rise;
+    const terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    uint32_t level = terrimpi_sorted_level(s), pattern = 0;
+    terrimp_sorted_int away[2];
+    int k;
     if (level == 0 || s->away > s->whole[level])
         return 0;
-    x = terrimpi_sorted_away(s, 0, at[0], size);
-    z = terrimpi_sorted_away(s, 1, at[1], size);
-    return (uint32_t)(x + terrimpi_sorted_away(s, 1, at[1] - size, size) < split) |
-           (uint32_t)(x + terrimpi_sorted_away(s, 1, at[1] + size, size) < split) << 1 |
-           (uint32_t)(z + terrimpi_sorted_away(s, 0, at[0] - size, size) < split) << 2 |
-           (uint32_t)(z + terrimpi_sorted_away(s, 0, at[0] + size, size) < split) << 3;
+    for (k = 0; k < 2; k++)
+        away[k] = terrimpi_sorted_nearest(c->away[k][0], c->away[k][2]);
+    for (k = 0; k < 2; k++) {
+        terrimp_sorted_int size = c->away[k][2] - c->away[k][0];
+        terrimp_sorted_int beside = away[k] > 0 ? terrimpi_sorted_nearest(away[k] - size, away[k])
+                                                : terrimpi_sorted_nearest(away[k], away[k] + size);
+        if (beside * beside + away[1 - k] * away[1 - k] + s->rise < s->split[level])
+            pattern |= (away[k] > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
+    }
+    return pattern;
+}
+
+/* ---- heights ---- */
+
+static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t at)
+{
+    return at < s->last[axis] ? at : s->last[axis];
+}
+
+/* A sample of the page as it is stored. */
+static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    const void *row = (const char *)s->page.samples +
+                      (size_t)(terrimpi_sorted_clamp(s, 1, z) >> s->page.level) * s->page.row_bytes;
+    const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
+    x = terrimpi_sorted_clamp(s, 0, x) >> s->page.level;
+    switch (s->desc.field.format) {
+#ifndef TERRIMP_FIXED
+    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
+#endif
+    case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
+    case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
+    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
+    }
+}
+
+/* From which level on the heights at a place of the page are here. */
+static uint32_t terrimpi_sorted_here(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    int32_t quads = (int32_t)s->desc.page_quads;
+    uint32_t level = s->page.level;
+    if (z == 0)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z0]);
+    if (z == quads)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z1]);
+    if (x == 0)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X0]);
+    if (x == quads)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X1]);
+    return level;
+}
+
+/* from + (to - from) * part / whole. Ends and halves are exact, so that an edge is the same for
+   both of its sides. */
+static terrimp_sorted_height terrimpi_sorted_mix(terrimp_sorted_height from,
+                                                 terrimp_sorted_height to, int32_t part,
+                                                 int32_t whole)
+{
+    if (part * 2 == whole)
+        return (from + to) / 2;
+    if (part == whole)
+        return to;
+#ifdef TERRIMP_FIXED
+    return from + (to - from) / 16 * part / whole * 16;
+#else
+    return from + (to - from) * ((float)part / (float)whole);
+#endif
+}
+
+/* What a height that is not a corner of its square rests on where the next level begins: mostly the
+   middle between two others, at its sides or on the diagonal. Where the field ends within the
+   square it is a place of one of its two triangles. */
+static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s,
+                                                  const terrimp_sorted_cell *c, uint32_t place,
+                                                  int32_t x, int32_t z, int32_t size)
+{
+    uint32_t step = place & 5u;
+    terrimp_sorted_height from = c->heights[place - step], to = c->heights[place + step], corner;
+    int32_t u, v, width, length;
+    if (!s->partial)
+        return (from + to) / 2;
+    u = terrimpi_sorted_clamp(s, 0, x) - c->at[0];
+    v = terrimpi_sorted_clamp(s, 1, z) - c->at[1];
+    width = terrimpi_sorted_clamp(s, 0, c->at[0] + size) - c->at[0];
+    length = terrimpi_sorted_clamp(s, 1, c->at[1] + size) - c->at[1];
+    if (step == 1u)
+        return terrimpi_sorted_mix(from, to, u, width);
+    if (step == 4u || u * length == v * width)
+        return terrimpi_sorted_mix(from, to, v, length);
+    corner = c->heights[u * length > v * width ? 2 : 8];
+    if (u * length > v * width)
+        return terrimpi_sorted_mix(from, corner, u, width) - corner +
+               terrimpi_sorted_mix(corner, to, v, length);
+    return terrimpi_sorted_mix(from, corner, v, length) - corner +
+           terrimpi_sorted_mix(corner, to, u, width);
+}
+
+/* The height of a place of a square that comes when that is split, into quarters of a level. */
+static terrimp_sorted_height terrimpi_sorted_height_at(const terrimp_sorted *s,
+                                                       const terrimp_sorted_cell *c,
+                                                       uint32_t place, uint32_t level)
+{
+    uint32_t column = place & 3u, row = place >> 2;
+    int32_t x = c->at[0] + (int32_t)(column << level), z = c->at[1] + (int32_t)(row << level);
+    terrimp_sorted_int away = c->away[0][column] * c->away[0][column] +
+                              c->away[1][row] * c->away[1][row] + s->rise;
+    terrimp_sorted_int left = s->split[level + 1u] - away;
+    int here = !s->partial || terrimpi_sorted_here(s, x, z) <= level;
+    terrimp_sorted_height rest;
+    if (here && away <= s->whole[level])
+        return terrimpi_sorted_sample(s, x, z);
+    rest = terrimpi_sorted_rest(s, c, place, x, z, 2 << level);
+    if (!here || left <= 0)
+        return rest;
+#ifdef TERRIMP_FIXED
+    {
+        terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
+        int shift = range < 1 << 16 ? 0 : 15;
+        return rest + (terrimpi_sorted_sample(s, x, z) - rest) / 64 *
+                      ((left >> shift) * 64 / ((range >> shift) + 1));
+    }
+#else
+    return rest + (terrimpi_sorted_sample(s, x, z) - rest) *
+                  terrimpi_min((float)left * s->fade[level], 1.0f);
+#endif
+}
+
+/* The heights of the places of a square that is split, but for its corners. */
+static void terrimpi_sorted_fill(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
+{
+    static const uint8_t places[5] = { 1, 4, 5, 6, 9 };
+    int i;
+    for (i = 0; i < 5; i++)
+        c->heights[places[i]] = terrimpi_sorted_height_at(s, c, places[i], level);
 }
 
 /* ---- the order ---- */
@@ -12520,69 +12739,70 @@ static void terrimpi_sorted_restart(terrimp_sorted *s)
     s->triangle_count = 0;
 }
 
-/* Pushes a square on the stack, or makes it the present one: then it returns 1. */
-static int terrimpi_sorted_visit(terrimp_sorted *s, const int32_t at[2], uint32_t level,
-                                 uint32_t mask)
+/* Looks at the square above the stack, of which begin and level are known. Returns 1 if it is drawn
+   as a whole: then it is the present one; 0 after it has been pushed; -1 when it lies outside. */
+static int terrimpi_sorted_visit(terrimp_sorted *s)
 {
-    int sides = terrimpi_sorted_sides(s, at, 1 << level, mask);
-    if (sides < 0 || at[0] - s->corner[0] >= s->last[0] || at[1] - s->corner[1] >= s->last[1])
-        return 0;
-    s->at[0] = at[0];
-    s->at[1] = at[1];
-    s->level = level;
-    s->away = terrimpi_sorted_away(s, 0, at[0], 1 << level) +
-              terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise;
+    uint32_t level = terrimpi_sorted_level(s);
+    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    int k, sides = c->sides ? terrimpi_sorted_sides(s, c, level) : 0;
+    if (sides < 0 || c->at[0] >= s->last[0] || c->at[1] >= s->last[1])
+        return -1;
+    s->away = s->rise;
+    for (k = 0; k < 2; k++) {
+        terrimp_sorted_int *away = c->away[k], size = s->unit[k] << level, nearest;
+        away[1] = away[0] + (size >> 1);
+        away[2] = away[0] + size;
+        nearest = terrimpi_sorted_nearest(away[0], away[2]);
+        s->away += nearest * nearest;
+    }
     if (s->away >= s->split[level])
         return 1;
+    c->sides = (uint16_t)sides;
+    c->child = 0;
+    c->order = (uint8_t)((c->away[s->row_axis][1] > 0) | (c->away[1 - s->row_axis][1] > 0) << 1);
+    c->order ^= s->desc.front_to_back ? 3 : 0;
     s->depth++;
-    s->stack[s->depth].at[0] = at[0];
-    s->stack[s->depth].at[1] = at[1];
-    s->stack[s->depth].sides = (uint16_t)sides;
-    s->stack[s->depth].child = 0;
     return 0;
 }
 
-/* Looks at the next quarter of the square on top of the stack. Rows come before columns. */
+/* Goes to the next quarter of the square on top of the stack, of two the one first that the eye is
+   not at; rows come before columns. Returns its place; -1 after the last one. */
 static int terrimpi_sorted_quarter(terrimp_sorted *s)
 {
-    uint32_t k = s->stack[s->depth].child++, level = s->top - (uint32_t)s->depth - 1u;
-    int32_t half = 1 << level, at[2];
-    int axis;
-    if (k == 4u) {
+    terrimp_sorted_cell *c = &s->stack[s->depth];
+    uint32_t level = terrimpi_sorted_level(s), k = c->child ^ (uint32_t)c->order, x, z;
+    if (c->child++ == 4) {
         s->depth--;
-        return 0;
+        return -1;
     }
-    k = s->desc.front_to_back ? 3u - k : k;
-    for (axis = 0; axis < 2; axis++) {
-        int32_t begin = s->stack[s->depth].at[axis];
-        int eye_beyond = s->eye[axis] >= (begin + half) * s->unit[axis];
-        uint32_t closer = axis == s->row_axis ? k & 1u : k >> 1;
-        at[axis] = begin + ((int)closer == eye_beyond ? half : 0);
-    }
-    return terrimpi_sorted_visit(s, at, level, s->stack[s->depth].sides);
+    x = s->row_axis == 0 ? k & 1u : k >> 1;
+    z = s->row_axis == 0 ? k >> 1 : k & 1u;
+    c[1].at[0] = c->at[0] + (int32_t)(x << level);
+    c[1].at[1] = c->at[1] + (int32_t)(z << level);
+    c[1].away[0][0] = c->away[0][x];
+    c[1].away[1][0] = c->away[1][z];
+    c[1].sides = c->sides;
+    return (int)(x + 4u * z);
 }
 
 /* ---- pages ---- */
 
 /* The level whose texels are one to two pixels large at the page's closest point. A coarser one is
    left only a tenth closer than where it began. */
-static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int32_t page[2])
+static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s)
 {
     const terrimp_sorted_desc *d = &s->desc;
-    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0], (int32_t)d->page_quads) +
-                              terrimpi_sorted_away(s, 1, s->corner[1], (int32_t)d->page_quads) +
-                              s->rise;
     uint32_t window = d->texture_window - 1u, level = 0;
     uint8_t *kept = d->texture_levels;
     if (kept)
-        kept += ((uint32_t)page[1] & window) * d->texture_window + ((uint32_t)page[0] & window);
+        kept += ((uint32_t)s->page.z & window) * d->texture_window + ((uint32_t)s->page.x & window);
     if (kept && *kept < d->texture_level_count) {
         level = *kept;
-        while (level > 0 && away >> 2u * (level - 1u) < s->texel_steps[1])
+        while (level > 0 && s->away >> 2u * (level - 1u) < s->texel_steps[1])
             level--;
     }
-    while (level + 1u < d->texture_level_count &&
-           away >> 2u * level >= s->texel_steps[0])
+    while (level + 1u < d->texture_level_count && s->away >> 2u * level >= s->texel_steps[0])
         level++;
     if (kept)
         *kept = (uint8_t)level;
@@ -12634,39 +12854,16 @@ static int terrimpi_sorted_ask(terrimp_sorted *s, terrimp_sorted_page *page)
     return 1;
 }
 
-/* Goes to a page, counted from the eye's. to_count: only its squares are of interest. */
-static int terrimpi_sorted_enter(terrimp_sorted *s, const int32_t place[2], int to_count)
+/* Goes to the next page of the frame; 0: there is none. */
+static int terrimpi_sorted_next_page(terrimp_sorted *s)
 {
-    int32_t page[2], quads = (int32_t)s->desc.page_quads;
-    int axis;
-    for (axis = 0; axis < 2; axis++) {
-        page[axis] = place[axis] + s->eye_page[axis];
-        s->corner[axis] = place[axis] * quads;
-        s->last[axis] = quads;
-    }
-    memset(&s->page, 0, sizeof s->page);
-    s->page.x = page[0];
-    s->page.z = page[1];
-    if (!s->desc.page)
-        terrimpi_sorted_field_page(s, &s->page);
-    if (!to_count) {
-        s->page.texture_level = terrimpi_sorted_texture_level(s, page);
-        if (s->desc.page && !terrimpi_sorted_ask(s, &s->page))
-            return 0;
-    }
-    return terrimpi_sorted_visit(s, s->corner, s->top, (1u << s->side_count) - 1u);
-}
-
-/* Goes to the next page of the frame. Returns 1 when it is the present square, 0 when it is to be
-   looked into, -1 when there is none. */
-static int terrimpi_sorted_next_page(terrimp_sorted *s, int to_count)
-{
-    int along = s->row_axis, across = 1 - along;
+    int along = s->row_axis, across = 1 - along, k;
+    terrimp_sorted_cell *c = &s->stack[0];
     int32_t place[2];
     while (s->col >= s->cols) {
         int32_t last;
         if (s->row >= s->rows)
-            return -1;
+            return 0;
         s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
                                                  s->desc.front_to_back);
         terrimpi_sorted_row(s, s->page_row, &s->first_col, &last);
@@ -12676,184 +12873,78 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s, int to_count)
     place[across] = s->page_row;
     place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, 0, s->col++,
                                               s->desc.front_to_back);
-    return terrimpi_sorted_enter(s, place, to_count);
+    memset(&s->page, 0, sizeof s->page);
+    s->page.x = place[0] + s->eye_page[0];
+    s->page.z = place[1] + s->eye_page[1];
+    for (k = 0; k < 2; k++) {
+        s->last[k] = (int32_t)s->desc.page_quads;
+        s->corner[k] = place[k] * s->last[k];
+        c->at[k] = 0;
+        c->away[k][0] = s->corner[k] * s->unit[k] - s->eye[k];
+    }
+    c->sides = (uint16_t)((1u << s->side_count) - 1u);
+    if (!s->desc.page)
+        terrimpi_sorted_field_page(s, &s->page);
+    return 1;
+}
+
+/* Readies a page to be drawn; 0: it is not here. Its corners have their own heights. */
+static int terrimpi_sorted_open(terrimp_sorted *s)
+{
+    terrimp_sorted_height *heights = s->stack[0].heights;
+    int32_t last = (int32_t)s->desc.page_quads;
+    s->page.texture_level = terrimpi_sorted_texture_level(s);
+    if (s->desc.page && !terrimpi_sorted_ask(s, &s->page)) {
+        s->depth = -1;
+        return 0;
+    }
+    heights[0] = terrimpi_sorted_sample(s, 0, 0);
+    heights[2] = terrimpi_sorted_sample(s, last, 0);
+    heights[8] = terrimpi_sorted_sample(s, 0, last);
+    heights[10] = terrimpi_sorted_sample(s, last, last);
+    return 1;
+}
+
+/* Gives a quarter the corners that are places of its square. */
+static void terrimpi_sorted_inherit(const terrimp_sorted_cell *from, int place,
+                                    terrimp_sorted_cell *quarter)
+{
+    quarter->heights[0] = from->heights[place];
+    quarter->heights[2] = from->heights[place + 1];
+    quarter->heights[8] = from->heights[place + 4];
+    quarter->heights[10] = from->heights[place + 5];
+}
+
+/* Looks at the next quarter or page. Returns 1 when it is the present square, 0 when it is not, -1
+   when there is none. to_count: heights are not wanted. */
+static int terrimpi_sorted_look(terrimp_sorted *s, int to_count)
+{
+    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    int is_page = s->depth < 0, place = 0, found;
+    if (is_page && !terrimpi_sorted_next_page(s))
+        return -1;
+    if (!is_page && (place = terrimpi_sorted_quarter(s)) < 0)
+        return 0;
+    found = terrimpi_sorted_visit(s);
+    if (found < 0 || to_count)
+        return found > 0;
+    if (is_page && !terrimpi_sorted_open(s))
+        return 0;
+    if (!is_page)
+        terrimpi_sorted_inherit(c - 1, place, c);
+    if (!found)
+        terrimpi_sorted_fill(s, c, terrimpi_sorted_level(s));
+    return found;
 }
 
 /* Goes to the next square; 0: there is none. */
 static int terrimpi_sorted_step(terrimp_sorted *s, int to_count)
 {
-    for (;;) {
-        int found = s->depth < 0 ? terrimpi_sorted_next_page(s, to_count)
-                                 : terrimpi_sorted_quarter(s);
-        if (found != 0)
-            return found > 0;
-    }
-}
-
-/* ---- heights ---- */
-
-static uint32_t terrimpi_sorted_alignment(const terrimp_sorted *s, int32_t x, int32_t z,
-                                          uint32_t least)
-{
-    uint32_t bits = (uint32_t)x | (uint32_t)z;
-    while (least < s->top && !(bits >> least & 1u))
-        least++;
-    return least;
-}
-
-static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t at)
-{
-    return at < s->last[axis] ? at : s->last[axis];
-}
-
-/* A sample of the page as it is stored; column and row are of those that are here. */
-static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
-{
-    const void *row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
-    const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
-    switch (s->desc.field.format) {
-#ifndef TERRIMP_FIXED
-    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
-#endif
-    case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
-    case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
-    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
-    }
-}
-
-/* From which level on the heights at a place of the page are here. */
-static uint32_t terrimpi_sorted_here(const terrimp_sorted *s, int32_t x, int32_t z)
-{
-    int32_t quads = (int32_t)s->desc.page_quads;
-    uint32_t level = s->page.level;
-    if (z == 0)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z0]);
-    if (z == quads)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z1]);
-    if (x == 0)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X0]);
-    if (x == quads)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X1]);
-    return level;
-}
-
-static terrimp_sorted_height terrimpi_sorted_solid(const terrimp_sorted *s, int32_t x, int32_t z);
-
-/* from + (to - from) * part / whole. Halves are exact, so that an edge is the same for both. */
-static terrimp_sorted_height terrimpi_sorted_mix(terrimp_sorted_height from,
-                                                 terrimp_sorted_height to, int32_t part,
-                                                 int32_t whole)
-{
-    if (part * 2 == whole)
-        return (from + to) / 2;
-#ifdef TERRIMP_FIXED
-    return from + (to - from) / 16 * part / whole * 16;
-#else
-    return from + (to - from) * ((float)part / (float)whole);
-#endif
-}
-
-/* The height at a place of the page when only every step-th sample is there. */
-static terrimp_sorted_height terrimpi_sorted_flat(const terrimp_sorted *s, int32_t x, int32_t z,
-                                                  int32_t step)
-{
-    int32_t quads = (int32_t)s->desc.page_quads;
-    int32_t x0 = x == quads ? x - step : x - x % step, z0 = z == quads ? z - step : z - z % step;
-    int32_t left = terrimpi_sorted_clamp(s, 0, x0), back = terrimpi_sorted_clamp(s, 1, z0);
-    int32_t u = terrimpi_sorted_clamp(s, 0, x) - left, v = terrimpi_sorted_clamp(s, 1, z) - back;
-    int32_t width = terrimpi_sorted_clamp(s, 0, x0 + step) - left;
-    int32_t depth = terrimpi_sorted_clamp(s, 1, z0 + step) - back;
-    int on_right = u == width && u > 0, on_front = v == depth && v > 0;
-    terrimp_sorted_height from, corner;
-    if (u == 0 || on_right) {
-        x0 += on_right ? step : 0;
-        from = terrimpi_sorted_solid(s, x0, z0 + (on_front ? step : 0));
-        return v == 0 || on_front ? from : terrimpi_sorted_mix(
-            from, terrimpi_sorted_solid(s, x0, z0 + step), v, depth);
-    }
-    if (v == 0 || on_front) {
-        z0 += on_front ? step : 0;
-        return terrimpi_sorted_mix(terrimpi_sorted_solid(s, x0, z0),
-                                   terrimpi_sorted_solid(s, x0 + step, z0), u, width);
-    }
-    from = terrimpi_sorted_solid(s, x0, z0);
-    if (u * depth == v * width)
-        return terrimpi_sorted_mix(from, terrimpi_sorted_solid(s, x0 + step, z0 + step), v, depth);
-    if (u * depth > v * width) {
-        corner = terrimpi_sorted_solid(s, x0 + step, z0);
-        return terrimpi_sorted_mix(from, corner, u, width) - corner + terrimpi_sorted_mix(
-            corner, terrimpi_sorted_solid(s, x0 + step, z0 + step), v, depth);
-    }
-    corner = terrimpi_sorted_solid(s, x0, z0 + step);
-    return terrimpi_sorted_mix(from, corner, v, depth) - corner + terrimpi_sorted_mix(
-        corner, terrimpi_sorted_solid(s, x0 + step, z0 + step), u, width);
-}
-
-/* The height of a place without blending. Of a page that is not all here, the place may lie in a
-   square of samples that are, these on a side that is shared with a page of which less is here:
-   three times round at most. */
-static terrimp_sorted_height terrimpi_sorted_solid(const terrimp_sorted *s, int32_t x, int32_t z)
-{
-    uint32_t here = s->partial ? terrimpi_sorted_here(s, x, z) : 0;
-    if (here == 0 || terrimpi_sorted_alignment(s, x, z, 0) >= here)
-        return terrimpi_sorted_sample(s, terrimpi_sorted_clamp(s, 0, x) >> s->page.level,
-                                      terrimpi_sorted_clamp(s, 1, z) >> s->page.level);
-    return terrimpi_sorted_flat(s, x, z, 1 << here);
-}
-
-/* What a vertex on the grid of a level rests on where that of the next one begins: mostly the
-   middle between two others, at its sides or on the diagonal. */
-static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s, int32_t x, int32_t z,
-                                                  uint32_t level)
-{
-    int32_t step_x = x & 1 << level, step_z = z & 1 << level;
-    if (s->partial)
-        return terrimpi_sorted_flat(s, x, z, 2 << level);
-    return (terrimpi_sorted_sample(s, x - step_x, z - step_z) +
-            terrimpi_sorted_sample(s, x + step_x, z + step_z)) / 2;
-}
-
-/* The height of a vertex on the grid of a level, on which others no longer rest. */
-static terrimp_sorted_height terrimpi_sorted_blend(const terrimp_sorted *s, int32_t x, int32_t z,
-                                                   uint32_t level, terrimp_sorted_int away)
-{
-    terrimp_sorted_height rest = terrimpi_sorted_rest(s, x, z, level);
-    terrimp_sorted_int left = s->split[level + 1u] - away;
-    if (left <= 0)
-        return rest;
-#ifdef TERRIMP_FIXED
-    {
-        terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
-        int shift = range < 1 << 16 ? 0 : 15;
-        return rest + (terrimpi_sorted_solid(s, x, z) - rest) / 64 *
-                      ((left >> shift) * 64 / ((range >> shift) + 1));
-    }
-#else
-    return rest + (terrimpi_sorted_solid(s, x, z) - rest) *
-                  terrimpi_min((float)left * s->fade[level], 1.0f);
-#endif
-}
-
-/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. away:
-   the square of its distance. */
-static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *out, int32_t x,
-                                int32_t z, uint32_t level, terrimp_sorted_int away)
-{
-    terrimp_sorted_vertex *v = &out->vertices[out->vertex_count++];
-    terrimp_sorted_height height;
-    v->x = s->page.x * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 0, x);
-    v->z = s->page.z * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 1, z);
-    if (away > s->whole[level])
-        level = terrimpi_sorted_alignment(s, x, z, level);
-    if (away > s->whole[level])
-        height = terrimpi_sorted_blend(s, x, z, level, away);
-    else
-        height = terrimpi_sorted_solid(s, x, z);
-#ifdef TERRIMP_FIXED
-    v->height = height;
-#else
-    v->height = terrimpi_field_world_height(&s->desc.field, height);
-#endif
+    int found;
+    do
+        found = terrimpi_sorted_look(s, to_count);
+    while (found == 0);
+    return found > 0;
 }
 
 /* ---- triangles ---- */
@@ -12867,104 +12958,102 @@ static void terrimpi_sorted_triangle(terrimp_sorted_square *out, int a, int b, i
     indices[2] = (uint8_t)(turned ? b : c);
 }
 
-/* Whether of the two sides of the plane through a and b the one with the half's corner comes first
-   in the order. In the half that is not turned it is to the right of the way from a to b. */
-static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_sorted_square *out,
+/* Whether of the two sides of the plane through two places of a square the one with the half's
+   corner comes first in the order. In the half that is not turned it is to the right of the way
+   from the first place to the second. */
+static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_sorted_cell *c,
                                         int a, int b, int turned)
 {
-    const terrimp_sorted_vertex *from = &out->vertices[a], *to = &out->vertices[b];
-    int32_t quads = (int32_t)s->desc.page_quads;
-    terrimp_sorted_int x = (from->x - s->eye_page[0] * quads) * s->unit[0] - s->eye[0];
-    terrimp_sorted_int z = (from->z - s->eye_page[1] * quads) * s->unit[1] - s->eye[1];
-    terrimp_sorted_int way_x = (to->x - from->x) * s->unit[0];
-    terrimp_sorted_int way_z = (to->z - from->z) * s->unit[1];
-    int eye_left = way_z * x - way_x * z > 0;
+    int eye_left = c->away[1][b >> 2] * c->away[0][a & 3] > c->away[0][b & 3] * c->away[1][a >> 2];
     return (eye_left != turned) != (s->desc.front_to_back != 0);
 }
 
-/* The two pieces of the half that the plane through a and b cuts: one of the triangle (a, b, apex)
-   on the side of the corner, one of (b, a, rest). */
-static void terrimpi_sorted_cut(const terrimp_sorted *s, terrimp_sorted_square *out, int a, int b,
-                                int corner, int rest, int turned)
+/* Half of a square: the triangle of vertices 0, 3 and corner, whose sides that meet in the corner
+   may have vertices in the middle (0: none), begin towards 0, end towards 3. The plane through
+   these cuts off a triangle with the corner; what is left of two has its corner at the first.
+   places: of the vertices. */
+static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out,
+                                 const uint8_t places[6], int corner, int begin, int end,
+                                 int turned)
 {
-    int first = terrimpi_sorted_corner_first(s, out, a, b, turned);
+    int a = begin, b = end ? end : 3;
+    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], places[a], places[b],
+                                             turned);
     if (first)
         terrimpi_sorted_triangle(out, a, b, corner, turned);
-    terrimpi_sorted_triangle(out, b, a, rest, turned);
+    if (begin && end)
+        terrimpi_sorted_half(s, out, places, begin, 0, end, turned);
+    else if (begin || end)
+        terrimpi_sorted_triangle(out, b, a, begin ? 0 : 3, turned);
     if (!first)
         terrimpi_sorted_triangle(out, a, b, corner, turned);
 }
 
-/* Half of a square: the triangle of vertices 0, 3 and corner, whose sides that meet in the corner
-   may have vertices in the middle (0: none), begin towards 0, end towards 3. */
-static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out, int corner,
-                                 int begin, int end, int turned)
-{
-    if (begin && end) {
-        int i, first = terrimpi_sorted_corner_first(s, out, begin, end, turned);
-        for (i = 0; i < 2; i++)
-            if (i != first)
-                terrimpi_sorted_triangle(out, begin, end, corner, turned);
-            else
-                terrimpi_sorted_cut(s, out, 0, end, begin, 3, turned);
-    } else if (begin) {
-        terrimpi_sorted_cut(s, out, begin, 3, corner, 0, turned);
-    } else if (end) {
-        terrimpi_sorted_cut(s, out, 0, end, corner, 3, turned);
-    } else {
-        terrimpi_sorted_triangle(out, 0, 3, corner, turned);
-    }
-}
-
-/* The triangles of a square, of whose sides some have a vertex in the middle. */
+/* The triangles of the present square, of whose sides some have a vertex in the middle. */
 static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_square *out,
-                                      const int middle[4])
+                                      const uint8_t places[6], const int middle[4])
 {
     static const uint8_t plain[2][6] = { { 0, 2, 3, 0, 3, 1 }, { 0, 3, 1, 0, 2, 3 } };
-    int first = terrimpi_sorted_corner_first(s, out, 0, 3, 0), i;
+    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], 0, 10, 0), i;
     if (out->vertex_count == 4) {
         memcpy(out->indices, plain[first], sizeof plain[0]);
         out->triangle_count = 2;
         return;
     }
     out->triangle_count = 0;
-    for (i = 0; i < 2; i++)
-        if (i != first)
-            terrimpi_sorted_half(s, out, 1, middle[TERRIMP_SIDE_Z0], middle[TERRIMP_SIDE_X1], 0);
-        else
-            terrimpi_sorted_half(s, out, 2, middle[TERRIMP_SIDE_X0], middle[TERRIMP_SIDE_Z1], 1);
+    for (i = 0; i < 2; i++) {
+        int turned = i == first;
+        terrimpi_sorted_half(s, out, places, 1 + turned,
+                             middle[turned ? TERRIMP_SIDE_X0 : TERRIMP_SIDE_Z0],
+                             middle[turned ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_X1], turned);
+    }
 }
 
-/* Writes the present square. */
-static void terrimpi_sorted_emit(const terrimp_sorted *s, terrimp_sorted_square *out)
+/* Cuts off what of the present square is beyond the last sample. */
+static void terrimpi_sorted_trim(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
 {
-    uint32_t pattern = terrimpi_sorted_pattern(s);
-    int32_t x = s->at[0] - s->corner[0], z = s->at[1] - s->corner[1], size = 1 << s->level;
-    int32_t half = size / 2;
-    terrimp_sorted_int away_x[2], away_z[2];
-    int i, middle[4] = { 0, 0, 0, 0 };
-    out->page_x = s->page.x;
-    out->page_z = s->page.z;
-    out->level = (uint8_t)s->level;
-    out->texture_level = (uint8_t)s->page.texture_level;
-    out->vertex_count = 0;
-    for (i = 0; i < 2; i++) {
-        away_x[i] = terrimpi_sorted_away(s, 0, s->at[0] + i * size, 0);
-        away_z[i] = terrimpi_sorted_away(s, 1, s->at[1] + i * size, 0) + s->rise;
-    }
-    for (i = 0; i < 4; i++)
-        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level,
-                            away_x[i & 1] + away_z[i >> 1]);
+    int i, k;
+    for (k = 0; k < 2; k++)
+        for (i = 1; i < 3; i++) {
+            int32_t over = c->at[k] + ((i << level) >> 1) - s->last[k];
+            c->away[k][i] -= over > 0 ? over * s->unit[k] : 0;
+        }
+}
+
+/* Writes the present square: its corners, then the middles of its sides that are split. */
+static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
+{
+    static const uint8_t sides[4] = { 1, 9, 4, 6 };
+    uint8_t places[6] = { 0, 2, 8, 10, 0, 0 };
+    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    uint32_t pattern = terrimpi_sorted_pattern(s), level = terrimpi_sorted_level(s), count = 4, i;
+    int32_t quads = (int32_t)s->desc.page_quads;
+    int middle[4] = { 0, 0, 0, 0 };
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
-            int32_t along_x = i < 2 ? half : (i & 1) * size;
-            int32_t along_z = i < 2 ? (i & 1) * size : half;
-            middle[i] = out->vertex_count;
-            terrimpi_sorted_put(s, out, x + along_x, z + along_z, s->level - 1u,
-                                terrimpi_sorted_away(s, 0, s->at[0] + along_x, 0) + s->rise +
-                                terrimpi_sorted_away(s, 1, s->at[1] + along_z, 0));
+            c->heights[sides[i]] = terrimpi_sorted_height_at(s, c, sides[i], level - 1u);
+            middle[i] = (int)count;
+            places[count++] = sides[i];
         }
-    terrimpi_sorted_triangles(s, out, middle);
+    if (s->partial)
+        terrimpi_sorted_trim(s, c, level);
+    for (i = 0; i < count; i++) {
+        terrimp_sorted_vertex *v = &out->vertices[i];
+        int32_t x = c->at[0] + ((places[i] & 3) << level >> 1);
+        int32_t z = c->at[1] + ((places[i] >> 2) << level >> 1);
+        v->x = s->page.x * quads + terrimpi_sorted_clamp(s, 0, x);
+        v->z = s->page.z * quads + terrimpi_sorted_clamp(s, 1, z);
+        v->height = c->heights[places[i]];
+#ifndef TERRIMP_FIXED
+        v->height = terrimpi_field_world_height(&s->desc.field, v->height);
+#endif
+    }
+    out->page_x = s->page.x;
+    out->page_z = s->page.z;
+    out->level = (uint8_t)level;
+    out->texture_level = (uint8_t)s->page.texture_level;
+    out->vertex_count = (uint8_t)count;
+    terrimpi_sorted_triangles(s, out, places, middle);
 }
 
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
@@ -13085,11 +13174,14 @@ static float terrimpi_sorted_z_far(const terrimp_sorted_desc *d, const terrimp_c
 }
 
 /* Chooses units, as fine as the squares of all distances allow, and puts the eye in its page. */
-static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3], float reach)
+static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3],
+                                 const terrimpi_sorted_hull *hull)
 {
     const terrimp_sorted_desc *d = &s->desc;
-    float spacing[2], larger, unit = 4096.0f, rise;
+    float spacing[2], larger, unit = 4096.0f, rise, reach = 0.0f;
     int k;
+    for (k = 0; k < 2; k++)
+        reach = terrimpi_max(reach, terrimpi_max(-hull->low[k], hull->high[k]));
     spacing[0] = d->field.spacing_x;
     spacing[1] = d->field.spacing_z;
     larger = terrimpi_max(spacing[0], spacing[1]);
@@ -13157,9 +13249,9 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     }
     terrimpi_sorted_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye,
                                  &hull);
-    TERRIMPI_REFUSE(!terrimpi_sorted_units(sorted, eye, hull.farthest), TERRIMP_E_RANGE);
     if (hull.count == 0)
         return TERRIMP_OK;
+    TERRIMPI_REFUSE(!terrimpi_sorted_units(sorted, eye, &hull), TERRIMP_E_RANGE);
     terrimpi_sorted_footprint(sorted, &hull);
     terrimpi_sorted_arrange(sorted, &c);
     terrimpi_sorted_texels(sorted, &c);
