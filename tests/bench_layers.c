@@ -297,7 +297,8 @@ static void table_house(void)
         "the cell: ours with as much, measured for\neach texel that can be seen. Last but one: "
         "triangles of layers for each of the mesh of 2 pixels\n\n");
     say("| distance m | layers | quads of layers | kB | s | mesh of 1.5 px | px | of 2 px | px | "
-        "kB | s | layers / mesh | voxels |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+        "kB | s | layers / mesh | voxels |\n"
+        "|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (i = 0; i < 7; i++) {
         const house_row *his = &his_house[i];
         terrimp_depth_mesh m;
