@@ -846,7 +846,8 @@ static void views_keep_to_their_cost(void)
             ratio = pace_fly(&l, &d, &least, &limited, &most, &rests);
             /* A picture is made in pieces of whole nodes, which some frames have no room for. */
             if (mode == TERRIMP_MODE_AUTO)
-                CHECK(ratio < 0.5f * free_ratio && limited < 1.02f * d.max_cost);
+                CHECK(ratio < 0.34f * free_ratio && limited < 0.95f * d.max_cost &&
+                      (turn == 0 || most <= 1.01f * d.max_cost));
             else
                 CHECK(ratio <= 1.2f && most <= 1.05f * d.max_cost && rests);
             CHECK(median > d.max_cost * 0.5f && least > 0.8f * d.max_cost);
