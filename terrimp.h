@@ -10274,7 +10274,9 @@ static void terrimpi_cull_close(terrimpi_cull *cull)
 }
 
 /* Which cuts run at a node in sight, of those that do not run above it. `done` gets them, and the
-   impostor cut where the ground is too close for one. */
+   impostor cut where the ground is too close for one. Where a choice is, impostors are no smaller
+   than the ground's nodes: ground beside them would be coarser than their borders are lifted for,
+   see terrimpi_build_lift_border. */
 static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cache,
                               const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
                               float closest, int *done)
@@ -10291,10 +10293,10 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
         return cuts;
     impostor = terrimpi_cull_impostor(f, node, closest, cache->of_node[node->number] !=
                                                             TERRIMPI_CACHE_NO_PICTURE);
-    if (impostor) {
+    if (impostor)
         cuts |= TERRIMPI_CULL_IMPOSTOR | (impostor & TERRIMPI_CULL_SHORT);
+    if (impostor || (*done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER))
         *done |= TERRIMPI_CULL_IMPOSTOR;
-    }
     return cuts;
 }
 
@@ -16276,10 +16278,10 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
    closer end, at most twice as much, which stays within the range of stored heights; a raised
    vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
    behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground beside a
-   mesh that is coarser than by one level could leave one, of less than its tolerance; to lift
-   borders over all of it would double the errors of meshes where ridges are steep. Neighbours of a
-   level still share what lies between the corners. */
+   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Views
+   put no mesh beside ground that is coarser by two levels: to lift borders over all of it would
+   double the errors of meshes where ridges are steep. Neighbours of a level still share what lies
+   between the corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {

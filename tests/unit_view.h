@@ -1422,7 +1422,8 @@ static void flights_with_split_pictures_keep_every_law(void)
     land_prepare(&l, 129, 129, TERRIMP_FORMAT_F32, LAND_FLAT);
     for (z = 0; z < 129u; z++) /* a plain with ridges along x that meshes can follow */
         for (x = 0; x < 129u; x++)
-            l.samples[z * 129u + x] = fmaxf(0.0f, 16.0f - 2.0f * fabsf((float)(z % 32u) - 10.0f));
+            l.samples[z * 129u + x] = fmaxf(0.0f, 16.0f - 2.0f * fabsf((float)(z % 32u) - 10.0f)) +
+                                      0.1f * (float)(x % 2u); /* ground that is fine */
     l.desc.chunk_quads = 8;
     l.desc.triangle_budget = 100;
     d = eager_settings();
