@@ -36,6 +36,10 @@ static void no_hole_in_random_flights(void)
     uint32_t seed = wanted && *wanted        ? (uint32_t)strtoul(wanted, NULL, 10)
                     : getenv("TERRIMP_LONG") ? (uint32_t)time(NULL) % 1000000u * 100u
                                              : 1u;
+    static const uint32_t once[][2] = { /* seeds and paths with holes that were mended: */
+        { 4244, 0 }, { 771007, 0 }, /* ground two levels coarser than a mesh beside it */
+        { 771093, 1 }               /* a picture made from below the ground */
+    };
     static holes_scene s;
     holes_sum sum;
     int i, path;
@@ -44,6 +48,11 @@ static void no_hole_in_random_flights(void)
         holes_open(&s, seed + (uint32_t)i);
         for (path = 0; path < HOLES_PATHS; path++)
             holes_fly(&s, path, check_flight, &sum);
+        holes_close(&s);
+    }
+    for (i = 0; i < (int)(sizeof once / sizeof *once); i++) {
+        holes_open(&s, once[i][0]);
+        holes_fly(&s, (int)once[i][1], check_flight, &sum);
         holes_close(&s);
     }
     printf("  TERRIMP_SEED=%u: %u frames, %u px of holes, %u of slits, %u of shreds\n",

@@ -779,6 +779,28 @@ static void check_nothing_is_drawn_twice(const flight *f)
         }
 }
 
+/* Whether two nodes that share no ground share a part of a side. */
+static int shares_side(const flight_place *a, const flight_place *b)
+{
+    int along_x = a->chunk[0] < b->beyond[0] && b->chunk[0] < a->beyond[0];
+    int along_z = a->chunk[1] < b->beyond[1] && b->chunk[1] < a->beyond[1];
+    return (along_x && (a->beyond[1] == b->chunk[1] || b->beyond[1] == a->chunk[1])) ||
+           (along_z && (a->beyond[0] == b->chunk[0] || b->beyond[0] == a->chunk[0]));
+}
+
+/* Ground beside a mesh is not coarser than its border is lifted for: by one level. */
+static void check_ground_beside_meshes(const flight *f)
+{
+    uint32_t i, k;
+    for (i = 0; i < f->item_count && f->stats.waiting == 0; i++)
+        for (k = 0; k < f->item_count; k++) {
+            const flight_place *a = &f->places[f->items[i].node];
+            const flight_place *b = &f->places[f->items[k].node];
+            if (f->items[i].is_impostor && !f->items[k].is_impostor && shares_side(a, b))
+                CHECK(b->level <= a->level + 1u);
+        }
+}
+
 /* Ground comes from front to back, and so do impostors. */
 static void check_front_to_back(const flight *f)
 {
@@ -947,6 +969,7 @@ static void flight_render(flight *f)
     check_nothing_in_sight_is_missing(f, 3);
     check_fades(f);
     check_nothing_is_drawn_twice(f);
+    check_ground_beside_meshes(f);
     check_front_to_back(f);
     check_pictures_are_good(f);
 }
