@@ -1308,15 +1308,15 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 
         terrimp_pages_next_frame(terrain);
         terrimp_view_update(view, &camera);
-        terrimp_view_wants(view, wants, 64, &count);   // begin these, on any thread fill what
-                                                       // begin has given; put, or fail
+        terrimp_pages_wants(terrain, wants, 64, &count); // begin these, on any thread fill what
+                                                         // begin has given; put, or fail
         terrimp_view_render(view, &draw);
 
    Begin, put and fail belong to the thread of the views, between update and render or after it. The
    pages that a frame uses stay where they are until the next frame's update. A page lies in its
    slot until another needs it, and what the host has made of it is good as long: a mesh has its
-   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Views of modes AUTO and
-   GEOMIP draw pages, without morph_ratio and hider. */
+   place in the host's buffers by the slot (terrimp_terrain_get_mesh). Walls and visible sets are
+   those of the same terrain in memory. Views draw pages without morph_ratio. */
 
 #define TERRIMP_PAGES_VERSION 1u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
@@ -1387,8 +1387,32 @@ TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t n
    more. Nobody may fill it any longer. Errors: E_STATE when it has not been begun. */
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node);
 
-/* Begins a frame of all views of a terrain: what the frame before did not use may be given up. */
+/* Begins a frame of all views of a terrain: what the frame before did not use may be given up, and
+   what it wanted is forgotten. */
 TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain);
+
+/* Why a page is wanted. */
+typedef enum terrimp_want_reason {
+    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
+    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
+    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
+    TERRIMP_WANT_REASON_COUNT
+} terrimp_want_reason;
+
+typedef struct terrimp_want {
+    uint32_t node, level, bytes;
+    int reason;     /* terrimp_want_reason */
+    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
+} terrimp_want;
+
+/* The pages that the updates of this frame would have liked to have, those of all views, best
+   first, and no more than there are slots for. None of them is here or coming, and the parents of
+   all are here.
+
+   wants       [capacity] out
+   count       out: how many */
+TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
+                                               uint32_t capacity, uint32_t *count);
 
 /* Lists the pages that have been begun and that no view wanted in this frame and the one before.
 
@@ -1674,29 +1698,6 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
    Cost       O(nodes in sight); no allocation */
 TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp_camera *camera);
 
-/* Why a page is wanted. */
-typedef enum terrimp_want_reason {
-    TERRIMP_WANT_GROUND = 0, /* ground is drawn too coarse without it */
-    TERRIMP_WANT_PICTURE,    /* a picture waits for it */
-    TERRIMP_WANT_AHEAD,      /* it will be of use soon */
-    TERRIMP_WANT_REASON_COUNT
-} terrimp_want_reason;
-
-typedef struct terrimp_want {
-    uint32_t node, level, bytes;
-    int reason;     /* terrimp_want_reason */
-    float urgency;  /* the error that is seen without it, over its limit; below 1: not yet */
-} terrimp_want;
-
-/* The pages that the last update would have liked to have, best first, and no more than there are
-   slots for. None of them is here or coming, and the parents of all are here. Several views share a
-   terrain's pages: ask them all, and begin refuses what another has asked for.
-
-   wants      [capacity] out
-   count      out: how many */
-TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
-                                              uint32_t capacity, uint32_t *count);
-
 /* Calls back with the frame's commands: captures, each with its ground; the ground; impostors; the
    floor. Each kind front to back: what is hidden by something drawn before it need not be shaded.
    With `sorted`: captures, the floor, then ground and impostors as they come, farthest first, and
@@ -1792,7 +1793,7 @@ typedef int64_t terrimp_sorted_int;
 
 enum {
     TERRIMP_SORTED_LEVELS = 11,  /* of pages of 1024 quads */
-    TERRIMP_SORTED_SIDES = 16,   /* of a footprint, at most */
+    TERRIMP_SORTED_SIDES = 8,    /* of a footprint, at most */
     TERRIMP_SORTED_ABSENT = 255  /* the level of a page of which nothing is here */
 };
 
@@ -1852,10 +1853,27 @@ typedef struct terrimp_sorted_square {
     int32_t page_x, page_z; /* column and row of its page, from the origin on, any sign */
     uint8_t level;          /* 2^level quads along a side */
     uint8_t texture_level;  /* of the page */
-    uint8_t vertex_count, triangle_count; /* up to 8 and 6 */
-    uint8_t indices[18];    /* of triangles, in order */
-    terrimp_sorted_vertex vertices[8]; /* its corners (0, 0), (1, 0), (0, 1), (1, 1); middles */
+    uint8_t vertex_count, triangle_count; /* up to 6 and 4 */
+    uint8_t indices[12];    /* of triangles, in order */
+    terrimp_sorted_vertex vertices[6]; /* its corners (0, 0), (1, 0), (0, 1), (1, 1); middles */
 } terrimp_sorted_square;
+
+/* Private: a square on the way to the present one, and the 3 x 3 places at which its quarters have
+   their corners: column + 4 * row. */
+typedef struct terrimp_sorted_cell {
+    int32_t at[2];                     /* its first sample, from that of its page on */
+    terrimp_sorted_int away[2][3];     /* units from the eye to the places along each axis */
+    terrimp_sorted_height heights[11]; /* of the places, before scale and offset */
+    uint16_t sides;                    /* of the footprint that cross it */
+    uint8_t child, order;              /* quarters that were looked at; which of them is first */
+} terrimp_sorted_cell;
+
+/* Private: a side of the footprint, inside of which x * its x + z * its z + at >= 0. */
+typedef struct terrimp_sorted_side {
+    terrimp_sorted_int at;
+    int32_t x, z;
+    int32_t fall, rise; /* of that, at most, across a square of a sample */
+} terrimp_sorted_side;
 
 /* The state of a terrain and of its frame. The caller's, 2 KiB; all but two are private. */
 typedef struct terrimp_sorted {
@@ -1875,8 +1893,8 @@ typedef struct terrimp_sorted {
     terrimp_sorted_int whole[TERRIMP_SORTED_LEVELS]; /* up to here a vertex has its own height */
     float fade[TERRIMP_SORTED_LEVELS]; /* 1 / (split of the next level - whole) */
     terrimp_sorted_int texel_steps[2]; /* squared: where level 1 begins, and where it is left */
-    uint32_t side_count;         /* of the footprint: sides[0] x + sides[1] z + sides[2] >= 0 */
-    terrimp_sorted_int sides[TERRIMP_SORTED_SIDES][3];
+    uint32_t side_count;
+    terrimp_sorted_side sides[TERRIMP_SORTED_SIDES];
     int32_t bounds[2][2];        /* of the footprint: first and last page along each axis */
     int32_t rows, row, cols, col, first_col, page_row; /* pages that there are, and are done */
     int32_t corner[2];           /* first sample of the page */
@@ -1884,15 +1902,9 @@ typedef struct terrimp_sorted {
     int partial;                 /* not all of it is in the field, or here, or beside it */
     uint8_t side_levels[4];      /* from which on heights along its sides are here */
     int32_t last[2];             /* column and row of the page's last sample in the field */
-    int depth;                   /* of the stack; -1: empty */
-    struct {
-        int32_t at[2];
-        uint16_t sides;          /* of the footprint that cross it */
-        uint16_t child;
-    } stack[TERRIMP_SORTED_LEVELS + 1];
-    int32_t at[2];               /* the present square */
-    uint32_t level;
-    terrimp_sorted_int away;     /* squared, of its closest point */
+    int depth;                   /* of the stack, above which the present square is; -1: empty */
+    terrimp_sorted_cell stack[TERRIMP_SORTED_LEVELS];
+    terrimp_sorted_int away;     /* squared, of the present square's closest point */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1924,7 +1936,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 
    squares    [capacity] out
    Returns    how many; less than capacity, or 0, at the end of the frame
-   Cost       110 to 150 cycles a triangle of a processor of 2020, whatever came before
+   Cost       70 to 100 cycles a triangle of a processor of 2020, whatever came before
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
@@ -2767,10 +2779,10 @@ typedef struct terrimp_placement {
 TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
 
 /* Chooses candidates: again and again the one that takes most off what views cost above the budget,
-   for its memory; a picture of a cluster takes the place of pictures of what is in it. Then those
-   are given back that others can stand in for. Small sets are gone through again and again, each
-   time without one of the chosen candidates or with another one to begin with, while that pays.
-   Costs count as within the budget to 1e-5 of it.
+   for its memory; a picture of a cluster takes the place of pictures of the same and of what is in
+   it. Then those are given back that others can stand in for. Small sets are gone through again and
+   again, with one or two candidates more or less, while that pays. Costs count as within the budget
+   to 1e-5 of it.
 
    scratch    aligned to 8 bytes
    shown      [gain_count] out: 1 where the candidate's picture is shown in that view, else 0. A
@@ -2779,8 +2791,8 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
    placement  out
    Errors     E_RANGE also for a parent that is not greater, or a gain of two candidates
    Cost       about O(gains + chosen * log(candidates)): scores only ever fall, so that only the
-              best one is scored anew until it stays the best. 2 s for 300,000 candidates with 2.2
-              million gains, 60 bytes of scratch memory for each of these
+              best one is scored anew until it stays the best. 1.6 s for 300,000 candidates with
+              3.1 million gains, 26 bytes of scratch memory for each of these
    Source     Jeschke 2004, section 5.7; all after the choice is ours */
 TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
                                          size_t bytes, uint8_t *shown, float *costs,
@@ -2805,9 +2817,13 @@ typedef struct terrimp_place_terrain_desc {
                                 [Default 0 -> 0.1] */
     float texels_per_px;     /* from the closest eye [Limits: > 0] [Default 0 -> 1] */
     float draw_cost, triangle_cost; /* [Limits: >= 0] [Default both 0 -> 40 and 1] */
+    int shafts;                     /* nonzero: a picture serves every cell behind its square, too,
+                                       that keeps within tolerance and angle: together a shaft
+                                       that opens away from the node */
 } terrimp_place_terrain_desc;
 
-/* A picture that may be prepared: of a node, for a square of cells, from its middle. */
+/* A picture that may be prepared: of a node, for a square of cells, from its middle; with shafts
+   for cells behind that, too. */
 typedef struct terrimp_place_picture {
     uint32_t node;
     uint32_t level;         /* 2^level x 2^level cells */
@@ -2839,8 +2855,9 @@ TERRIMP_API size_t terrimp_place_terrain_scratch_bytes(const terrimp_place_terra
 
    scratch    aligned to 8 bytes
    Errors     E_CAPACITY: the counts say how much is needed
-   Cost       O(views * nodes * cell_levels)
-   Source     Jeschke 2004, sections 5.5 and 5.6; box cells */
+   Cost       O(views * nodes * cell_levels); with shafts O(views * nodes * cells), 0.4 s for 64
+              cells, 12 directions and 341 nodes
+   Source     Jeschke 2004, sections 5.5 and 5.6 */
 TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_desc *desc,
                                                  void *scratch, size_t bytes,
                                                  terrimp_place_set *set);
@@ -4535,7 +4552,29 @@ struct terrimp_pages {
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
+    int strays;                /* the view's walk may not come to all that it asks for */
+    terrimp_want *wants;       /* [want_limit] of this frame */
+    uint32_t want_count, want_limit;
+    const struct terrimpi_page_calls *calls;
 };
+
+struct terrimpi_mip_frame;
+
+/* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
+   which opens none has no code of it. */
+typedef struct terrimpi_page_calls {
+    const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
+    int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
+    int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
+                   const terrimp_frustum *frustum, int reason, float urgency);
+    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
+    void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
+                       const float away[3]);
+    void (*fill_ground)(const terrimp_terrain *t, uint32_t node, float *xyz);
+    terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
+                         uint32_t *level);
+    float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
+} terrimpi_page_calls;
 
 #define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
 #define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
@@ -4548,23 +4587,10 @@ static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint
                                                : NULL;
 }
 
-/* The record of a node: its parent's page has it. NULL when that is not here. */
-static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
-{
-    terrimp_node n;
-    const unsigned char *page;
-    if (number + 1u == t->node_count)
-        return t->pages->root;
-    n = terrimpi_tree_node(t, number);
-    page = terrimpi_page_of(t->pages, terrimpi_tree_parent(t, &n).number);
-    return page ? page + TERRIMPI_PAGE_CHILDREN +
-                      (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
-}
-
 /* What PICTURE asks of a node for those below it: the last number of its record. */
 static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
 {
-    return *(const float *)(const void *)(terrimpi_page_record(t, number) +
+    return *(const float *)(const void *)(t->pages->calls->record(t, number) +
                                           TERRIMPI_PAGE_RECORD - sizeof(float));
 }
 
@@ -4574,7 +4600,7 @@ static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtr
 {
     return t->nodes ? t->nodes + number
                     : (const struct terrimp_geomip_node *)(const void *)
-                          terrimpi_page_record(t, number);
+                          t->pages->calls->record(t, number);
 }
 
 /* Whether there is anything to be known of a tree's nodes. */
@@ -4933,6 +4959,7 @@ typedef struct terrimpi_mip_frame {
     float cos2;                /* square of the cosine between forward and the screen's corner */
     int exact;                 /* BOUND */
     float relief;              /* what measures are multiplied with */
+    float whole;               /* [wu] so close to the eye all is split; below 0: all in sight */
     float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
@@ -5063,14 +5090,18 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
     terrimp_box box;
     split2 = f->tree->pages ? terrimpi_mip_distance(f, node->level, node->number)
                             : f->view->distances[node->number];
-    if (!(split2 > 0.0f))
+    if (!(split2 > 0.0f) && !(f->whole > 0.0f) && !(f->whole < 0.0f))
         return 0.0f;
     terrimpi_mip_error_box(f->tree, node, &box);
+    if (f->whole > 0.0f && terrimpi_mip_distance2(&box, f->eye) < f->whole * f->whole)
+        return TERRIMPI_MIP_MOST;
     if (*planes) {
         *planes = terrimp_frustum_test(&f->frustum, &box, *planes);
         if (*planes == TERRIMP_PLANES_OUTSIDE)
             return 0.0f;
     }
+    if (f->whole < 0.0f)
+        return TERRIMPI_MIP_MOST;
     if (split2 >= TERRIMPI_MIP_MOST)
         return split2; /* at no distance; or it cannot be drawn at all */
     terrimpi_camera_grow(&box, f->reach);
@@ -5303,6 +5334,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_
                                           const terrimp_camera *camera)
 {
     terrimpi_mip_frame f;
+    f.whole = 0.0f;
     terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
@@ -6635,7 +6667,8 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
 {
     if (t->meshes)
         return &t->meshes[node];
-    return &((const terrimpi_record *)(const void *)terrimpi_page_record(&t->tree, node))->mesh;
+    return &((const terrimpi_record *)(const void *)t->tree.pages->calls->record(&t->tree,
+                                                                                     node))->mesh;
 }
 
 /* The node of the built terrain that a node is, or repeats. */
@@ -7037,10 +7070,16 @@ static size_t terrimpi_terrain_ground_vertices(const terrimp_terrain *t)
     return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
-/* The samples of a page, [chunk_quads + 1]^2 in 16 bits. */
+/* The samples of a page, [chunk_quads + 1]^2. */
 static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node)
 {
     return terrimpi_corners_of(t, node) + t->index_limit / 4u;
+}
+
+/* Bytes of a sample in a page: as the field's, but two at least. */
+static uint32_t terrimpi_page_sample_bytes(const terrimp_heightfield *field)
+{
+    return field->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
 }
 
 /* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
@@ -7050,8 +7089,8 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     terrimp_heightfield f = t->desc.field;
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     f.samples = terrimpi_page_samples(t, node);
-    f.format = f.format == TERRIMP_FORMAT_S16 ? f.format : TERRIMP_FORMAT_U16;
-    f.row_bytes = 2u * (t->desc.chunk_quads + 1u);
+    f.row_bytes = terrimpi_page_sample_bytes(&f) * (t->desc.chunk_quads + 1u);
+    f.format = f.format == TERRIMP_FORMAT_U8 ? TERRIMP_FORMAT_U16 : f.format;
     f.origin_x = terrimpi_terrain_x(t, p.x);
     f.origin_z = terrimpi_terrain_z(t, p.z);
     f.spacing_x *= (float)(1u << p.level);
@@ -7061,19 +7100,6 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     return f;
 }
 
-static void terrimpi_fill_page_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
-{
-    terrimp_heightfield f = terrimpi_page_field(t, node);
-    terrimp_node n = terrimpi_tree_node(&t->tree, node);
-    uint32_t quads = t->desc.chunk_quads, i, j;
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++) {
-            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
-            *xyz++ = terrimpi_field_sample(&f, i, j);
-            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
-        }
-}
-
 TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *terrain,
                                                        uint32_t node, float *xyz, size_t capacity)
 {
@@ -7081,7 +7107,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
     TERRIMPI_REFUSE(capacity < 3u * terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     if (!terrain->tree.pages)
         return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
-    terrimpi_fill_page_ground(terrain, node, xyz);
+    terrain->tree.pages->calls->fill_ground(terrain, node, xyz);
     return TERRIMP_OK;
 }
 
@@ -7667,6 +7693,13 @@ static uint32_t terrimpi_stand_last(const terrimp_quadtree *tree, uint32_t axis)
     return (axis == 0 ? tree->field.width : tree->field.depth) - 1u;
 }
 
+/* A sample; HORIZON_ALL when its page is not here. */
+static float terrimpi_stand_sample(const terrimp_quadtree *tree, uint32_t x, uint32_t z)
+{
+    return tree->pages ? tree->pages->calls->sample(tree, x, z)
+                       : terrimpi_field_sample(&tree->field, x, z);
+}
+
 /* The highest that the ground can be within so many quads of the eye: of each quad the highest
    corner or, if that is less, how far its triangles rise there. */
 static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *tree,
@@ -7684,10 +7717,10 @@ static float terrimpi_stand_top(const terrimp_stand *s, const terrimp_quadtree *
     }
     for (j = from[1]; j <= to[1]; j++)
         for (i = from[0]; i <= to[0]; i++) {
-            float a = terrimpi_field_sample(&tree->field, i, j), u, v, low, high;
-            float b = terrimpi_field_sample(&tree->field, i + 1u, j);
-            float c = terrimpi_field_sample(&tree->field, i, j + 1u);
-            float d = terrimpi_field_sample(&tree->field, i + 1u, j + 1u);
+            float a = terrimpi_stand_sample(tree, i, j), u, v, low, high;
+            float b = terrimpi_stand_sample(tree, i + 1u, j);
+            float c = terrimpi_stand_sample(tree, i, j + 1u);
+            float d = terrimpi_stand_sample(tree, i + 1u, j + 1u);
             u = (float)((int32_t)s->quad[0] - (int32_t)i) + s->within[0];
             v = (float)((int32_t)s->quad[1] - (int32_t)j) + s->within[1];
             low = a + (b - a) * u + (d - b) * v + terrimpi_abs(b - a) * reach[0] +
@@ -7712,7 +7745,7 @@ static int terrimpi_stand_clip(terrimp_stand *s, const terrimp_quadtree *tree,
     s->clipped[0] = quads[0] = reach / field->spacing_x;
     s->clipped[1] = quads[1] = reach / field->spacing_z;
     s->steepest = TERRIMPI_HORIZON_NONE;
-    if (tree->nodes[tree->node_count - 1u].high < s->eye - 2.0f * reach)
+    if (terrimpi_tree_kept(tree, tree->node_count - 1u)->high < s->eye - 2.0f * reach)
         return 1;
     top += terrimpi_stand_top(s, tree, quads) + 2.0f * s->error * reach;
     if (top >= s->eye)
@@ -7748,12 +7781,22 @@ static int terrimpi_stand_over(terrimp_stand *s, const terrimp_quadtree *tree, c
     return 1;
 }
 
+/* The height of the ground below an eye; returns 0 when its page is not here. */
+static int terrimpi_stand_ground(const terrimp_quadtree *tree, const float eye[3], float *ground)
+{
+    terrimp_heightfield field = tree->field;
+    uint32_t level = 0;
+    return (!tree->pages || tree->pages->calls->at(tree, eye[0], eye[2], &field, &level) ==
+                                TERRIMP_OK) &&
+           level == 0 && terrimp_heightfield_height(&field, eye[0], eye[2], ground) == TERRIMP_OK;
+}
+
 /* Looks at what a camera stands over. Returns 0 when nothing is hidden from it. */
 static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
                                 const terrimp_camera *camera, const terrimp_capture *capture,
                                 float error, float low)
 {
-    const terrimp_geomip_node *all = &tree->nodes[tree->node_count - 1u];
+    const terrimp_geomip_node *all = terrimpi_tree_kept(tree, tree->node_count - 1u);
     float ground;
     s->eye = camera->eye[1];
     s->error = error;
@@ -7761,8 +7804,7 @@ static int terrimpi_stand_begin(terrimp_stand *s, const terrimp_quadtree *tree,
                             terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high)));
     return !camera->orthographic && !(camera->reach > 0.0f) &&
            terrimpi_stand_over(s, tree, camera->eye) &&
-           terrimp_heightfield_height(&tree->field, camera->eye[0], camera->eye[2], &ground) ==
-               TERRIMP_OK &&
+           terrimpi_stand_ground(tree, camera->eye, &ground) &&
            s->eye > ground + s->low && terrimpi_stand_clip(s, tree, capture);
 }
 
@@ -7805,7 +7847,7 @@ TERRIMP_API size_t terrimp_walls_bytes(const terrimp_quadtree *tree)
 
 static terrimp_result terrimpi_walls_check(const terrimp_quadtree *tree, const void *walls)
 {
-    TERRIMPI_REFUSE(!tree || !walls || !tree->nodes, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!tree || !walls || !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)walls % sizeof(float) != 0, TERRIMP_E_ALIGN);
     return TERRIMP_OK;
 }
@@ -7851,12 +7893,14 @@ static float terrimpi_walls_lowest(const terrimp_walls *w, uint32_t axis, uint32
 
 /* ---- walls as an eye sees them ---- */
 
-/* The sample where line `line` of an axis crosses line `other` of the other one. */
+/* The sample where line `line` of an axis crosses line `other` of the other one: what is not here
+   hides nothing. */
 static float terrimpi_horizon_sample(const terrimp_horizon *h, uint32_t axis, uint32_t line,
                                      uint32_t other)
 {
-    return axis == 0 ? terrimpi_field_sample(&h->hider.tree->field, line, other)
-                     : terrimpi_field_sample(&h->hider.tree->field, other, line);
+    float height = terrimpi_stand_sample(h->hider.tree, axis == 0 ? line : other,
+                                         axis == 0 ? other : line);
+    return height < TERRIMPI_HORIZON_ALL ? height : TERRIMPI_HORIZON_NONE;
 }
 
 /* The lowest height of a line of samples from place `from` to `to`, which are in quads i and j. */
@@ -8024,13 +8068,13 @@ static int terrimpi_horizon_hides_box(terrimp_horizon *h, float x, float z, floa
    one that is closest to the eye. */
 static int terrimpi_horizon_hides_node(terrimp_horizon *h, const terrimp_node *node, float raised)
 {
-    const terrimp_geomip_node *heights = &h->hider.tree->nodes[node->number];
+    const terrimp_geomip_node *heights = terrimpi_tree_kept(h->hider.tree, node->number);
     uint32_t quads = h->hider.tree->chunk_quads << node->level, k, first;
     float size = (float)quads, part = size / (float)TERRIMPI_WALL_TOPS, scale[2];
     float x = (float)((int32_t)(node->x * quads) - (int32_t)h->stand.quad[0]) - h->stand.within[0];
     float z = (float)((int32_t)(node->z * quads) - (int32_t)h->stand.quad[1]) - h->stand.within[1];
     const unsigned char *tops;
-    if (h->blind || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
+    if (h->blind || !heights || terrimpi_stand_under(&h->stand, x, z, size, heights->low - raised))
         return 0;
     if (terrimpi_horizon_hides_box(h, x, z, size, heights->high - h->stand.eye))
         return 1;
@@ -8224,15 +8268,15 @@ TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
 static float terrimpi_horizon_node_error(const terrimp_quadtree *tree, const terrimp_node *n,
                                          int morphs)
 {
-    const terrimp_geomip_node *nodes = tree->nodes;
+    const terrimp_geomip_node *own = terrimpi_tree_kept(tree, n->number);
     uint32_t quads = tree->chunk_quads << n->level, part = (1u << n->level) - 1u;
     uint32_t last_x = tree->field.width - 1u, last_z = tree->field.depth - 1u;
     if (((n->x + 1u) * quads >= last_x && (last_x & part)) ||
         ((n->z + 1u) * quads >= last_z && (last_z & part)))
-        return nodes[n->number].high - nodes[n->number].low;
+        return own->high - own->low;
     if (morphs && n->level + 1u < tree->level_count)
-        return nodes[terrimpi_tree_parent(tree, n).number].error;
-    return nodes[n->number].error;
+        return terrimpi_tree_kept(tree, terrimpi_tree_parent(tree, n).number)->error;
+    return own->error;
 }
 
 /* The same for a draw, which at coarse borders is drawn as those beside it. */
@@ -8329,7 +8373,8 @@ static uint32_t terrimpi_sets_level_nodes(const terrimp_quadtree *tree, uint32_t
 /* What ground and nodes may be off their samples, with the rounding of heights [wu]. */
 static float terrimpi_sets_low(const terrimp_sets *s)
 {
-    const terrimp_geomip_node *all = &s->hider.tree->nodes[s->hider.tree->node_count - 1u];
+    const terrimp_geomip_node *all =
+        terrimpi_tree_kept(s->hider.tree, s->hider.tree->node_count - 1u);
     float most = terrimpi_max(terrimpi_abs(all->low), terrimpi_abs(all->high));
     return s->low + 1e-6f * (2.0f * most + s->reach);
 }
@@ -8348,9 +8393,11 @@ static int terrimpi_sets_begin(terrimp_hider *hider, const terrimp_camera *camer
         return 0;
     cell = terrimpi_tree_at(tree, s->cell_level, s->stand.quad[0] / quads,
                             s->stand.quad[1] / quads);
+    if (!terrimpi_tree_kept(tree, cell.number))
+        return 0;
     s->row = s->codes + (size_t)(cell.number - tree->level_first[cell.level]) *
                             terrimpi_sets_level_nodes(tree, s->node_level);
-    s->code = terrimpi_sets_code(s, tree->nodes[cell.number].low, s->stand.eye);
+    s->code = terrimpi_sets_code(s, terrimpi_tree_kept(tree, cell.number)->low, s->stand.eye);
     return 1;
 }
 
@@ -8372,7 +8419,7 @@ static int terrimpi_sets_hides(terrimp_hider *hider, const terrimp_node *node)
         &s->stand, (float)((int32_t)(node->x * quads) - (int32_t)s->stand.quad[0]) -
                        s->stand.within[0],
         (float)((int32_t)(node->z * quads) - (int32_t)s->stand.quad[1]) - s->stand.within[1],
-        (float)quads, tree->nodes[node->number].low - s->stand.low);
+        (float)quads, terrimpi_tree_kept(tree, node->number)->low - s->stand.low);
 }
 
 TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrimp_sets *sets)
@@ -8390,8 +8437,9 @@ TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrim
 TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree)
 {
     const terrimp_geomip_node *all;
-    TERRIMPI_REFUSE(!sets || !tree || !tree->nodes || !sets->codes, TERRIMP_E_NULL);
-    all = &tree->nodes[tree->node_count - 1u];
+    TERRIMPI_REFUSE(!sets || !tree || !sets->codes || !terrimpi_tree_is_built(tree),
+                    TERRIMP_E_NULL);
+    all = terrimpi_tree_kept(tree, tree->node_count - 1u);
     TERRIMPI_REFUSE(!terrimpi_finite2(sets->error, sets->low) || !terrimpi_finite(sets->reach),
                     TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(terrimp_sets_bytes(tree, sets) == 0 || !(sets->low >= 0.0f) ||
@@ -8412,6 +8460,7 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
    is known of a node hangs on its parent's page alone. */
 
+#define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
 #define TERRIMPI_PAGES_MAGIC 0x54494d51u
 #define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
 
@@ -8434,7 +8483,7 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 {
     uint32_t side = t->desc.chunk_quads + 1u;
     uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
-                     t->index_limit + 2u * side * side;
+                     t->index_limit + terrimpi_page_sample_bytes(&t->desc.field) * side * side;
     return (bytes + 15u) / 16u * 16u;
 }
 
@@ -8522,7 +8571,6 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     head->bake.bytes != TERRIMP_PAGES_HEADER_BYTES ||
                     terrimpi_bake_hash(header) != head->bake.checksum ||
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
-                    t->desc.field.format == TERRIMP_FORMAT_F32 ||
                     head->block_level >= t->tree.level_count ||
                     terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
@@ -8555,84 +8603,6 @@ TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
     info->stamp = head.stamp;
     info->height_scale = t.desc.field.height_scale;
     info->height_offset = t.desc.field.height_offset;
-    return TERRIMP_OK;
-}
-
-/* The one description of the block: sets the arrays when there is a base. */
-static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pages *p,
-                                    unsigned char *base, unsigned char **head)
-{
-    terrimpi_arena b = terrimpi_arena_at(base);
-    terrimpi_take(&b, 1, sizeof *t);
-    terrimpi_take(&b, 1, sizeof *p);
-    *head = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
-    p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
-    p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
-    p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
-    return b.ok ? b.bytes : 0;
-}
-
-TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count)
-{
-    terrimp_terrain t;
-    terrimpi_pages_head head;
-    struct terrimp_pages p;
-    unsigned char *none;
-    if (!terrimpi_within_u32(slot_count, 8u, 65534u) ||
-        terrimpi_pages_read(header, bytes, &t, &head) != TERRIMP_OK)
-        return 0;
-    p.slot_count = slot_count;
-    p.page_bytes = terrimpi_page_bytes(&t);
-    return terrimpi_pages_layout(&t, &p, NULL, &none);
-}
-
-TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
-                                              size_t bytes, uint32_t slot_count, void *memory,
-                                              size_t memory_bytes, terrimp_terrain **terrain)
-{
-    terrimp_terrain t;
-    terrimpi_pages_head head;
-    struct terrimp_pages p;
-    unsigned char *copy;
-    uint32_t i;
-    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
-    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
-    TERRIMPI_REFUSE(!terrimpi_within_u32(slot_count, 8u, 65534u), TERRIMP_E_RANGE);
-    memset(&p, 0, sizeof p);
-    p.slot_count = slot_count;
-    p.page_bytes = terrimpi_page_bytes(&t);
-    p.node_count = t.tree.node_count;
-    p.block_level = head.block_level;
-    p.stamp = head.stamp;
-    p.frame = 2;
-    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
-                                      terrimpi_pages_layout(&t, &p, NULL, &copy)));
-    if (field) {
-        terrimp_heightfield place = *field;
-        place.samples = header;
-        place.width = t.desc.field.width;
-        place.depth = t.desc.field.depth;
-        place.format = t.desc.field.format;
-        place.row_bytes = 0;
-        place.height_scale = t.desc.field.height_scale;
-        place.height_offset = t.desc.field.height_offset;
-        TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
-    }
-    t.desc.field.samples = NULL; /* there are none but those of pages */
-    t.desc.field.has_no_data = t.desc.field.wrap = 0;
-    t.tree.field = t.desc.field;
-    t.begun = t.built = t.baked = 1;
-    terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
-    memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
-    memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
-    p.root = copy + offsetof(terrimpi_pages_head, root);
-    p.lows = (const float *)(const void *)(copy + sizeof head);
-    for (i = 0; i < slot_count; i++)
-        p.slots[i].node = p.node_count;
-    t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
-    *t.tree.pages = p;
-    *(terrimp_terrain *)memory = t;
-    *terrain = (terrimp_terrain *)memory;
     return TERRIMP_OK;
 }
 
@@ -8754,9 +8724,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
     return 1;
 }
 
-/* Whether a page that has just come is that of its node, and all numbers of it are what building
-   could have made. */
-static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
+/* Whether a page that has just come is that of its node, which has a record above it, and all
+   numbers of it are what building could have made. */
+static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsigned char *record)
 {
     const struct terrimp_pages *p = t->tree.pages;
     const unsigned char *page = terrimpi_page_of(p, node);
@@ -8767,7 +8737,7 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
     memcpy(&head, page, sizeof head);
     if (head.checksum != terrimpi_page_hash(page, p->page_bytes) || head.stamp != p->stamp ||
         head.node != node ||
-        memcmp(&head.record, terrimpi_page_record(&t->tree, node), sizeof head.record) != 0 ||
+        memcmp(&head.record, record, sizeof head.record) != 0 ||
         !terrimpi_page_children_ok(t, &n, &head.record) || !terrimpi_bake_node_ok(t, node))
         return 0;
     scan.skip_voids = 0;
@@ -8779,10 +8749,12 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node)
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
     terrimpi_page_slot *slot;
+    const unsigned char *record;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
+    record = terrain->tree.pages->calls->record(&terrain->tree, node);
     slot->is_here = 1; /* to be looked at */
     slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node))
+    if (terrimpi_page_ok(terrain, node, record))
         return TERRIMP_OK;
     terrimpi_page_clear(&terrain->tree, slot);
     return TERRIMP_E_BAKE;
@@ -8800,6 +8772,7 @@ TERRIMP_API terrimp_result terrimp_pages_next_frame(terrimp_terrain *terrain)
 {
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, terrain));
     terrain->tree.pages->frame++;
+    terrain->tree.pages->want_count = 0;
     return TERRIMP_OK;
 }
 
@@ -8825,77 +8798,347 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-static void terrimpi_page_use(const terrimp_quadtree *t, uint32_t node)
+/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
+static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
-    terrimpi_page_slot *slot = t->pages ? terrimpi_page_slot_of(t->pages, node) : NULL;
-    if (slot)
-        slot->used = t->pages->frame;
+    terrimp_node n;
+    const unsigned char *page = terrimpi_page_of(t->pages, number);
+    if (page)
+        return page + offsetof(terrimpi_page_head, record);
+    if (number + 1u == t->node_count)
+        return t->pages->root;
+    n = terrimpi_tree_node(t, number);
+    page = terrimpi_page_of(t->pages, terrimpi_tree_parent(t, &n).number);
+    return page ? page + TERRIMPI_PAGE_CHILDREN +
+                      (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
 }
 
-/* As terrimpi_tree_quarter, of a child in sight; the node's page is here. */
-static int terrimpi_page_quarter(const terrimp_terrain *t, const terrimp_node *node, uint32_t i,
-                                 const terrimp_frustum *frustum, terrimp_node *child)
+/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
+static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
 {
-    terrimp_box box;
-    if (!terrimpi_tree_quarter(&t->tree, node, i, child))
-        return 0;
-    terrimpi_terrain_node_box(t, child, &box);
-    return terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE;
+    if (a->urgency > b->urgency || a->urgency < b->urgency)
+        return a->urgency > b->urgency;
+    return a->level != b->level ? a->level > b->level : a->node < b->node;
 }
 
-/* Whether a node may be left for its children: its page is here, and of these each in sight. */
-static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
-                                 const terrimp_frustum *frustum)
+/* Notes that a page is of use in this frame, and those above it. If it is missing, it is wanted at
+   an urgency above 0, or the one above it that has to come first. Returns whether it is here. */
+static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+                              float urgency)
 {
-    const terrimp_quadtree *tree = &t->tree;
-    terrimp_node child;
+    struct terrimp_pages *p = t->pages;
+    terrimp_node n = *node;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+    terrimp_want want, *worst = p->wants;
     uint32_t i;
-    int all = 1;
-    if (!tree->pages)
-        return 1;
-    if (!terrimpi_page_of(tree->pages, node->number))
-        return 0;
-    terrimpi_page_use(tree, node->number);
-    for (i = 0; i < 4u; i++)
-        if (terrimpi_page_quarter(t, node, i, frustum, &child)) {
-            terrimpi_page_use(tree, child.number);
-            all &= terrimpi_page_of(tree->pages, child.number) != NULL;
+    while (!slot && n.level + 1u < t->level_count) {
+        terrimp_node above = terrimpi_tree_parent(t, &n);
+        slot = terrimpi_page_slot_of(p, above.number);
+        if (slot)
+            slot->used = p->frame; /* or it might be given up for this */
+        if (slot && slot->is_here) {
+            slot = NULL;
+            break;
         }
+        n = above;
+    }
+    if (slot)
+        slot->used = p->frame;
+    if (slot || !(urgency > 0.0f))
+        return slot && slot->is_here;
+    want.node = n.number;
+    want.level = n.level;
+    want.bytes = p->page_bytes;
+    want.reason = reason;
+    want.urgency = urgency;
+    for (i = 0; i < p->want_count; i++) {
+        if (p->wants[i].node == n.number) {
+            if (terrimpi_want_before(&want, &p->wants[i]))
+                p->wants[i] = want;
+            return 0;
+        }
+        if (terrimpi_want_before(worst, &p->wants[i]))
+            worst = &p->wants[i];
+    }
+    if (p->want_count < p->want_limit)
+        p->wants[p->want_count++] = want;
+    else if (terrimpi_want_before(&want, worst))
+        *worst = want;
+    return 0;
+}
+
+/* The same for a node and its children in sight, without which it may not be left for them. Returns
+   whether all are here. Then the walk that finds what is in sight comes by and uses the children,
+   unless `strays` says that it may not. */
+static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
+                                 const terrimp_frustum *frustum, int reason, float urgency)
+{
+    const struct terrimp_pages *p = t->tree.pages;
+    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
+    terrimp_node child;
+    terrimp_box box;
+    uint32_t i;
+    if (!terrimpi_page_want(&t->tree, node, reason, urgency))
+        return 0;
+    for (i = 0; i < 4u; i++) {
+        if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
+            (!uses && terrimpi_page_of(p, child.number)))
+            continue;
+        terrimpi_terrain_node_box(t, &child, &box);
+        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+            continue;
+        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
+        if (!all && !uses) { /* it does not come: once more */
+            uses = 1;
+            i = 0xffffffffu;
+        }
+    }
     return all;
 }
 
-/* ---- heights and rays ---- */
-
-/* The finest node at a position whose page is here. */
-static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z, terrimp_node *n)
+/* Whether the nodes exist that have to beside and above one that is split. */
+static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
 {
-    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, n));
-    while (!terrimpi_page_of(t->pages, n->number)) {
-        TERRIMPI_REFUSE(n->level + 1u == t->level_count, TERRIMP_E_PAGE);
-        *n = terrimpi_tree_parent(t, n);
+    terrimp_node beyond;
+    int side;
+    if (node->level + 1u == mip->tree->level_count)
+        return 1;
+    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
+        return 0;
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
+            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
+            return 0;
+    return 1;
+}
+
+/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
+   neighbours still differ by one level at most. All that the split would need is wanted; and the
+   ground below the eye, which says whether it is over it. Returns how many are joined. */
+static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
+{
+    uint32_t level, number, late = 0;
+    terrimp_node below;
+    if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
+        terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
+        terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
+    for (level = t->tree.level_count; level-- > 1u;)
+        for (number = mip->first[level]; number != t->tree.node_count;
+             number = mip->view->marks[number].next) {
+            terrimp_geomip_mark *mark = &mip->view->marks[number];
+            terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            if (mark->measure < 1.0f ||
+                (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
+                                       TERRIMP_SQRTF(mark->measure)) &&
+                 (late == 0 || terrimpi_page_has_around(mip, &node))))
+                continue;
+            mark->measure = 0.0f;
+            late++;
+            t->tree.pages->strays = 1;
+        }
+    return late;
+}
+
+/* Asks for the pages that ground will need when the eye has gone on by `away`. */
+static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
+                                     const float away[3])
+{
+    uint32_t i, k;
+    for (i = 0; i < mip->view->draw_count; i++) {
+        const terrimp_node *node = &mip->view->draws[i].node;
+        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
+        terrimp_box box;
+        if (node->level == 0)
+            continue;
+        measure *= measure;
+        terrimpi_terrain_node_box(t, node, &box);
+        for (k = 0; k < 3u; k++)
+            eye[k] = mip->eye[k] + away[k];
+        now = terrimp_box_distance(&box, mip->eye);
+        soon = terrimp_box_distance(&box, eye);
+        if (measure * now * now >= soon * soon)
+            terrimpi_page_divides(t, node, &mip->frustum, TERRIMP_WANT_AHEAD,
+                                  0.99f * terrimpi_min(measure, 1.0f));
     }
+}
+
+static void terrimpi_page_fill_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
+{
+    terrimp_heightfield f = terrimpi_page_field(t, node);
+    terrimp_node n = terrimpi_tree_node(&t->tree, node);
+    uint32_t quads = t->desc.chunk_quads, i, j;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++) {
+            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
+            *xyz++ = terrimpi_field_sample(&f, i, j);
+            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
+        }
+}
+
+TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
+                                               uint32_t capacity, uint32_t *count)
+{
+    struct terrimp_pages *p;
+    uint32_t i, k, gap, room = 0;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
+    TERRIMPI_REFUSE(!wants && capacity > 0, TERRIMP_E_NULL);
+    p = terrain->tree.pages;
+    for (gap = p->want_count / 2u; gap > 0; gap /= 2u)
+        for (i = gap; i < p->want_count; i++) {
+            terrimp_want moved = p->wants[i];
+            for (k = i; k >= gap && terrimpi_want_before(&moved, &p->wants[k - gap]); k -= gap)
+                p->wants[k] = p->wants[k - gap];
+            p->wants[k] = moved;
+        }
+    for (i = 0; i < p->slot_count; i++)
+        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
+    room = terrimpi_min_u32(room, capacity);
+    for (*count = i = 0; i < p->want_count && *count < room; i++)
+        if (!p->slot_of[p->wants[i].node]) /* it has not been begun since */
+            wants[(*count)++] = p->wants[i];
     return TERRIMP_OK;
 }
+
+/* The terrain that pages belong to: terrimp_pages_open puts them behind it. */
+static const terrimp_terrain *terrimpi_page_terrain(const terrimp_quadtree *t)
+{
+    return (const terrimp_terrain *)(const void *)t->pages - 1;
+}
+
+/* The ground at a position: of the finest node whose page is here. */
+static terrimp_result terrimpi_page_at(const terrimp_quadtree *t, float x, float z,
+                                       terrimp_heightfield *ground, uint32_t *level)
+{
+    terrimp_node n;
+    TERRIMPI_TRY(terrimp_quadtree_find(t, 0, x, z, &n));
+    while (!terrimpi_page_of(t->pages, n.number)) {
+        TERRIMPI_REFUSE(n.level + 1u == t->level_count, TERRIMP_E_PAGE);
+        n = terrimpi_tree_parent(t, &n);
+    }
+    *ground = terrimpi_page_field(terrimpi_page_terrain(t), n.number);
+    *level = n.level;
+    return TERRIMP_OK;
+}
+
+/* A sample; HORIZON_ALL when its page is not here. */
+static float terrimpi_page_sample(const terrimp_quadtree *t, uint32_t x, uint32_t z)
+{
+    uint32_t i = terrimpi_min_u32(x / t->chunk_quads, t->level_x[0] - 1u);
+    uint32_t j = terrimpi_min_u32(z / t->chunk_quads, t->level_z[0] - 1u);
+    terrimp_node n = terrimpi_tree_at(t, 0, i, j);
+    terrimp_heightfield f;
+    if (!terrimpi_page_of(t->pages, n.number))
+        return TERRIMPI_HORIZON_ALL;
+    f = terrimpi_page_field(terrimpi_page_terrain(t), n.number);
+    return terrimpi_field_sample(&f, x - i * t->chunk_quads, z - j * t->chunk_quads);
+}
+
+/* ---- opening ---- */
+
+/* The one description of the block: sets the arrays when there is a base. */
+static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pages *p,
+                                    unsigned char *base, unsigned char **head)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    terrimpi_take(&b, 1, sizeof *t);
+    terrimpi_take(&b, 1, sizeof *p);
+    *head = (unsigned char *)terrimpi_take(&b, TERRIMP_PAGES_HEADER_BYTES, 1);
+    p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
+    p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
+    p->want_limit = terrimpi_min_u32(p->slot_count, TERRIMPI_PAGE_WANTS);
+    p->wants = (terrimp_want *)terrimpi_take(&b, p->want_limit, sizeof *p->wants);
+    p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
+    return b.ok ? b.bytes : 0;
+}
+
+TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_t slot_count)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *none;
+    if (!terrimpi_within_u32(slot_count, 8u, 65534u) ||
+        terrimpi_pages_read(header, bytes, &t, &head) != TERRIMP_OK)
+        return 0;
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    return terrimpi_pages_layout(&t, &p, NULL, &none);
+}
+
+TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
+                                              size_t bytes, uint32_t slot_count, void *memory,
+                                              size_t memory_bytes, terrimp_terrain **terrain)
+{
+    static const terrimpi_page_calls calls = {
+        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
+        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_fill_ground,
+        terrimpi_page_at,         terrimpi_page_sample};
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages p;
+    unsigned char *copy;
+    uint32_t i;
+    TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    TERRIMPI_REFUSE(!terrimpi_within_u32(slot_count, 8u, 65534u), TERRIMP_E_RANGE);
+    memset(&p, 0, sizeof p);
+    p.slot_count = slot_count;
+    p.page_bytes = terrimpi_page_bytes(&t);
+    p.node_count = t.tree.node_count;
+    p.block_level = head.block_level;
+    p.stamp = head.stamp;
+    p.frame = 2;
+    p.calls = &calls;
+    TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
+                                      terrimpi_pages_layout(&t, &p, NULL, &copy)));
+    if (field) {
+        terrimp_heightfield place = *field;
+        place.samples = header;
+        place.width = t.desc.field.width;
+        place.depth = t.desc.field.depth;
+        place.format = t.desc.field.format;
+        place.row_bytes = 0;
+        place.height_scale = t.desc.field.height_scale;
+        place.height_offset = t.desc.field.height_offset;
+        TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
+    }
+    t.desc.field.samples = NULL; /* there are none but those of pages */
+    t.desc.field.has_no_data = t.desc.field.wrap = 0;
+    t.tree.field = t.desc.field;
+    t.begun = t.built = t.baked = 1;
+    terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
+    memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
+    memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
+    p.root = copy + offsetof(terrimpi_pages_head, root);
+    p.lows = (const float *)(const void *)(copy + sizeof head);
+    for (i = 0; i < slot_count; i++)
+        p.slots[i].node = p.node_count;
+    t.tree.pages = (struct terrimp_pages *)(void *)((terrimp_terrain *)memory + 1);
+    *t.tree.pages = p;
+    *(terrimp_terrain *)memory = t;
+    *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+/* ---- heights and rays ---- */
 
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
                                                   float *height, float normal[3], uint32_t *level)
 {
     terrimp_heightfield f;
-    terrimp_node n;
+    uint32_t found = 0;
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
                                              height));
     f = terrain->desc.field;
-    memset(&n, 0, sizeof n);
     if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrimpi_page_at(&terrain->tree, x, z, &n));
-        TERRIMPI_REFUSE(n.level > 0 && !level, TERRIMP_E_PAGE);
-        f = terrimpi_page_field(terrain, n.number);
+        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
+        TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
     }
     TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
     if (normal)
         TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
     if (level)
-        *level = n.level;
+        *level = found;
     return TERRIMP_OK;
 }
 
@@ -9373,12 +9616,12 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
-#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; when costs fall with the square
-                                         of that, for max_cost */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; for max_cost, from which costs fall
+                                         with the square of the tolerance, at least so much */
+#define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
-#define TERRIMPI_VIEW_WANTS 512u      /* pages asked for in a frame at most */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
@@ -9454,6 +9697,7 @@ typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
+    uint32_t wants;                /* of pages, before this update */
     terrimp_camera camera;         /* resolved */
     float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
     float pixel_factor;            /* K from there */
@@ -9589,7 +9833,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages &&
-                    (terrimpi_view_full(&d) || d.morph_ratio > 1.0f || d.hider), TERRIMP_E_RANGE);
+                    d.morph_ratio > 1.0f, TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -9891,6 +10135,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
+    const struct terrimp_pages *pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
@@ -9900,15 +10145,17 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0; /* too much of what a picture may be off goes to how far eyes are apart */
     if (node->level == 0)
         return 1;
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_ALWAYS ||
-        (f->terrain->real && /* and it is no repetition of a whole node */
-         terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0))
+    if (f->terrain->real && /* and it is no repetition of a whole node */
+        terrimpi_mesh_triangles(&f->terrain->meshes[node->number]) == 0)
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
+    if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
+        closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
-    return terrimpi_page_divides(f->terrain, node, &f->frustum) ? 0 : 1 + TERRIMPI_CULL_SHORT;
+    pages = f->terrain->tree.pages;
+    return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
+               ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -9979,6 +10226,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
                               const terrimpi_cache *cache, const terrimpi_mip_frame *mip)
 {
     const int below = TERRIMP_PLANES_ALL + 1; /* a cut of 1 is this bit, one of 2 the next */
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     cull->count = cull->ground_count = cull->impostor_count = cull->hidden_count = 0;
@@ -9989,6 +10237,8 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         terrimp_box box;
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
+        if (pages)
+            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -10337,8 +10587,7 @@ struct terrimp_view {
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
-    terrimp_want *wants;           /* [want_limit] of a terrain in pages */
-    uint32_t want_count, want_limit, late;
+    uint32_t late;                 /* nodes and pictures that pages are missing for */
     uint32_t open;                 /* 1 + the job of which pieces are missing */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
@@ -10451,8 +10700,6 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     if (v->desc.exact_depth)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
-    v->want_limit = v->terrain->tree.pages ? TERRIMPI_VIEW_WANTS : 0u;
-    v->wants = (terrimp_want *)terrimpi_take(&l, v->want_limit, sizeof *v->wants);
     v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
                                                  sizeof *v->ground.distances);
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
@@ -10781,189 +11028,6 @@ TERRIMP_API terrimp_result terrimp_view_light(terrimp_view *view, const float di
     return TERRIMP_OK;
 }
 
-/* ---- the pages that are missing ---- */
-
-/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
-static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
-{
-    if (a->urgency > b->urgency || a->urgency < b->urgency)
-        return a->urgency > b->urgency;
-    return a->level != b->level ? a->level > b->level : a->node < b->node;
-}
-
-/* Notes that a page is of use in this frame. If it is missing it is wanted; or the one above it
-   that has to come first. */
-static void terrimpi_view_want(terrimp_view *v, const terrimp_node *node, int reason,
-                               float urgency)
-{
-    const terrimp_quadtree *t = &v->terrain->tree;
-    terrimp_node n = *node, above;
-    terrimp_want want, *worst = v->wants;
-    uint32_t i;
-    while (n.level + 1u < t->level_count && !t->pages->slot_of[n.number]) {
-        above = terrimpi_tree_parent(t, &n);
-        terrimpi_page_use(t, above.number); /* or it might be given up for this */
-        if (terrimpi_page_of(t->pages, above.number))
-            break;
-        n = above;
-    }
-    terrimpi_page_use(t, n.number);
-    if (t->pages->slot_of[n.number])
-        return;
-    want.node = n.number;
-    want.level = n.level;
-    want.bytes = t->pages->page_bytes;
-    want.reason = reason;
-    want.urgency = urgency;
-    for (i = 0; i < v->want_count; i++) {
-        if (v->wants[i].node == n.number) {
-            if (terrimpi_want_before(&want, &v->wants[i]))
-                v->wants[i] = want;
-            return;
-        }
-        if (terrimpi_want_before(worst, &v->wants[i]))
-            worst = &v->wants[i];
-    }
-    if (v->want_count < v->want_limit)
-        v->wants[v->want_count++] = want;
-    else if (terrimpi_want_before(&want, worst))
-        *worst = want;
-}
-
-/* The same for a node and its children in sight. Returns whether all of them are here. */
-static int terrimpi_view_want_children(terrimp_view *v, const terrimp_frustum *frustum,
-                                       const terrimp_node *node, int reason, float urgency)
-{
-    const terrimp_quadtree *t = &v->terrain->tree;
-    terrimp_node child;
-    uint32_t i;
-    int all = 1;
-    if (!t->pages)
-        return 1;
-    terrimpi_view_want(v, node, reason, urgency);
-    if (!terrimpi_page_of(t->pages, node->number))
-        return 0;
-    for (i = 0; i < 4u; i++)
-        if (terrimpi_page_quarter(v->terrain, node, i, frustum, &child)) {
-            terrimpi_view_want(v, &child, reason, urgency);
-            all &= terrimpi_page_of(t->pages, child.number) != NULL;
-        }
-    return all;
-}
-
-/* Whether the nodes exist that have to beside and above one that is split. */
-static int terrimpi_view_has_around(const terrimpi_mip_frame *mip, const terrimp_node *node)
-{
-    terrimp_node beyond;
-    int side;
-    if (node->level + 1u == mip->tree->level_count)
-        return 1;
-    if (terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, node).number) < 1.0f)
-        return 0;
-    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
-        if (terrimpi_tree_beyond(mip->tree, node, side, &beyond) &&
-            terrimpi_mip_ratio_of(mip, terrimpi_tree_parent(mip->tree, &beyond).number) < 1.0f)
-            return 0;
-    return 1;
-}
-
-/* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
-   neighbours still differ by one level at most. All that the split would need is wanted. */
-static void terrimpi_view_settle(terrimp_view *v, const terrimpi_frame *f,
-                                 const terrimpi_mip_frame *mip)
-{
-    const terrimp_quadtree *t = mip->tree;
-    uint32_t level, number;
-    v->want_count = v->late = 0;
-    if (!t->pages)
-        return;
-    terrimpi_page_use(t, t->node_count - 1u);
-    for (level = t->level_count; level-- > 1u;)
-        for (number = mip->first[level]; number != t->node_count;
-             number = v->ground.marks[number].next) {
-            terrimp_geomip_mark *mark = &v->ground.marks[number];
-            terrimp_node node = terrimpi_tree_node(t, number);
-            if (mark->measure < 1.0f)
-                continue;
-            if (terrimpi_view_want_children(v, &f->frustum, &node, TERRIMP_WANT_GROUND,
-                                            TERRIMP_SQRTF(mark->measure)) &&
-                terrimpi_view_has_around(mip, &node))
-                continue;
-            mark->measure = 0.0f;
-            v->late++;
-        }
-}
-
-/* Asks for the pages that ground will need soon, as the eye goes on. */
-static void terrimpi_view_look_ahead(terrimp_view *v, const terrimpi_frame *f,
-                                     const terrimpi_mip_frame *mip)
-{
-    const float *away = f->motion.away[0];
-    float frames = f->motion.frames[0] > 0.0f ? TERRIMPI_VIEW_SOON / f->motion.frames[0] : 0.0f;
-    uint32_t i, k;
-    if (!mip->tree->pages || f->desc->no_lookahead || !(terrimpi_length(away) > 0.0f))
-        return;
-    for (i = 0; i < v->ground.draw_count; i++) {
-        const terrimp_node *node = &v->ground.draws[i].node;
-        int planes = 0;
-        float measure, now, soon, eye[3];
-        terrimp_box box;
-        if (node->level == 0)
-            continue;
-        measure = terrimpi_mip_split_ratio(mip, node, &planes);
-        terrimpi_terrain_node_box(v->terrain, node, &box);
-        for (k = 0; k < 3u; k++)
-            eye[k] = f->eye[k] + away[k] * frames;
-        now = terrimp_box_distance(&box, f->eye);
-        soon = terrimp_box_distance(&box, eye);
-        if (measure * now * now >= soon * soon)
-            terrimpi_view_want_children(v, &f->frustum, node, TERRIMP_WANT_AHEAD,
-                                        0.99f * terrimpi_min(measure, 1.0f));
-    }
-}
-
-/* Whether all pages are here that a capture draws; those that are not are wanted. */
-static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
-                                   uint32_t count, float urgency)
-{
-    const terrimp_quadtree *t = &v->terrain->tree;
-    uint32_t i;
-    int all = 1;
-    for (i = 0; i < count && t->pages; i++) {
-        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
-        terrimpi_view_want(v, &node, urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE,
-                           terrimpi_min(urgency, 2.0f));
-        all &= terrimpi_page_of(t->pages, node.number) != NULL;
-    }
-    v->late += all ? 0u : 1u;
-    return all;
-}
-
-TERRIMP_API terrimp_result terrimp_view_wants(terrimp_view *view, terrimp_want *wants,
-                                              uint32_t capacity, uint32_t *count)
-{
-    uint32_t i, k, gap, room = 0;
-    const struct terrimp_pages *p;
-    TERRIMPI_REFUSE(!view || !count || (!wants && capacity > 0), TERRIMP_E_NULL);
-    *count = 0;
-    p = view->terrain->tree.pages;
-    if (!p)
-        return TERRIMP_OK;
-    for (gap = view->want_count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < view->want_count; i++) {
-            terrimp_want moved = view->wants[i];
-            for (k = i; k >= gap && terrimpi_want_before(&moved, &view->wants[k - gap]); k -= gap)
-                view->wants[k] = view->wants[k - gap];
-            view->wants[k] = moved;
-        }
-    for (i = 0; i < p->slot_count; i++)
-        room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
-    *count = terrimpi_min_u32(terrimpi_min_u32(view->want_count, room), capacity);
-    for (i = 0; i < *count; i++)
-        wants[i] = view->wants[i];
-    return TERRIMP_OK;
-}
-
 /* ---- the regions ---- */
 
 /* Makes the ground draw of a node in the ground cut. */
@@ -11034,8 +11098,16 @@ static void terrimpi_view_make_regions(terrimp_view *v, terrimpi_mip_frame *mip)
    tolerance. The frame before is only written over when that has succeeded. */
 static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f)
 {
+    struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
-    if (terrimpi_view_full(&v->desc)) {
+    uint32_t i;
+    mip.whole = 0.0f;
+    if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
+        const terrimp_heightfield *field = &f->terrain->desc.field;
+        mip.whole = v->desc.mode == TERRIMP_MODE_FULL
+                        ? -1.0f : v->desc.fade_start + 4.0f * (float)v->terrain->desc.chunk_quads *
+                                      terrimpi_max(field->spacing_x, field->spacing_z);
+    } else if (terrimpi_view_full(&v->desc)) {
         if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
             return TERRIMP_E_CAPACITY;
         terrimpi_view_make_regions(v, NULL);
@@ -11045,15 +11117,25 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
-        terrimpi_view_settle(v, f, &mip);
+        if (pages) {
+            pages->want_count = f->wants; /* those of a try before are of no use */
+            pages->strays = f->desc->hider != NULL;
+            v->late = pages->calls->settle(f->terrain, &mip);
+        }
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
-        if (v->ground_scale >= most)
+        if (v->ground_scale >= most || mip.whole < 0.0f)
             return TERRIMP_E_CAPACITY;
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
-    terrimpi_view_make_regions(v, &mip);
-    terrimpi_view_look_ahead(v, f, &mip);
+    terrimpi_view_make_regions(v, mip.whole < 0.0f && v->late == 0 ? NULL : &mip);
+    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
+        float ahead[3];
+        for (i = 0; i < 3u; i++)
+            ahead[i] = f->motion.away[0][i] * (TERRIMPI_VIEW_SOON / f->motion.frames[0]);
+        if (terrimpi_length(ahead) > 0.0f)
+            pages->calls->look_ahead(f->terrain, &mip, ahead);
+    }
     return TERRIMP_OK;
 }
 
@@ -11185,9 +11267,9 @@ static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *reg
 static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    if (!p || !terrimpi_tree_opens(&v->terrain->tree, node->number))
+    const terrimp_quadtree *tree = &v->terrain->tree;
+    if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
         return 0;
-    terrimpi_page_use(&v->terrain->tree, node->number);
     if (p->listed == v->frame.number) {
         v->draws[p->draw].alpha = 1.0f;
         return 1;
@@ -11469,6 +11551,21 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
+/* Whether all pages are here that a capture draws; those that are not are wanted. */
+static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
+                                   uint32_t count, float urgency)
+{
+    const terrimp_quadtree *t = &v->terrain->tree;
+    int reason = urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE, all = 1;
+    uint32_t i;
+    for (i = 0; i < count && t->pages; i++) {
+        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
+        all &= t->pages->calls->want(t, &node, reason, terrimpi_min(urgency, 2.0f));
+    }
+    v->late += all ? 0u : 1u;
+    return all;
+}
+
 /* Finds slots for a job: those of the old picture, unless the new one is made in pieces and the old
    one is drawn meanwhile. */
 static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], terrimpi_job *job)
@@ -11482,7 +11579,8 @@ static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], ter
 }
 
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
-   `room` triangles it may be cut, if no other one is. Returns 0 when it cannot be made. */
+   `room` triangles it may be cut, if no other one is; 0: it only asks for its pages. Returns 0 when
+   it cannot be made. */
 static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, uint32_t room,
                                 terrimpi_job *job)
 {
@@ -11497,7 +11595,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     int is_known;
     memset(job, 0, sizeof *job);
     if (c->is_short) {
-        terrimpi_view_want_children(v, &f->frustum, &c->node, TERRIMP_WANT_PICTURE, 2.0f);
+        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &f->frustum,
+                                               TERRIMP_WANT_PICTURE, 2.0f);
         v->late++;
         return 0;
     }
@@ -11524,7 +11623,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency))
+    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
@@ -11534,7 +11633,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->in_pieces = f->desc->max_capture_triangles ||
                      ((job->triangles > room ||
                        (f->desc->max_cost > 0.0f &&
-                        c->capture_cost > costs->triangle * (float)room)) && !v->open);
+                        terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
+                                              (float)job->triangles) >
+                            costs->triangle * (float)room)) && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -11679,6 +11780,14 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_captur
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
+/* Asks for the pages of a picture that has to wait: so they come meanwhile, and stay. */
+static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
+{
+    terrimpi_job job;
+    if (v->terrain->tree.pages && c->urgency >= 1.0f)
+        terrimpi_job_prepare(v, c, 0, &job);
+}
+
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
@@ -11690,8 +11799,11 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
-        (d->max_capture_texels && s->texels >= d->max_capture_texels) ||
-        !terrimpi_job_prepare(v, c, room, job))
+        (d->max_capture_texels && s->texels >= d->max_capture_texels)) {
+        terrimpi_view_await(v, c);
+        return 0;
+    }
+    if (!terrimpi_job_prepare(v, c, room, job))
         return 0;
     room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
@@ -11879,6 +11991,17 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
+/* What max_cost leaves for captures: those of the mean frame, up to a share of it, and the smallest
+   piece of the picture that has been begun. */
+static float terrimpi_view_reserve(const terrimp_view *v, float spread)
+{
+    float least = (float)terrimpi_spending_least(&v->frame), piece = 0.0f;
+    if (v->open)
+        piece = v->jobs[0].cost * terrimpi_min(least / (float)v->jobs[0].triangles, 1.0f);
+    return terrimpi_max(terrimpi_min(spread, TERRIMPI_VIEW_RESERVE * v->desc.max_cost),
+                        terrimpi_min(piece, 2.0f * TERRIMPI_VIEW_RESERVE * v->desc.max_cost));
+}
+
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
 static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
@@ -11886,9 +12009,10 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    float finer = max_cost > 0.0f ? TERRIMP_SQRTF(v->cost / max_cost) : TERRIMPI_VIEW_FINER;
     uint32_t tries, i;
-    if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
-        v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
+    if (finer <= TERRIMPI_VIEW_FINER)
+        v->ground_scale = terrimpi_max(1.0f, scale * terrimpi_max(finer, TERRIMPI_VIEW_FINEST));
     for (tries = 0;; tries++) {
         TERRIMPI_TRY(terrimpi_view_cut(v, f));
         if (!f->camera.orthographic != !v->frame.camera.orthographic)
@@ -11897,11 +12021,14 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->region_count; i++)
             terrimpi_view_decide(v, &v->regions[i], sums);
-        v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
+        v->cost = sums->drawn + terrimpi_view_reserve(v, sums->spread);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
-        v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
+        finer = v->ground_scale;
+        v->ground_scale *= TERRIMPI_VIEW_DEARER;
+        if (finer < scale)
+            v->ground_scale = terrimpi_min(v->ground_scale, scale);
     }
 }
 
@@ -11919,12 +12046,12 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         terrimpi_tiled_move(view, went[0], went[1]);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
-    if (view->terrain->tree.pages && !terrimpi_tree_opens(&view->terrain->tree,
-                                                          view->terrain->tree.node_count - 1u)) {
-        terrimp_node root = terrimpi_tree_root(&view->terrain->tree);
-        view->want_count = 0;
-        terrimpi_view_want(view, &root, TERRIMP_WANT_GROUND, 1e6f);
-        return TERRIMP_E_PAGE;
+    if (view->terrain->tree.pages) {
+        const terrimp_quadtree *tree = &view->terrain->tree;
+        terrimp_node root = terrimpi_tree_root(tree);
+        frame.wants = tree->pages->want_count;
+        TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
+                        TERRIMP_E_PAGE);
     }
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
@@ -12131,7 +12258,8 @@ TERRIMP_API void terrimp_view_destroy(terrimp_view *view)
    sqrt(5) sides of its own level farther away than split[a + 1] while it is there, its neighbours
    less than sqrt(2) sides more, 1.83 sides of theirs, and up to 1.875 of them beyond the place
    where their level begins vertices have their own height. So a height is a function of the place
-   and of the eye alone, for both pages at a border too, and a continuous one of the eye.
+   and of the eye alone, for both pages at a border too, and a continuous one of the eye. It is made
+   once for all quarters of a square: their corners are the 3 x 3 places of the square.
 
    All distances are whole numbers of units of 1/8 sample or less: the same on every machine. */
 
@@ -12249,21 +12377,22 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
 
 /* ---- the footprint ---- */
 
-/* Points in plan, in samples from the corner of the eye's page. */
+/* Points in plan, in samples from the corner of the eye's page, and the rectangle around them. */
 typedef struct terrimpi_sorted_hull {
-    float at[16][2];
+    float at[16][2], low[2], high[2];
     int count;
-    float farthest; /* from the corner, along an axis */
 } terrimpi_sorted_hull;
 
 static void terrimpi_sorted_hull_add(terrimpi_sorted_hull *hull, const float a[3], const float b[3],
                                      float part)
 {
+    int k, first = hull->count == 0;
     float *at = hull->at[hull->count++];
-    at[0] = a[0] + (b[0] - a[0]) * part;
-    at[1] = a[2] + (b[2] - a[2]) * part;
-    hull->farthest = terrimpi_max(hull->farthest, terrimpi_max(terrimpi_abs(at[0]),
-                                                               terrimpi_abs(at[1])));
+    for (k = 0; k < 2; k++) {
+        at[k] = a[2 * k] + (b[2 * k] - a[2 * k]) * part;
+        hull->low[k] = first ? at[k] : terrimpi_min(hull->low[k], at[k]);
+        hull->high[k] = first ? at[k] : terrimpi_max(hull->high[k], at[k]);
+    }
 }
 
 /* Adds where an edge of the frustum ends or leaves the heights that there are. */
@@ -12297,7 +12426,6 @@ static void terrimpi_sorted_hull_frustum(const terrimp_sorted_desc *d, const ter
             corner[i][k] = eye[k] + way * z_far / size;
         }
     hull->count = 0;
-    hull->farthest = 0.0f;
     for (i = 0; i < 4; i++) {
         terrimpi_sorted_hull_edge(hull, eye, corner[i], d->low, d->high);
         terrimpi_sorted_hull_edge(hull, corner[i], corner[(i + 1) & 3], d->low, d->high);
@@ -12323,21 +12451,24 @@ static int terrimpi_sorted_hull_next(const terrimpi_sorted_hull *hull, int from)
     return best;
 }
 
-/* A side of the footprint: its direction is rounded, but none of the points is left outside, nor
-   what is within a sample of them. */
-static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *hull, float x,
-                                 float z)
+/* A side of the footprint, between two points: its direction is rounded, but none of the points is
+   left outside, nor what is within a sample of them. */
+static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *hull, int from,
+                                 int to)
 {
+    float x = hull->at[to][0] - hull->at[from][0], z = hull->at[to][1] - hull->at[from][1];
     float size = 8192.0f / terrimpi_max(terrimpi_abs(x), terrimpi_abs(z)), least = 0.0f;
-    terrimp_sorted_int *side = s->sides[s->side_count++];
+    terrimp_sorted_side *side = &s->sides[s->side_count++];
     int i;
-    side[0] = (terrimp_sorted_int)(-z * size);
-    side[1] = (terrimp_sorted_int)(x * size);
+    side->x = (int32_t)(-z * size);
+    side->z = (int32_t)(x * size);
     for (i = 0; i < hull->count; i++) {
-        float at = (float)side[0] * hull->at[i][0] + (float)side[1] * hull->at[i][1];
+        float at = (float)side->x * hull->at[i][0] + (float)side->z * hull->at[i][1];
         least = i == 0 ? at : terrimpi_min(least, at);
     }
-    side[2] = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
+    side->at = (terrimp_sorted_int)(terrimpi_abs(least) * 1e-6f - least) + 2 * 8192 + 1;
+    side->fall = (side->x < 0 ? -side->x : 0) + (side->z < 0 ? -side->z : 0);
+    side->rise = side->x + side->z + side->fall;
 }
 
 static int32_t terrimpi_sorted_larger(int32_t a, int32_t b) { return a > b ? a : b; }
@@ -12353,50 +12484,41 @@ static int32_t terrimpi_sorted_floor(float value)
 static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_hull *hull)
 {
     float page = (float)s->desc.page_quads;
-    int i, k, first = 0, from, to, least[2] = { 0, 0 }, most[2] = { 0, 0 };
-    s->side_count = 0;
-    for (i = 0; i < hull->count; i++)
-        for (k = 0; k < 2; k++) {
-            const float *p = hull->at[i], *q = hull->at[least[k]];
-            least[k] = p[k] < q[k] || (p[k] == q[k] && p[1 - k] < q[1 - k]) ? i : least[k];
-            most[k] = hull->at[i][k] > hull->at[most[k]][k] ? i : most[k];
-        }
+    int i, k, first = 0, from, to;
     for (k = 0; k < 2; k++) {
-        s->bounds[k][0] = terrimpi_sorted_floor((hull->at[least[k]][k] - 1.0f) / page);
-        s->bounds[k][1] = terrimpi_sorted_floor((hull->at[most[k]][k] + 1.0f) / page);
+        s->bounds[k][0] = terrimpi_sorted_floor((hull->low[k] - 1.0f) / page);
+        s->bounds[k][1] = terrimpi_sorted_floor((hull->high[k] + 1.0f) / page);
     }
-    for (from = first = least[0]; s->side_count < TERRIMP_SORTED_SIDES; from = to) {
-        float x, z;
+    for (i = 1; i < hull->count; i++) {
+        const float *p = hull->at[i], *q = hull->at[first];
+        first = p[0] < q[0] || (p[0] == q[0] && p[1] < q[1]) ? i : first;
+    }
+    s->side_count = 0;
+    from = first;
+    do {
         to = terrimpi_sorted_hull_next(hull, from);
-        x = hull->at[to][0] - hull->at[from][0];
-        z = hull->at[to][1] - hull->at[from][1];
-        if (to == from || !(x * x + z * z > 0.0f))
+        if (to == from)
             return;
-        terrimpi_sorted_side(s, hull, x, z);
-        if (to == first)
-            return;
-    }
+        terrimpi_sorted_side(s, hull, from, to);
+        from = to;
+    } while (to != first && s->side_count < TERRIMP_SORTED_SIDES);
 }
 
-/* Which of the sides of a mask cross a square; -1: it is outside of one. */
-static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], int32_t size,
-                                 uint32_t mask)
+/* Which of a square's sides of the footprint cross it; -1: it is outside of one. */
+static int terrimpi_sorted_sides(const terrimp_sorted *s, const terrimp_sorted_cell *c,
+                                 uint32_t level)
 {
-    uint32_t i, crossing = 0;
-    for (i = 0; mask >> i; i++) {
-        const terrimp_sorted_int *n = s->sides[i];
-        terrimp_sorted_int here, most, least;
-        if (!(mask >> i & 1u))
-            continue;
-        here = n[0] * at[0] + n[1] * at[1] + n[2];
-        most = here + (n[0] > 0 ? n[0] : 0) * size + (n[1] > 0 ? n[1] : 0) * size;
-        least = here + (n[0] < 0 ? n[0] : 0) * size + (n[1] < 0 ? n[1] : 0) * size;
-        if (most < 0)
-            return -1;
-        if (least < 0)
-            crossing |= 1u << i;
-    }
-    return (int)crossing;
+    terrimp_sorted_int x = s->corner[0] + c->at[0], z = s->corner[1] + c->at[1];
+    const terrimp_sorted_side *side = s->sides;
+    int bit, mask = c->sides, crossing = 0;
+    for (bit = 1; bit <= mask; bit <<= 1, side++)
+        if (mask & bit) {
+            terrimp_sorted_int here = side->x * x + side->z * z + side->at;
+            if (here + ((terrimp_sorted_int)side->rise << level) < 0)
+                return -1;
+            crossing |= here < (terrimp_sorted_int)side->fall << level ? bit : 0;
+        }
+    return crossing;
 }
 
 /* First and last page of a row that the footprint can touch, or one more: sides are divided in
@@ -12404,14 +12526,14 @@ static int terrimpi_sorted_sides(const terrimp_sorted *s, const int32_t at[2], i
 static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *first,
                                 int32_t *last)
 {
-    int along = s->row_axis, across = 1 - along;
+    int along = s->row_axis;
     uint32_t i;
     *first = s->bounds[along][0];
     *last = s->bounds[along][1];
     for (i = 0; i < s->side_count; i++) {
-        int32_t n = (int32_t)s->sides[i][along], m = (int32_t)s->sides[i][across];
-        int32_t most = (int32_t)(s->sides[i][2] >> s->top) + 1 +
-                       m * (m > 0 ? row + 1 : row);
+        const terrimp_sorted_side *side = &s->sides[i];
+        int32_t n = along == 0 ? side->x : side->z, m = side->x + side->z - n;
+        int32_t most = (int32_t)(side->at >> s->top) + 1 + m * (m > 0 ? row + 1 : row);
         if (n > 0)
             *first = terrimpi_sorted_larger(*first, -most / n - 1);
         else if (n < 0)
@@ -12421,14 +12543,10 @@ static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *f
 
 /* ---- levels ---- */
 
-/* The square of the distance, along an axis, from the eye to an interval of samples. */
-static terrimp_sorted_int terrimpi_sorted_away(const terrimp_sorted *s, int axis, int32_t low,
-                                               int32_t size)
+/* The way along an axis from the eye to the closest point of an interval. */
+static terrimp_sorted_int terrimpi_sorted_nearest(terrimp_sorted_int begin, terrimp_sorted_int end)
 {
-    terrimp_sorted_int before = low * s->unit[axis] - s->eye[axis];
-    terrimp_sorted_int beyond = before + size * s->unit[axis];
-    terrimp_sorted_int away = before > 0 ? before : beyond < 0 ? beyond : 0;
-    return away * away;
+    return begin > 0 ? begin : end < 0 ? end : 0;
 }
 
 /* The square of a number of units, or more than any distance. */
@@ -12459,22 +12577,156 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
+static uint32_t terrimpi_sorted_level(const terrimp_sorted *s)
+{
+    return s->top - (uint32_t)(s->depth + 1);
+}
+
 /* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
-   nodes. None is when even the neighbour that is closest, by a side, is not. */
+   nodes. Only one that is closer than the square can be, across the side that faces the eye: one
+   along each axis at most. */
 static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
-    const int32_t *at = s->at;
-    uint32_t level = s->level;
-    int32_t size = 1 << level;
-    terrimp_sorted_int x, z, split = s->split[level] - s->rise;
+    const terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    uint32_t level = terrimpi_sorted_level(s), pattern = 0;
+    terrimp_sorted_int away[2];
+    int k;
     if (level == 0 || s->away > s->whole[level])
         return 0;
-    x = terrimpi_sorted_away(s, 0, at[0], size);
-    z = terrimpi_sorted_away(s, 1, at[1], size);
-    return (uint32_t)(x + terrimpi_sorted_away(s, 1, at[1] - size, size) < split) |
-           (uint32_t)(x + terrimpi_sorted_away(s, 1, at[1] + size, size) < split) << 1 |
-           (uint32_t)(z + terrimpi_sorted_away(s, 0, at[0] - size, size) < split) << 2 |
-           (uint32_t)(z + terrimpi_sorted_away(s, 0, at[0] + size, size) < split) << 3;
+    for (k = 0; k < 2; k++)
+        away[k] = terrimpi_sorted_nearest(c->away[k][0], c->away[k][2]);
+    for (k = 0; k < 2; k++) {
+        terrimp_sorted_int size = c->away[k][2] - c->away[k][0];
+        terrimp_sorted_int beside = away[k] > 0 ? terrimpi_sorted_nearest(away[k] - size, away[k])
+                                                : terrimpi_sorted_nearest(away[k], away[k] + size);
+        if (beside * beside + away[1 - k] * away[1 - k] + s->rise < s->split[level])
+            pattern |= (away[k] > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
+    }
+    return pattern;
+}
+
+/* ---- heights ---- */
+
+static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t at)
+{
+    return at < s->last[axis] ? at : s->last[axis];
+}
+
+/* A sample of the page as it is stored. */
+static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    const void *row = (const char *)s->page.samples +
+                      (size_t)(terrimpi_sorted_clamp(s, 1, z) >> s->page.level) * s->page.row_bytes;
+    const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
+    x = terrimpi_sorted_clamp(s, 0, x) >> s->page.level;
+    switch (s->desc.field.format) {
+#ifndef TERRIMP_FIXED
+    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
+#endif
+    case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
+    case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
+    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
+    }
+}
+
+/* From which level on the heights at a place of the page are here. */
+static uint32_t terrimpi_sorted_here(const terrimp_sorted *s, int32_t x, int32_t z)
+{
+    int32_t quads = (int32_t)s->desc.page_quads;
+    uint32_t level = s->page.level;
+    if (z == 0)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z0]);
+    if (z == quads)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z1]);
+    if (x == 0)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X0]);
+    if (x == quads)
+        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X1]);
+    return level;
+}
+
+/* from + (to - from) * part / whole. Ends and halves are exact, so that an edge is the same for
+   both of its sides. */
+static terrimp_sorted_height terrimpi_sorted_mix(terrimp_sorted_height from,
+                                                 terrimp_sorted_height to, int32_t part,
+                                                 int32_t whole)
+{
+    if (part * 2 == whole)
+        return (from + to) / 2;
+    if (part == whole)
+        return to;
+#ifdef TERRIMP_FIXED
+    return from + (to - from) / 16 * part / whole * 16;
+#else
+    return from + (to - from) * ((float)part / (float)whole);
+#endif
+}
+
+/* What a height that is not a corner of its square rests on where the next level begins: mostly the
+   middle between two others, at its sides or on the diagonal. Where the field ends within the
+   square it is a place of one of its two triangles. */
+static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s,
+                                                  const terrimp_sorted_cell *c, uint32_t place,
+                                                  int32_t x, int32_t z, int32_t size)
+{
+    uint32_t step = place & 5u;
+    terrimp_sorted_height from = c->heights[place - step], to = c->heights[place + step], corner;
+    int32_t u, v, width, length;
+    if (!s->partial)
+        return (from + to) / 2;
+    u = terrimpi_sorted_clamp(s, 0, x) - c->at[0];
+    v = terrimpi_sorted_clamp(s, 1, z) - c->at[1];
+    width = terrimpi_sorted_clamp(s, 0, c->at[0] + size) - c->at[0];
+    length = terrimpi_sorted_clamp(s, 1, c->at[1] + size) - c->at[1];
+    if (step == 1u)
+        return terrimpi_sorted_mix(from, to, u, width);
+    if (step == 4u || u * length == v * width)
+        return terrimpi_sorted_mix(from, to, v, length);
+    corner = c->heights[u * length > v * width ? 2 : 8];
+    if (u * length > v * width)
+        return terrimpi_sorted_mix(from, corner, u, width) - corner +
+               terrimpi_sorted_mix(corner, to, v, length);
+    return terrimpi_sorted_mix(from, corner, v, length) - corner +
+           terrimpi_sorted_mix(corner, to, u, width);
+}
+
+/* The height of a place of a square that comes when that is split, into quarters of a level. */
+static terrimp_sorted_height terrimpi_sorted_height_at(const terrimp_sorted *s,
+                                                       const terrimp_sorted_cell *c,
+                                                       uint32_t place, uint32_t level)
+{
+    uint32_t column = place & 3u, row = place >> 2;
+    int32_t x = c->at[0] + (int32_t)(column << level), z = c->at[1] + (int32_t)(row << level);
+    terrimp_sorted_int away = c->away[0][column] * c->away[0][column] +
+                              c->away[1][row] * c->away[1][row] + s->rise;
+    terrimp_sorted_int left = s->split[level + 1u] - away;
+    int here = !s->partial || terrimpi_sorted_here(s, x, z) <= level;
+    terrimp_sorted_height rest;
+    if (here && away <= s->whole[level])
+        return terrimpi_sorted_sample(s, x, z);
+    rest = terrimpi_sorted_rest(s, c, place, x, z, 2 << level);
+    if (!here || left <= 0)
+        return rest;
+#ifdef TERRIMP_FIXED
+    {
+        terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
+        int shift = range < 1 << 16 ? 0 : 15;
+        return rest + (terrimpi_sorted_sample(s, x, z) - rest) / 64 *
+                      ((left >> shift) * 64 / ((range >> shift) + 1));
+    }
+#else
+    return rest + (terrimpi_sorted_sample(s, x, z) - rest) *
+                  terrimpi_min((float)left * s->fade[level], 1.0f);
+#endif
+}
+
+/* The heights of the places of a square that is split, but for its corners. */
+static void terrimpi_sorted_fill(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
+{
+    static const uint8_t places[5] = { 1, 4, 5, 6, 9 };
+    int i;
+    for (i = 0; i < 5; i++)
+        c->heights[places[i]] = terrimpi_sorted_height_at(s, c, places[i], level);
 }
 
 /* ---- the order ---- */
@@ -12498,69 +12750,70 @@ static void terrimpi_sorted_restart(terrimp_sorted *s)
     s->triangle_count = 0;
 }
 
-/* Pushes a square on the stack, or makes it the present one: then it returns 1. */
-static int terrimpi_sorted_visit(terrimp_sorted *s, const int32_t at[2], uint32_t level,
-                                 uint32_t mask)
+/* Looks at the square above the stack, of which begin and level are known. Returns 1 if it is drawn
+   as a whole: then it is the present one; 0 after it has been pushed; -1 when it lies outside. */
+static int terrimpi_sorted_visit(terrimp_sorted *s)
 {
-    int sides = terrimpi_sorted_sides(s, at, 1 << level, mask);
-    if (sides < 0 || at[0] - s->corner[0] >= s->last[0] || at[1] - s->corner[1] >= s->last[1])
-        return 0;
-    s->at[0] = at[0];
-    s->at[1] = at[1];
-    s->level = level;
-    s->away = terrimpi_sorted_away(s, 0, at[0], 1 << level) +
-              terrimpi_sorted_away(s, 1, at[1], 1 << level) + s->rise;
+    uint32_t level = terrimpi_sorted_level(s);
+    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    int k, sides = c->sides ? terrimpi_sorted_sides(s, c, level) : 0;
+    if (sides < 0 || c->at[0] >= s->last[0] || c->at[1] >= s->last[1])
+        return -1;
+    s->away = s->rise;
+    for (k = 0; k < 2; k++) {
+        terrimp_sorted_int *away = c->away[k], size = s->unit[k] << level, nearest;
+        away[1] = away[0] + (size >> 1);
+        away[2] = away[0] + size;
+        nearest = terrimpi_sorted_nearest(away[0], away[2]);
+        s->away += nearest * nearest;
+    }
     if (s->away >= s->split[level])
         return 1;
+    c->sides = (uint16_t)sides;
+    c->child = 0;
+    c->order = (uint8_t)((c->away[s->row_axis][1] > 0) | (c->away[1 - s->row_axis][1] > 0) << 1);
+    c->order ^= s->desc.front_to_back ? 3 : 0;
     s->depth++;
-    s->stack[s->depth].at[0] = at[0];
-    s->stack[s->depth].at[1] = at[1];
-    s->stack[s->depth].sides = (uint16_t)sides;
-    s->stack[s->depth].child = 0;
     return 0;
 }
 
-/* Looks at the next quarter of the square on top of the stack. Rows come before columns. */
+/* Goes to the next quarter of the square on top of the stack, of two the one first that the eye is
+   not at; rows come before columns. Returns its place; -1 after the last one. */
 static int terrimpi_sorted_quarter(terrimp_sorted *s)
 {
-    uint32_t k = s->stack[s->depth].child++, level = s->top - (uint32_t)s->depth - 1u;
-    int32_t half = 1 << level, at[2];
-    int axis;
-    if (k == 4u) {
+    terrimp_sorted_cell *c = &s->stack[s->depth];
+    uint32_t level = terrimpi_sorted_level(s), k = c->child ^ (uint32_t)c->order, x, z;
+    if (c->child++ == 4) {
         s->depth--;
-        return 0;
+        return -1;
     }
-    k = s->desc.front_to_back ? 3u - k : k;
-    for (axis = 0; axis < 2; axis++) {
-        int32_t begin = s->stack[s->depth].at[axis];
-        int eye_beyond = s->eye[axis] >= (begin + half) * s->unit[axis];
-        uint32_t closer = axis == s->row_axis ? k & 1u : k >> 1;
-        at[axis] = begin + ((int)closer == eye_beyond ? half : 0);
-    }
-    return terrimpi_sorted_visit(s, at, level, s->stack[s->depth].sides);
+    x = s->row_axis == 0 ? k & 1u : k >> 1;
+    z = s->row_axis == 0 ? k >> 1 : k & 1u;
+    c[1].at[0] = c->at[0] + (int32_t)(x << level);
+    c[1].at[1] = c->at[1] + (int32_t)(z << level);
+    c[1].away[0][0] = c->away[0][x];
+    c[1].away[1][0] = c->away[1][z];
+    c[1].sides = c->sides;
+    return (int)(x + 4u * z);
 }
 
 /* ---- pages ---- */
 
 /* The level whose texels are one to two pixels large at the page's closest point. A coarser one is
    left only a tenth closer than where it began. */
-static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s, const int32_t page[2])
+static uint32_t terrimpi_sorted_texture_level(const terrimp_sorted *s)
 {
     const terrimp_sorted_desc *d = &s->desc;
-    terrimp_sorted_int away = terrimpi_sorted_away(s, 0, s->corner[0], (int32_t)d->page_quads) +
-                              terrimpi_sorted_away(s, 1, s->corner[1], (int32_t)d->page_quads) +
-                              s->rise;
     uint32_t window = d->texture_window - 1u, level = 0;
     uint8_t *kept = d->texture_levels;
     if (kept)
-        kept += ((uint32_t)page[1] & window) * d->texture_window + ((uint32_t)page[0] & window);
+        kept += ((uint32_t)s->page.z & window) * d->texture_window + ((uint32_t)s->page.x & window);
     if (kept && *kept < d->texture_level_count) {
         level = *kept;
-        while (level > 0 && away >> 2u * (level - 1u) < s->texel_steps[1])
+        while (level > 0 && s->away >> 2u * (level - 1u) < s->texel_steps[1])
             level--;
     }
-    while (level + 1u < d->texture_level_count &&
-           away >> 2u * level >= s->texel_steps[0])
+    while (level + 1u < d->texture_level_count && s->away >> 2u * level >= s->texel_steps[0])
         level++;
     if (kept)
         *kept = (uint8_t)level;
@@ -12612,39 +12865,16 @@ static int terrimpi_sorted_ask(terrimp_sorted *s, terrimp_sorted_page *page)
     return 1;
 }
 
-/* Goes to a page, counted from the eye's. to_count: only its squares are of interest. */
-static int terrimpi_sorted_enter(terrimp_sorted *s, const int32_t place[2], int to_count)
+/* Goes to the next page of the frame; 0: there is none. */
+static int terrimpi_sorted_next_page(terrimp_sorted *s)
 {
-    int32_t page[2], quads = (int32_t)s->desc.page_quads;
-    int axis;
-    for (axis = 0; axis < 2; axis++) {
-        page[axis] = place[axis] + s->eye_page[axis];
-        s->corner[axis] = place[axis] * quads;
-        s->last[axis] = quads;
-    }
-    memset(&s->page, 0, sizeof s->page);
-    s->page.x = page[0];
-    s->page.z = page[1];
-    if (!s->desc.page)
-        terrimpi_sorted_field_page(s, &s->page);
-    if (!to_count) {
-        s->page.texture_level = terrimpi_sorted_texture_level(s, page);
-        if (s->desc.page && !terrimpi_sorted_ask(s, &s->page))
-            return 0;
-    }
-    return terrimpi_sorted_visit(s, s->corner, s->top, (1u << s->side_count) - 1u);
-}
-
-/* Goes to the next page of the frame. Returns 1 when it is the present square, 0 when it is to be
-   looked into, -1 when there is none. */
-static int terrimpi_sorted_next_page(terrimp_sorted *s, int to_count)
-{
-    int along = s->row_axis, across = 1 - along;
+    int along = s->row_axis, across = 1 - along, k;
+    terrimp_sorted_cell *c = &s->stack[0];
     int32_t place[2];
     while (s->col >= s->cols) {
         int32_t last;
         if (s->row >= s->rows)
-            return -1;
+            return 0;
         s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
                                                  s->desc.front_to_back);
         terrimpi_sorted_row(s, s->page_row, &s->first_col, &last);
@@ -12654,184 +12884,78 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s, int to_count)
     place[across] = s->page_row;
     place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, 0, s->col++,
                                               s->desc.front_to_back);
-    return terrimpi_sorted_enter(s, place, to_count);
+    memset(&s->page, 0, sizeof s->page);
+    s->page.x = place[0] + s->eye_page[0];
+    s->page.z = place[1] + s->eye_page[1];
+    for (k = 0; k < 2; k++) {
+        s->last[k] = (int32_t)s->desc.page_quads;
+        s->corner[k] = place[k] * s->last[k];
+        c->at[k] = 0;
+        c->away[k][0] = s->corner[k] * s->unit[k] - s->eye[k];
+    }
+    c->sides = (uint16_t)((1u << s->side_count) - 1u);
+    if (!s->desc.page)
+        terrimpi_sorted_field_page(s, &s->page);
+    return 1;
+}
+
+/* Readies a page to be drawn; 0: it is not here. Its corners have their own heights. */
+static int terrimpi_sorted_open(terrimp_sorted *s)
+{
+    terrimp_sorted_height *heights = s->stack[0].heights;
+    int32_t last = (int32_t)s->desc.page_quads;
+    s->page.texture_level = terrimpi_sorted_texture_level(s);
+    if (s->desc.page && !terrimpi_sorted_ask(s, &s->page)) {
+        s->depth = -1;
+        return 0;
+    }
+    heights[0] = terrimpi_sorted_sample(s, 0, 0);
+    heights[2] = terrimpi_sorted_sample(s, last, 0);
+    heights[8] = terrimpi_sorted_sample(s, 0, last);
+    heights[10] = terrimpi_sorted_sample(s, last, last);
+    return 1;
+}
+
+/* Gives a quarter the corners that are places of its square. */
+static void terrimpi_sorted_inherit(const terrimp_sorted_cell *from, int place,
+                                    terrimp_sorted_cell *quarter)
+{
+    quarter->heights[0] = from->heights[place];
+    quarter->heights[2] = from->heights[place + 1];
+    quarter->heights[8] = from->heights[place + 4];
+    quarter->heights[10] = from->heights[place + 5];
+}
+
+/* Looks at the next quarter or page. Returns 1 when it is the present square, 0 when it is not, -1
+   when there is none. to_count: heights are not wanted. */
+static int terrimpi_sorted_look(terrimp_sorted *s, int to_count)
+{
+    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    int is_page = s->depth < 0, place = 0, found;
+    if (is_page && !terrimpi_sorted_next_page(s))
+        return -1;
+    if (!is_page && (place = terrimpi_sorted_quarter(s)) < 0)
+        return 0;
+    found = terrimpi_sorted_visit(s);
+    if (found < 0 || to_count)
+        return found > 0;
+    if (is_page && !terrimpi_sorted_open(s))
+        return 0;
+    if (!is_page)
+        terrimpi_sorted_inherit(c - 1, place, c);
+    if (!found)
+        terrimpi_sorted_fill(s, c, terrimpi_sorted_level(s));
+    return found;
 }
 
 /* Goes to the next square; 0: there is none. */
 static int terrimpi_sorted_step(terrimp_sorted *s, int to_count)
 {
-    for (;;) {
-        int found = s->depth < 0 ? terrimpi_sorted_next_page(s, to_count)
-                                 : terrimpi_sorted_quarter(s);
-        if (found != 0)
-            return found > 0;
-    }
-}
-
-/* ---- heights ---- */
-
-static uint32_t terrimpi_sorted_alignment(const terrimp_sorted *s, int32_t x, int32_t z,
-                                          uint32_t least)
-{
-    uint32_t bits = (uint32_t)x | (uint32_t)z;
-    while (least < s->top && !(bits >> least & 1u))
-        least++;
-    return least;
-}
-
-static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t at)
-{
-    return at < s->last[axis] ? at : s->last[axis];
-}
-
-/* A sample of the page as it is stored; column and row are of those that are here. */
-static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
-{
-    const void *row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
-    const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
-    switch (s->desc.field.format) {
-#ifndef TERRIMP_FIXED
-    case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
-#endif
-    case TERRIMP_FORMAT_U16: return (terrimp_sorted_height)((const uint16_t *)row)[x] * one;
-    case TERRIMP_FORMAT_S16: return (terrimp_sorted_height)((const int16_t *)row)[x] * one;
-    default: return (terrimp_sorted_height)((const uint8_t *)row)[x] * one;
-    }
-}
-
-/* From which level on the heights at a place of the page are here. */
-static uint32_t terrimpi_sorted_here(const terrimp_sorted *s, int32_t x, int32_t z)
-{
-    int32_t quads = (int32_t)s->desc.page_quads;
-    uint32_t level = s->page.level;
-    if (z == 0)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z0]);
-    if (z == quads)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z1]);
-    if (x == 0)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X0]);
-    if (x == quads)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X1]);
-    return level;
-}
-
-static terrimp_sorted_height terrimpi_sorted_solid(const terrimp_sorted *s, int32_t x, int32_t z);
-
-/* from + (to - from) * part / whole. Halves are exact, so that an edge is the same for both. */
-static terrimp_sorted_height terrimpi_sorted_mix(terrimp_sorted_height from,
-                                                 terrimp_sorted_height to, int32_t part,
-                                                 int32_t whole)
-{
-    if (part * 2 == whole)
-        return (from + to) / 2;
-#ifdef TERRIMP_FIXED
-    return from + (to - from) / 16 * part / whole * 16;
-#else
-    return from + (to - from) * ((float)part / (float)whole);
-#endif
-}
-
-/* The height at a place of the page when only every step-th sample is there. */
-static terrimp_sorted_height terrimpi_sorted_flat(const terrimp_sorted *s, int32_t x, int32_t z,
-                                                  int32_t step)
-{
-    int32_t quads = (int32_t)s->desc.page_quads;
-    int32_t x0 = x == quads ? x - step : x - x % step, z0 = z == quads ? z - step : z - z % step;
-    int32_t left = terrimpi_sorted_clamp(s, 0, x0), back = terrimpi_sorted_clamp(s, 1, z0);
-    int32_t u = terrimpi_sorted_clamp(s, 0, x) - left, v = terrimpi_sorted_clamp(s, 1, z) - back;
-    int32_t width = terrimpi_sorted_clamp(s, 0, x0 + step) - left;
-    int32_t depth = terrimpi_sorted_clamp(s, 1, z0 + step) - back;
-    int on_right = u == width && u > 0, on_front = v == depth && v > 0;
-    terrimp_sorted_height from, corner;
-    if (u == 0 || on_right) {
-        x0 += on_right ? step : 0;
-        from = terrimpi_sorted_solid(s, x0, z0 + (on_front ? step : 0));
-        return v == 0 || on_front ? from : terrimpi_sorted_mix(
-            from, terrimpi_sorted_solid(s, x0, z0 + step), v, depth);
-    }
-    if (v == 0 || on_front) {
-        z0 += on_front ? step : 0;
-        return terrimpi_sorted_mix(terrimpi_sorted_solid(s, x0, z0),
-                                   terrimpi_sorted_solid(s, x0 + step, z0), u, width);
-    }
-    from = terrimpi_sorted_solid(s, x0, z0);
-    if (u * depth == v * width)
-        return terrimpi_sorted_mix(from, terrimpi_sorted_solid(s, x0 + step, z0 + step), v, depth);
-    if (u * depth > v * width) {
-        corner = terrimpi_sorted_solid(s, x0 + step, z0);
-        return terrimpi_sorted_mix(from, corner, u, width) - corner + terrimpi_sorted_mix(
-            corner, terrimpi_sorted_solid(s, x0 + step, z0 + step), v, depth);
-    }
-    corner = terrimpi_sorted_solid(s, x0, z0 + step);
-    return terrimpi_sorted_mix(from, corner, v, depth) - corner + terrimpi_sorted_mix(
-        corner, terrimpi_sorted_solid(s, x0 + step, z0 + step), u, width);
-}
-
-/* The height of a place without blending. Of a page that is not all here, the place may lie in a
-   square of samples that are, these on a side that is shared with a page of which less is here:
-   three times round at most. */
-static terrimp_sorted_height terrimpi_sorted_solid(const terrimp_sorted *s, int32_t x, int32_t z)
-{
-    uint32_t here = s->partial ? terrimpi_sorted_here(s, x, z) : 0;
-    if (here == 0 || terrimpi_sorted_alignment(s, x, z, 0) >= here)
-        return terrimpi_sorted_sample(s, terrimpi_sorted_clamp(s, 0, x) >> s->page.level,
-                                      terrimpi_sorted_clamp(s, 1, z) >> s->page.level);
-    return terrimpi_sorted_flat(s, x, z, 1 << here);
-}
-
-/* What a vertex on the grid of a level rests on where that of the next one begins: mostly the
-   middle between two others, at its sides or on the diagonal. */
-static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s, int32_t x, int32_t z,
-                                                  uint32_t level)
-{
-    int32_t step_x = x & 1 << level, step_z = z & 1 << level;
-    if (s->partial)
-        return terrimpi_sorted_flat(s, x, z, 2 << level);
-    return (terrimpi_sorted_sample(s, x - step_x, z - step_z) +
-            terrimpi_sorted_sample(s, x + step_x, z + step_z)) / 2;
-}
-
-/* The height of a vertex on the grid of a level, on which others no longer rest. */
-static terrimp_sorted_height terrimpi_sorted_blend(const terrimp_sorted *s, int32_t x, int32_t z,
-                                                   uint32_t level, terrimp_sorted_int away)
-{
-    terrimp_sorted_height rest = terrimpi_sorted_rest(s, x, z, level);
-    terrimp_sorted_int left = s->split[level + 1u] - away;
-    if (left <= 0)
-        return rest;
-#ifdef TERRIMP_FIXED
-    {
-        terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
-        int shift = range < 1 << 16 ? 0 : 15;
-        return rest + (terrimpi_sorted_solid(s, x, z) - rest) / 64 *
-                      ((left >> shift) * 64 / ((range >> shift) + 1));
-    }
-#else
-    return rest + (terrimpi_sorted_solid(s, x, z) - rest) *
-                  terrimpi_min((float)left * s->fade[level], 1.0f);
-#endif
-}
-
-/* Adds a vertex at a place of the page that is on the grid of a level, or of a coarser one. away:
-   the square of its distance. */
-static void terrimpi_sorted_put(const terrimp_sorted *s, terrimp_sorted_square *out, int32_t x,
-                                int32_t z, uint32_t level, terrimp_sorted_int away)
-{
-    terrimp_sorted_vertex *v = &out->vertices[out->vertex_count++];
-    terrimp_sorted_height height;
-    v->x = s->page.x * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 0, x);
-    v->z = s->page.z * (int32_t)s->desc.page_quads + terrimpi_sorted_clamp(s, 1, z);
-    if (away > s->whole[level])
-        level = terrimpi_sorted_alignment(s, x, z, level);
-    if (away > s->whole[level])
-        height = terrimpi_sorted_blend(s, x, z, level, away);
-    else
-        height = terrimpi_sorted_solid(s, x, z);
-#ifdef TERRIMP_FIXED
-    v->height = height;
-#else
-    v->height = terrimpi_field_world_height(&s->desc.field, height);
-#endif
+    int found;
+    do
+        found = terrimpi_sorted_look(s, to_count);
+    while (found == 0);
+    return found > 0;
 }
 
 /* ---- triangles ---- */
@@ -12845,104 +12969,102 @@ static void terrimpi_sorted_triangle(terrimp_sorted_square *out, int a, int b, i
     indices[2] = (uint8_t)(turned ? b : c);
 }
 
-/* Whether of the two sides of the plane through a and b the one with the half's corner comes first
-   in the order. In the half that is not turned it is to the right of the way from a to b. */
-static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_sorted_square *out,
+/* Whether of the two sides of the plane through two places of a square the one with the half's
+   corner comes first in the order. In the half that is not turned it is to the right of the way
+   from the first place to the second. */
+static int terrimpi_sorted_corner_first(const terrimp_sorted *s, const terrimp_sorted_cell *c,
                                         int a, int b, int turned)
 {
-    const terrimp_sorted_vertex *from = &out->vertices[a], *to = &out->vertices[b];
-    int32_t quads = (int32_t)s->desc.page_quads;
-    terrimp_sorted_int x = (from->x - s->eye_page[0] * quads) * s->unit[0] - s->eye[0];
-    terrimp_sorted_int z = (from->z - s->eye_page[1] * quads) * s->unit[1] - s->eye[1];
-    terrimp_sorted_int way_x = (to->x - from->x) * s->unit[0];
-    terrimp_sorted_int way_z = (to->z - from->z) * s->unit[1];
-    int eye_left = way_z * x - way_x * z > 0;
+    int eye_left = c->away[1][b >> 2] * c->away[0][a & 3] > c->away[0][b & 3] * c->away[1][a >> 2];
     return (eye_left != turned) != (s->desc.front_to_back != 0);
 }
 
-/* The two pieces of the half that the plane through a and b cuts: one of the triangle (a, b, apex)
-   on the side of the corner, one of (b, a, rest). */
-static void terrimpi_sorted_cut(const terrimp_sorted *s, terrimp_sorted_square *out, int a, int b,
-                                int corner, int rest, int turned)
+/* Half of a square: the triangle of vertices 0, 3 and corner, whose sides that meet in the corner
+   may have vertices in the middle (0: none), begin towards 0, end towards 3. The plane through
+   these cuts off a triangle with the corner; what is left of two has its corner at the first.
+   places: of the vertices. */
+static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out,
+                                 const uint8_t places[6], int corner, int begin, int end,
+                                 int turned)
 {
-    int first = terrimpi_sorted_corner_first(s, out, a, b, turned);
+    int a = begin, b = end ? end : 3;
+    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], places[a], places[b],
+                                             turned);
     if (first)
         terrimpi_sorted_triangle(out, a, b, corner, turned);
-    terrimpi_sorted_triangle(out, b, a, rest, turned);
+    if (begin && end)
+        terrimpi_sorted_half(s, out, places, begin, 0, end, turned);
+    else if (begin || end)
+        terrimpi_sorted_triangle(out, b, a, begin ? 0 : 3, turned);
     if (!first)
         terrimpi_sorted_triangle(out, a, b, corner, turned);
 }
 
-/* Half of a square: the triangle of vertices 0, 3 and corner, whose sides that meet in the corner
-   may have vertices in the middle (0: none), begin towards 0, end towards 3. */
-static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square *out, int corner,
-                                 int begin, int end, int turned)
-{
-    if (begin && end) {
-        int i, first = terrimpi_sorted_corner_first(s, out, begin, end, turned);
-        for (i = 0; i < 2; i++)
-            if (i != first)
-                terrimpi_sorted_triangle(out, begin, end, corner, turned);
-            else
-                terrimpi_sorted_cut(s, out, 0, end, begin, 3, turned);
-    } else if (begin) {
-        terrimpi_sorted_cut(s, out, begin, 3, corner, 0, turned);
-    } else if (end) {
-        terrimpi_sorted_cut(s, out, 0, end, corner, 3, turned);
-    } else {
-        terrimpi_sorted_triangle(out, 0, 3, corner, turned);
-    }
-}
-
-/* The triangles of a square, of whose sides some have a vertex in the middle. */
+/* The triangles of the present square, of whose sides some have a vertex in the middle. */
 static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_square *out,
-                                      const int middle[4])
+                                      const uint8_t places[6], const int middle[4])
 {
     static const uint8_t plain[2][6] = { { 0, 2, 3, 0, 3, 1 }, { 0, 3, 1, 0, 2, 3 } };
-    int first = terrimpi_sorted_corner_first(s, out, 0, 3, 0), i;
+    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], 0, 10, 0), i;
     if (out->vertex_count == 4) {
         memcpy(out->indices, plain[first], sizeof plain[0]);
         out->triangle_count = 2;
         return;
     }
     out->triangle_count = 0;
-    for (i = 0; i < 2; i++)
-        if (i != first)
-            terrimpi_sorted_half(s, out, 1, middle[TERRIMP_SIDE_Z0], middle[TERRIMP_SIDE_X1], 0);
-        else
-            terrimpi_sorted_half(s, out, 2, middle[TERRIMP_SIDE_X0], middle[TERRIMP_SIDE_Z1], 1);
+    for (i = 0; i < 2; i++) {
+        int turned = i == first;
+        terrimpi_sorted_half(s, out, places, 1 + turned,
+                             middle[turned ? TERRIMP_SIDE_X0 : TERRIMP_SIDE_Z0],
+                             middle[turned ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_X1], turned);
+    }
 }
 
-/* Writes the present square. */
-static void terrimpi_sorted_emit(const terrimp_sorted *s, terrimp_sorted_square *out)
+/* Cuts off what of the present square is beyond the last sample. */
+static void terrimpi_sorted_trim(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
 {
-    uint32_t pattern = terrimpi_sorted_pattern(s);
-    int32_t x = s->at[0] - s->corner[0], z = s->at[1] - s->corner[1], size = 1 << s->level;
-    int32_t half = size / 2;
-    terrimp_sorted_int away_x[2], away_z[2];
-    int i, middle[4] = { 0, 0, 0, 0 };
-    out->page_x = s->page.x;
-    out->page_z = s->page.z;
-    out->level = (uint8_t)s->level;
-    out->texture_level = (uint8_t)s->page.texture_level;
-    out->vertex_count = 0;
-    for (i = 0; i < 2; i++) {
-        away_x[i] = terrimpi_sorted_away(s, 0, s->at[0] + i * size, 0);
-        away_z[i] = terrimpi_sorted_away(s, 1, s->at[1] + i * size, 0) + s->rise;
-    }
-    for (i = 0; i < 4; i++)
-        terrimpi_sorted_put(s, out, x + (i & 1) * size, z + (i >> 1) * size, s->level,
-                            away_x[i & 1] + away_z[i >> 1]);
+    int i, k;
+    for (k = 0; k < 2; k++)
+        for (i = 1; i < 3; i++) {
+            int32_t over = c->at[k] + ((i << level) >> 1) - s->last[k];
+            c->away[k][i] -= over > 0 ? over * s->unit[k] : 0;
+        }
+}
+
+/* Writes the present square: its corners, then the middles of its sides that are split. */
+static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
+{
+    static const uint8_t sides[4] = { 1, 9, 4, 6 };
+    uint8_t places[6] = { 0, 2, 8, 10, 0, 0 };
+    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
+    uint32_t pattern = terrimpi_sorted_pattern(s), level = terrimpi_sorted_level(s), count = 4, i;
+    int32_t quads = (int32_t)s->desc.page_quads;
+    int middle[4] = { 0, 0, 0, 0 };
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
-            int32_t along_x = i < 2 ? half : (i & 1) * size;
-            int32_t along_z = i < 2 ? (i & 1) * size : half;
-            middle[i] = out->vertex_count;
-            terrimpi_sorted_put(s, out, x + along_x, z + along_z, s->level - 1u,
-                                terrimpi_sorted_away(s, 0, s->at[0] + along_x, 0) + s->rise +
-                                terrimpi_sorted_away(s, 1, s->at[1] + along_z, 0));
+            c->heights[sides[i]] = terrimpi_sorted_height_at(s, c, sides[i], level - 1u);
+            middle[i] = (int)count;
+            places[count++] = sides[i];
         }
-    terrimpi_sorted_triangles(s, out, middle);
+    if (s->partial)
+        terrimpi_sorted_trim(s, c, level);
+    for (i = 0; i < count; i++) {
+        terrimp_sorted_vertex *v = &out->vertices[i];
+        int32_t x = c->at[0] + ((places[i] & 3) << level >> 1);
+        int32_t z = c->at[1] + ((places[i] >> 2) << level >> 1);
+        v->x = s->page.x * quads + terrimpi_sorted_clamp(s, 0, x);
+        v->z = s->page.z * quads + terrimpi_sorted_clamp(s, 1, z);
+        v->height = c->heights[places[i]];
+#ifndef TERRIMP_FIXED
+        v->height = terrimpi_field_world_height(&s->desc.field, v->height);
+#endif
+    }
+    out->page_x = s->page.x;
+    out->page_z = s->page.z;
+    out->level = (uint8_t)level;
+    out->texture_level = (uint8_t)s->page.texture_level;
+    out->vertex_count = (uint8_t)count;
+    terrimpi_sorted_triangles(s, out, places, middle);
 }
 
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
@@ -13063,11 +13185,14 @@ static float terrimpi_sorted_z_far(const terrimp_sorted_desc *d, const terrimp_c
 }
 
 /* Chooses units, as fine as the squares of all distances allow, and puts the eye in its page. */
-static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3], float reach)
+static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3],
+                                 const terrimpi_sorted_hull *hull)
 {
     const terrimp_sorted_desc *d = &s->desc;
-    float spacing[2], larger, unit = 4096.0f, rise;
+    float spacing[2], larger, unit = 4096.0f, rise, reach = 0.0f;
     int k;
+    for (k = 0; k < 2; k++)
+        reach = terrimpi_max(reach, terrimpi_max(-hull->low[k], hull->high[k]));
     spacing[0] = d->field.spacing_x;
     spacing[1] = d->field.spacing_z;
     larger = terrimpi_max(spacing[0], spacing[1]);
@@ -13135,9 +13260,9 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     }
     terrimpi_sorted_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye,
                                  &hull);
-    TERRIMPI_REFUSE(!terrimpi_sorted_units(sorted, eye, hull.farthest), TERRIMP_E_RANGE);
     if (hull.count == 0)
         return TERRIMP_OK;
+    TERRIMPI_REFUSE(!terrimpi_sorted_units(sorted, eye, &hull), TERRIMP_E_RANGE);
     terrimpi_sorted_footprint(sorted, &hull);
     terrimpi_sorted_arrange(sorted, &c);
     terrimpi_sorted_texels(sorted, &c);
@@ -16832,8 +16957,7 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     memset(&t, 0, sizeof t);
     TERRIMPI_TRY(terrimp_terrain_desc_resolve(&d.terrain, &t.desc));
     TERRIMPI_REFUSE(!terrimpi_terrain_count(&t), TERRIMP_E_OVERFLOW);
-    TERRIMPI_REFUSE(t.desc.field.format == TERRIMP_FORMAT_F32 ||
-                    !(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
     top = t.tree.level_count - 1u;
     TERRIMPI_DEFAULT(d.block_level, t.desc.field.width <= 4097u && t.desc.field.depth <= 4097u
                                         ? top : 4u);
@@ -17051,17 +17175,19 @@ static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t
 }
 
 /* Copies the samples of a node of the part into its page. */
-static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n, uint16_t *out)
+static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n,
+                                    unsigned char *out)
 {
     const terrimp_quadtree *t = &w->part->tree;
-    uint32_t i, j, quads = t->chunk_quads;
+    uint32_t i, j, quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field);
     for (j = 0; j <= quads; j++) {
-        const void *row = terrimpi_field_row(&t->field, terrimpi_tree_row(t, n->level,
-                                                                          n->z * quads + j));
-        for (i = 0; i <= quads; i++) {
+        const unsigned char *row = (const unsigned char *)terrimpi_field_row(
+            &t->field, terrimpi_tree_row(t, n->level, n->z * quads + j));
+        for (i = 0; i <= quads; i++, out += size) {
             uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
-            *out++ = t->field.format == TERRIMP_FORMAT_U8 ? ((const uint8_t *)row)[x]
-                                                          : ((const uint16_t *)row)[x];
+            uint16_t wide = row[t->field.format == TERRIMP_FORMAT_U8 ? x : 0];
+            memcpy(out, t->field.format == TERRIMP_FORMAT_U8 ? (const void *)&wide : row + x * size,
+                   size);
         }
     }
 }
@@ -17096,7 +17222,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
     at += 4u * t->vertex_limit;
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
-    terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
+    terrimpi_paging_samples(w, n, w->page + at + t->index_limit);
     memcpy(w->page, &head, sizeof head);
     head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
@@ -17182,13 +17308,13 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
 {
     const terrimp_quadtree *t = &w->part->tree;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t quads = t->chunk_quads, i, j, x, z;
+    uint32_t quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field), i, j, x, z;
     terrimpi_page_head head;
     const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
                                 4u * w->whole.vertex_limit + w->whole.index_limit;
     TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
     for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++, from += 2) {
+        for (i = 0; i <= quads; i++, from += size) {
             uint16_t sample;
             x = terrimpi_tree_col(t, 0, n->x * quads + i);
             z = terrimpi_tree_row(t, 0, n->z * quads + j);
@@ -17196,7 +17322,7 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
             if (t->field.format == TERRIMP_FORMAT_U8)
                 w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
             else
-                memcpy(w->samples + ((size_t)z * t->field.width + x) * 2u, &sample, sizeof sample);
+                memcpy(w->samples + ((size_t)z * t->field.width + x) * size, from, size);
         }
     t->nodes[n->number] = head.record.ground;
     w->part->meshes[n->number] = head.record.mesh;
@@ -17215,7 +17341,7 @@ static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uin
     uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
     uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
     uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
-    uint16_t line[256]; /* either is 1 */
+    float line[256]; /* of any format; either is 1 */
     for (k = 0; k < cols * rows; k += 256u) {
         f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
         f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
@@ -19622,8 +19748,8 @@ static int terrimpi_place_within(const terrimpi_place_work *p, uint32_t cluster,
     return cluster == other;
 }
 
-/* What a picture would take off a view's cost: less what pictures of its parts have, whose place
-   it takes; nothing when one already shows all of it. */
+/* What a picture would take off a view's cost: less what pictures of the same cluster or its parts
+   have, whose place it takes; nothing when one of a larger cluster shows it. */
 static float terrimpi_place_net(const terrimpi_place_work *p, uint32_t gain)
 {
     const terrimp_place_gain *g = &p->desc->gains[gain];
@@ -19631,10 +19757,10 @@ static float terrimpi_place_net(const terrimpi_place_work *p, uint32_t gain)
     float net = g->saved;
     for (i = p->first[g->view]; i != TERRIMPI_PLACE_NONE; i = p->next[i]) {
         uint32_t other = p->desc->candidates[p->owner[i]].cluster;
-        if (terrimpi_place_within(p, cluster, other))
-            return 0.0f;
         if (terrimpi_place_within(p, other, cluster))
             net -= p->desc->gains[i].saved;
+        else if (terrimpi_place_within(p, cluster, other))
+            return 0.0f;
     }
     return net;
 }
@@ -19704,7 +19830,7 @@ static void terrimpi_place_toggle(terrimpi_place_work *p, uint32_t gain)
     p->costs[g->view] += g->saved;
 }
 
-/* Shows a picture in a view, in place of the pictures of its parts. */
+/* Shows a picture in a view, in place of those of the same cluster and its parts. */
 static void terrimpi_place_show(terrimpi_place_work *p, uint32_t gain)
 {
     uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i, after;
@@ -19894,28 +20020,29 @@ static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *ou
     terrimpi_place_sum(p, out);
 }
 
-/* Attempts to do without each chosen candidate, and to begin with each other one, as long as that
-   pays and work is left to spend. */
+/* Attempts to do the reverse with one or two candidates, to be made or not, as long as that pays
+   and work is left to spend: each candidate alone, then all pairs. Each time all others are chosen
+   anew, and then once more beginning with those that are made now. */
 static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *best)
 {
-    uint32_t n = p->desc->candidate_count, i = 0, since = 0;
+    uint32_t n = p->desc->candidate_count, turn = 0, i;
     uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
-    for (; since < n && tries > 0; i = i + 1u < n ? i + 1u : 0u, since++) {
+    while (n > 0 && turn / 2u / n <= n / 2u && tries-- > 0) {
+        uint32_t a = turn / 2u % n, b = (a + turn / 2u / n) % n;
         terrimp_placement attempt;
-        uint8_t wish = p->wish[i];
-        p->wish[i] = terrimpi_place_uses(p, p->best, i) ? TERRIMPI_PLACE_NEVER
-                                                        : TERRIMPI_PLACE_FIRST;
-        if (p->wish[i] == wish)
-            continue;
+        for (i = 0; i < n; i++) {
+            int made = terrimpi_place_uses(p, p->best, i), reverse = i == a || i == b;
+            p->wish[i] = reverse ? (made ? TERRIMPI_PLACE_NEVER : TERRIMPI_PLACE_FIRST)
+                                 : (made && turn % 2u ? TERRIMPI_PLACE_FIRST : 0);
+        }
         terrimpi_place_attempt(p, &attempt);
-        tries--;
+        turn++;
         if (attempt.unsolved < best->unsolved ||
             (attempt.unsolved == best->unsolved && attempt.memory < best->memory)) {
             *best = attempt;
             memcpy(p->best, p->shown, p->desc->gain_count);
-            since = 0;
-        } else
-            p->wish[i] = wish;
+            turn = 0;
+        }
     }
 }
 
@@ -19963,6 +20090,8 @@ typedef struct terrimpi_prepare {
     float *worth;       /* [nodes] what the node costs as ground in a view */
     uint8_t *whole;     /* [nodes] ground of the cell draws it, and none of its parts */
     uint8_t *below;     /* [nodes] of such a node */
+    uint32_t *list;     /* [squares] those whose pictures may serve a cell */
+    uint8_t *serves;    /* [squares][nodes] of that list: whether they do */
     uint32_t *slots;    /* [squares][nodes] gains of that picture, later where the next one goes;
                            TERRIMPI_PLACE_NONE: it cannot be prepared */
 } terrimpi_prepare;
@@ -20006,29 +20135,51 @@ static float terrimpi_prepare_half_diagonal(const terrimp_box *box)
     return 0.5f * terrimpi_length(size);
 }
 
-/* Whether a node's picture from the middle of a square can serve all of its eyes, and its size. A
-   point that lies `error` off its mesh is then seen at most K error r / d^2 pixels off, when eyes
-   are up to r from that middle and at least d from the node: the directions differ by r / d. */
+static void terrimpi_prepare_middle(const terrimp_box *box, float out[3])
+{
+    int k;
+    for (k = 0; k < 3; k++)
+        out[k] = 0.5f * (box->min[k] + box->max[k]);
+}
+
+/* Whether a node's picture from the middle of a square can serve all eyes of a box, none of them
+   closer to the node than those of the square. Up to r from the middle of that box, and at least d
+   from the node, they look at it in directions that differ by r / d from those of its middle, which
+   itself sees the picture at some angle. A point that lies `error` off the node's mesh is then seen
+   at most K error / d times that many pixels off. */
+static int terrimpi_prepare_serves(const terrimpi_prepare *p, const terrimp_box *square,
+                                   const terrimp_box *eyes, uint32_t node)
+{
+    terrimp_box box;
+    terrimp_mesh_info mesh;
+    float from[3], middle[3], d, angle, turn;
+    if (terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
+        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
+        return 0;
+    d = terrimpi_prepare_distance(eyes, &box);
+    turn = terrimpi_prepare_half_diagonal(eyes) / d;
+    terrimpi_prepare_middle(square, from);
+    terrimpi_prepare_middle(eyes, middle);
+    return turn <= p->desc.max_angle_rad && d >= terrimpi_prepare_distance(square, &box) &&
+           terrimp_view_angle(&box, from, middle, &angle) == TERRIMP_OK &&
+           turn + angle <= p->desc.max_angle_rad &&
+           p->desc.pixel_factor * mesh.error * (turn + angle) <= p->desc.tolerance_px * d;
+}
+
+/* Whether a node's picture from the middle of a square can serve it, and its size. */
 static int terrimpi_prepare_picture(const terrimpi_prepare *p, const terrimp_box *square,
                                     uint32_t node, terrimp_place_picture *out)
 {
     terrimp_box box;
-    terrimp_mesh_info mesh;
     terrimp_capture capture;
     uint32_t size[2];
-    float r = terrimpi_prepare_half_diagonal(square), d, closer, scale;
-    int k;
-    if (terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
-        terrimp_terrain_get_mesh(p->desc.terrain, node, &mesh) != TERRIMP_OK)
-        return 0;
-    d = terrimpi_prepare_distance(square, &box);
-    for (k = 0; k < 3; k++)
-        out->eye[k] = 0.5f * (square->min[k] + square->max[k]);
-    if (!(r <= p->desc.max_angle_rad * d) ||
-        p->desc.pixel_factor * mesh.error * r > p->desc.tolerance_px * d * d ||
+    float closer, scale;
+    terrimpi_prepare_middle(square, out->eye);
+    if (!terrimpi_prepare_serves(p, square, square, node) ||
+        terrimp_terrain_get_box(p->desc.terrain, node, &box) != TERRIMP_OK ||
         terrimp_capture_fit(&box, out->eye, &capture) != TERRIMP_OK)
         return 0;
-    closer = terrimp_box_distance(&box, out->eye) / d;
+    closer = terrimp_box_distance(&box, out->eye) / terrimpi_prepare_distance(square, &box);
     if (terrimp_impostor_size(&capture, p->desc.pixel_factor, p->desc.texels_per_px * closer, 1,
                               8192, size, &scale) != TERRIMP_OK || scale < 1.0f)
         return 0;
@@ -20116,27 +20267,48 @@ static float terrimpi_prepare_saved(const terrimpi_prepare *p, uint32_t node)
            p->desc.triangle_cost * (float)(mesh.index_count / 3u);
 }
 
+/* Lists the squares whose pictures may serve a cell, and finds out whether they do; returns how
+   many they are. */
+static uint32_t terrimpi_prepare_squares(const terrimpi_prepare *p, const terrimp_box *cell,
+                                         uint32_t cell_x, uint32_t cell_z)
+{
+    uint32_t level, x, z, i, count = 0, square = 0;
+    for (level = 0; level <= p->desc.cell_levels; level++)
+        for (z = 0; z < p->cells >> level; z++)
+            for (x = 0; x < p->cells >> level; x++, square++) {
+                int holds = cell_x >> level == x && cell_z >> level == z;
+                uint8_t *serves = p->serves + (size_t)count * p->nodes;
+                terrimp_box box;
+                if (!holds && !p->desc.shafts)
+                    continue;
+                terrimpi_prepare_square(p, level, x, z, &box);
+                for (i = 0; i < p->nodes; i++)
+                    serves[i] = p->slots[(size_t)square * p->nodes + i] != TERRIMPI_PLACE_NONE &&
+                                (holds || terrimpi_prepare_serves(p, &box, cell, i));
+                p->list[count++] = square;
+            }
+    return count;
+}
+
 /* Counts the gains of all pictures, or writes them. */
 static void terrimpi_prepare_gains(terrimpi_prepare *p, int write)
 {
-    uint32_t cell_x, cell_z, k, i, level, view = 0;
+    uint32_t cell_x, cell_z, k, i, n, count, view = 0;
     for (cell_z = 0; cell_z < p->cells; cell_z++)
         for (cell_x = 0; cell_x < p->cells; cell_x++) {
             terrimp_box cell;
             terrimpi_prepare_square(p, 0, cell_x, cell_z, &cell);
             terrimpi_prepare_ground(p, &cell);
+            count = terrimpi_prepare_squares(p, &cell, cell_x, cell_z);
             for (k = 0; k < p->desc.directions; k++, view++) {
                 terrimpi_prepare_worth(p, &cell, k);
                 if (write)
                     p->set->costs[view] = p->worth[p->nodes - 1u];
                 for (i = 0; i < p->nodes; i++) {
                     float saved = terrimpi_prepare_saved(p, i);
-                    for (level = 0; saved > 0.0f && level <= p->desc.cell_levels; level++) {
-                        uint32_t square = terrimpi_prepare_first(p, level) +
-                                          (cell_z >> level) * (p->cells >> level) +
-                                          (cell_x >> level);
-                        uint32_t *slot = &p->slots[(size_t)square * p->nodes + i];
-                        if (*slot == TERRIMPI_PLACE_NONE)
+                    for (n = 0; saved > 0.0f && n < count; n++) {
+                        uint32_t *slot = &p->slots[(size_t)p->list[n] * p->nodes + i];
+                        if (!p->serves[(size_t)n * p->nodes + i])
                             continue;
                         if (write) {
                             p->set->gains[*slot].view = view;
@@ -20227,6 +20399,8 @@ static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *d
     p->worth = (float *)terrimpi_take(&arena, p->nodes, sizeof *p->worth);
     p->whole = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
     p->below = (uint8_t *)terrimpi_take(&arena, p->nodes, 1);
+    p->list = (uint32_t *)terrimpi_take(&arena, p->squares, sizeof *p->list);
+    p->serves = (uint8_t *)terrimpi_take(&arena, terrimpi_mul(p->squares, p->nodes, &arena.ok), 1);
     p->slots = (uint32_t *)terrimpi_take(&arena, terrimpi_mul(p->squares, p->nodes, &arena.ok),
                                          sizeof *p->slots);
     *bytes = arena.bytes;

@@ -1,8 +1,9 @@
 /* Shows terrain without a depth buffer: 320 x 240 pixels of RGB565, endless, in painter's order,
    with a texture for each page at the level that fits the screen, a constant number of triangles,
-   and trees that are drawn in between. The same frames are drawn with a depth buffer and compared.
+   and trees that are drawn in between. Each frame is drawn three times and compared: from back to
+   front, from front to back with a bit for each pixel that is covered, and with a depth buffer.
    Build:  make sorted
-   Expect: 60 frames in which no pixel differs, and what both ways cost; the last frame in
+   Expect: 60 frames in which no pixel differs, and what the three ways cost; the last frame in
            sorted.png. Exit code 1 when a pixel differs. */
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
@@ -22,7 +23,9 @@ enum { TEXELS = 128, LOG2_TEXELS = 7, LEVELS = 5, MAP = PAGES * TEXELS + 1 };
 static uint16_t heights[SIDE * SIDE];
 static uint8_t map[MAP * MAP * 3], coarser[MAP * MAP * 3];
 static uint16_t texels[LEVELS][PAGES * PAGES * TEXELS * TEXELS]; /* page by page */
-static uint16_t screen[2][WIDTH * HEIGHT], depth[WIDTH * HEIGHT];
+enum { BACK_TO_FRONT, COVERED, WITH_DEPTH, WAYS };
+static uint16_t screen[WAYS][WIDTH * HEIGHT], depth[WIDTH * HEIGHT];
+static uint32_t covered[WIDTH * HEIGHT / 32];
 static uint8_t texture_levels[32 * 32], rgb[WIDTH * HEIGHT * 3];
 static const uint16_t leaves[1] = { 0x2a45 };
 
@@ -171,27 +174,33 @@ static void draw_tree(raster *r, const terrimp_sorted_square *q, const float *xy
     draw(r, leaves, 0, 0, 0, kite, indices, 6);
 }
 
-/* Squares from back to front, each before its tree; with a depth buffer the other way round. */
-static int draw_frame(raster *r, terrimp_sorted *s, const terrimp_camera *camera, uint16_t *pixels,
-                      uint16_t *with_depth)
+/* Squares from back to front, each before its tree; the other ways the other way round. */
+static int draw_frame(raster *r, terrimp_sorted *s, const terrimp_camera *camera, int way)
 {
     float view[16], projection[16], xyz[8 * 3];
     terrimp_sorted_square q;
     int i;
     if (terrimp_camera_matrices(camera, view, projection) || terrimp_sorted_begin(s, camera))
         return 0;
-    raster_begin(r, pixels, with_depth, WIDTH, WIDTH, HEIGHT, 1, view, projection, camera->eye);
-    raster_clear(r, SKY);
+    raster_begin(r, screen[way], way == WITH_DEPTH ? depth : NULL, WIDTH, WIDTH, HEIGHT, 1, view,
+                 projection, camera->eye);
+    r->covered = way == COVERED ? covered : NULL;
+    if (way == COVERED)
+        raster_clear_covered(r);
+    else
+        raster_clear(r, SKY);
     raster_clear_depth(r);
     while (terrimp_sorted_next(s, &q, 1)) {
         for (i = 0; i < q.vertex_count; i++)
             terrimp_sorted_position(s, &q.vertices[i], xyz + 3 * i);
-        if (with_depth)
+        if (way != BACK_TO_FRONT)
             draw_tree(r, &q, xyz, camera);
         draw_square(r, &q, xyz);
-        if (!with_depth)
+        if (way == BACK_TO_FRONT)
             draw_tree(r, &q, xyz, camera);
     }
+    if (way == COVERED)
+        raster_fill_rest(r, SKY);
     return 1;
 }
 
@@ -215,10 +224,10 @@ int main(int argc, char **argv)
 {
     static raster r;
     terrimp_sorted_desc desc = { 0 };
-    terrimp_sorted sorted, reversed;
-    clock_t without = 0, with = 0, start;
+    terrimp_sorted sorted[WAYS];
+    clock_t took[WAYS] = { 0 }, start;
     long differing = 0, triangles = 0;
-    int i, k;
+    int i, k, way;
     (void)argc;
     make_terrain(), make_map();
     desc.field.samples = heights;
@@ -230,29 +239,31 @@ int main(int argc, char **argv)
     desc.page_texels = TEXELS, desc.texture_level_count = LEVELS;
     desc.texture_levels = texture_levels;
     memset(texture_levels, 255, sizeof texture_levels);
-    if (!cut_pages() || terrimp_sorted_init(&desc, &sorted))
+    if (!cut_pages() || terrimp_sorted_init(&desc, &sorted[0]))
         return 2;
-    reversed = sorted;
-    reversed.desc.front_to_back = 1;
+    for (way = 1; way < WAYS; way++) {
+        sorted[way] = sorted[0];
+        sorted[way].desc.front_to_back = 1;
+    }
     for (i = 0; i < FRAMES; i++) {
         terrimp_camera camera = camera_of(i, &desc.field);
-        start = clock();
-        if (!draw_frame(&r, &sorted, &camera, screen[0], NULL))
-            return 2;
-        without += clock() - start;
-        raster_read(&r, rgb);
-        start = clock();
-        if (!draw_frame(&r, &reversed, &camera, screen[1], depth))
-            return 2;
-        with += clock() - start;
-        triangles += (long)sorted.triangle_count;
-        for (k = 0; k < WIDTH * HEIGHT; k++)
-            differing += screen[0][k] != screen[1][k];
+        for (way = 0; way < WAYS; way++) {
+            start = clock();
+            if (!draw_frame(&r, &sorted[way], &camera, way))
+                return 2;
+            took[way] += clock() - start;
+            for (k = 0; k < WIDTH * HEIGHT; k++)
+                differing += screen[0][k] != screen[way][k];
+        }
+        triangles += (long)sorted[0].triangle_count;
     }
+    raster_read(&r, rgb);
     printf("%d frames, %ld triangles each: %ld pixels differ from those with a depth buffer\n",
            FRAMES, triangles / FRAMES, differing);
-    printf("%.2f ms a frame without, %.2f ms with it; %zu bytes of state\n",
-           (double)without * 1000.0 / CLOCKS_PER_SEC / FRAMES,
-           (double)with * 1000.0 / CLOCKS_PER_SEC / FRAMES, sizeof sorted);
+    for (way = 0; way < WAYS; way++)
+        printf("%.3f ms a frame %s\n", (double)took[way] * 1000.0 / CLOCKS_PER_SEC / FRAMES,
+               way == BACK_TO_FRONT ? "from back to front" : way == COVERED
+               ? "from front to back, with a bit a pixel" : "with a depth buffer");
+    printf("%zu bytes of state\n", sizeof sorted[0]);
     return differing != 0 || image_write_beside(argv[0], "sorted.png", rgb, WIDTH, HEIGHT);
 }

@@ -2,7 +2,7 @@
    (examples/pages.c) while threads read what the view wants, from a disk as slow as you like.
    Build:  cc -O2 -std=c99 -I. examples/stream.c -lm -lpthread -o stream
    Use:    stream FILE [--slots N] [--latency MS] [--rate MB] [--frames N] [--speed WU] [--compare]
-           --latency, --rate: of a read, in milliseconds and MB a second; 16 are under way at once
+           --latency, --rate: of a read, in milliseconds and MB a second; 64 are under way at once
            --compare: the same path with all pages here; needs memory for them
    Expect: each second what has been read, how much is here, and what pages were missing for; at
            last how many frames drew just what memory would have. */
@@ -19,7 +19,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { MOST = 64, THREADS = 16 }; /* reads asked for, and under way */
+enum { MOST = 64 }; /* reads under way, each by a thread: what is slow is the way there */
 
 /* A read: the frame's thread owns those that are free or done, a reading thread the others. */
 typedef struct job {
@@ -84,13 +84,10 @@ static void *read_pages(void *shared)
     return NULL;
 }
 
-/* After an update: takes what has come, gives up what nobody wants any more, asks for the rest. */
-static void serve(reader *r, terrimp_terrain *terrain, terrimp_view *view)
+/* Before an update: takes what has come. */
+static void take(reader *r, terrimp_terrain *terrain)
 {
-    terrimp_want wants[MOST];
-    uint32_t gone[MOST], gone_count = 0, count = 0, i, k;
-    terrimp_pages_withdrawn(terrain, gone, MOST, &gone_count);
-    terrimp_view_wants(view, wants, MOST, &count);
+    int i;
     pthread_mutex_lock(&r->lock);
     for (i = 0; i < MOST; i++) {
         job *j = &r->jobs[i];
@@ -100,12 +97,24 @@ static void serve(reader *r, terrimp_terrain *terrain, terrimp_view *view)
             terrimp_page_fail(terrain, j->node);
         if (j->state == DONE || j->state == FAILED)
             j->state = FREE;
-        for (k = 0; k < gone_count && k < MOST && j->state == WAITING; k++)
-            if (gone[k] == j->node) {
-                terrimp_page_fail(terrain, j->node);
-                j->state = FREE;
-            }
     }
+    pthread_mutex_unlock(&r->lock);
+}
+
+/* After it: gives up what nobody wants any more, asks for the rest. */
+static void ask(reader *r, terrimp_terrain *terrain)
+{
+    terrimp_want wants[MOST];
+    uint32_t gone[MOST], gone_count = 0, count = 0, i, k;
+    terrimp_pages_withdrawn(terrain, gone, MOST, &gone_count);
+    terrimp_pages_wants(terrain, wants, MOST, &count);
+    pthread_mutex_lock(&r->lock);
+    for (i = 0; i < MOST; i++)
+        for (k = 0; k < gone_count && k < MOST && r->jobs[i].state == WAITING; k++)
+            if (gone[k] == r->jobs[i].node) {
+                terrimp_page_fail(terrain, gone[k]);
+                r->jobs[i].state = FREE;
+            }
     for (i = k = 0; i < count; i++) {
         while (k < MOST && r->jobs[k].state != FREE)
             k++;
@@ -173,7 +182,7 @@ int main(int argc, char **argv)
     terrimp_view *view, *all_view = NULL;
     terrimp_camera camera = {0};
     terrimp_stats stats;
-    pthread_t threads[THREADS];
+    pthread_t threads[MOST];
     uint32_t slots = 900, frames = 600, frame, i, node, late = 0, same = 0, here;
     float speed = 20.0f, ground = 0.0f;
     double start, worst = 0.0;
@@ -219,7 +228,7 @@ int main(int argc, char **argv)
     }
     pthread_mutex_init(&r.lock, NULL);
     pthread_cond_init(&r.wake, NULL);
-    for (k = 0; k < THREADS; k++)
+    for (k = 0; k < MOST; k++)
         pthread_create(&threads[k], NULL, read_pages, &r);
     camera.eye[0] = 0.2f * 30.0f * (float)info.width;
     camera.eye[2] = 0.5f * 30.0f * (float)info.depth;
@@ -241,13 +250,14 @@ int main(int argc, char **argv)
             TERRIMP_OK)
             camera.eye[1] = ground + 1500.0f;
         before = now();
+        take(&r, terrain);
         terrimp_pages_next_frame(terrain);
         result = terrimp_view_update(view, &camera);
         if (result == TERRIMP_OK)
             sum = render(view);
         took = now() - before;
         worst = took > worst ? took : worst;
-        serve(&r, terrain, view);
+        ask(&r, terrain);
         memset(&stats, 0, sizeof stats);
         terrimp_view_get_stats(view, &stats);
         late += result != TERRIMP_OK || stats.late > 0;
@@ -280,7 +290,7 @@ int main(int argc, char **argv)
     r.stop = 1;
     pthread_cond_broadcast(&r.wake);
     pthread_mutex_unlock(&r.lock);
-    for (k = 0; k < THREADS; k++)
+    for (k = 0; k < MOST; k++)
         pthread_join(threads[k], NULL);
     return 0;
 }

@@ -1,7 +1,8 @@
 /* Repeats the measurement of Finch and Bishop: 8 x 8 pages of 65 x 65 samples repeat without end,
    an eye flies a circle at a constant height above the ground, 1000 frames, and the scale of the
    levels is raised until triangles go from 400 to 6000 a frame. What is timed is what makes them,
-   without drawing. Cycles are those of a chain of additions and shifts on the same machine.
+   without drawing: medians over the frames, less what the clock takes itself. Cycles are those of a
+   chain of additions and shifts on the same machine.
 
    Build:  make bench_sorted
    Use:    build/bench_sorted   (BENCH_FRAMES is the number of frames of a flight [1000])
@@ -25,6 +26,30 @@ static double seconds(void)
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double median_of(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, compare_doubles);
+    return values[count / 2];
+}
+
+/* What asking for the time takes. */
+static double clock_seconds(void)
+{
+    double took[101];
+    int i;
+    for (i = 0; i < 101; i++) {
+        double start = seconds();
+        took[i] = seconds() - start;
+    }
+    return median_of(took, 101);
 }
 
 /* Six operations that wait for each other take six cycles. */
@@ -79,7 +104,9 @@ static void fly(float scale, uint32_t max_triangles, size_t frames, double rate)
     static terrimp_sorted_square squares[64];
     terrimp_sorted_desc desc;
     terrimp_sorted s;
-    double begin = 0.0, next = 0.0, triangles = 0.0, pages = 0.0, start, least = 1e9, most = 0.0;
+    double *begin = (double *)need_memory(frames * sizeof *begin), clock_took = clock_seconds();
+    double *next = (double *)need_memory(frames * sizeof *next), median;
+    double triangles = 0.0, pages = 0.0, start, least = 1e9, most = 0.0;
     size_t i;
     uint32_t got, k;
     memset(&desc, 0, sizeof desc);
@@ -94,11 +121,11 @@ static void fly(float scale, uint32_t max_triangles, size_t frames, double rate)
         int32_t page_x = 1 << 30, page_z = 0;
         start = seconds();
         need(terrimp_sorted_begin(&s, &camera));
-        begin += seconds() - start;
+        begin[i] = seconds() - start - clock_took;
         start = seconds();
         while (terrimp_sorted_next(&s, squares, 64) == 64)
             ;
-        next += seconds() - start;
+        next[i] = (seconds() - start - clock_took) / s.triangle_count;
         triangles += s.triangle_count;
         least = s.triangle_count < least ? s.triangle_count : least;
         most = s.triangle_count > most ? s.triangle_count : most;
@@ -111,11 +138,13 @@ static void fly(float scale, uint32_t max_triangles, size_t frames, double rate)
             }
         } while (got == 64);
     }
+    median = median_of(next, frames);
     say("| %s %g | %.0f | %.0f to %.0f | %.0f | %.1f | %.0f | %.1f |\n",
         max_triangles ? "max_triangles" : "scale",
         max_triangles ? (double)max_triangles : (double)scale, triangles / (double)frames, least,
-        most, pages / (double)frames, 1e9 * next / triangles, rate * next / triangles,
-        1e6 * begin / (double)frames);
+        most, pages / (double)frames, 1e9 * median, rate * median,
+        1e6 * median_of(begin, frames));
+    free(begin), free(next);
 }
 
 /* ---- views over the same pages ---- */
@@ -175,12 +204,6 @@ static void view_impostor(void *user, const terrimp_impostor_command *c)
     h->draws++;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* Flies once and says a row. Returns the median of what a frame costs. */
 static float fly_view(order_host *h, const char *name, int mode, float max_cost, size_t frames,
                       double rate)
@@ -188,7 +211,7 @@ static float fly_view(order_host *h, const char *name, int mode, float max_cost,
     terrimp_view_desc d;
     terrimp_view *view = NULL;
     terrimp_callbacks draw;
-    float *costs = (float *)calloc(frames, sizeof *costs), median;
+    double *costs = (double *)need_memory(frames * sizeof *costs), median;
     double update = 0.0;
     size_t i, first = frames / 20; /* until the pictures are there */
     memset(&d, 0, sizeof d);
@@ -201,7 +224,7 @@ static float fly_view(order_host *h, const char *name, int mode, float max_cost,
     h->ground_seconds = h->ground_triangles = h->mesh_seconds = h->mesh_triangles = 0.0;
     h->draws = h->captures = 0;
     for (i = 0; i < frames; i++) {
-        terrimp_stats stats;
+        terrimp_stats of_frame;
         terrimp_heightfield field;
         terrimp_camera camera;
         double start;
@@ -212,22 +235,21 @@ static float fly_view(order_host *h, const char *name, int mode, float max_cost,
         start = seconds();
         need(terrimp_view_update(view, &camera));
         update += seconds() - start;
-        need(terrimp_view_get_stats(view, &stats));
+        need(terrimp_view_get_stats(view, &of_frame));
         need(terrimp_view_render(view, &draw));
-        costs[i] = stats.cost;
+        costs[i] = (double)of_frame.cost;
     }
     frames -= first;
-    qsort(costs + first, frames, sizeof *costs, compare_floats);
-    median = costs[first + frames / 2];
+    median = median_of(costs + first, frames);
     say("| %s | %.1f | %.2f | %.0f | %.0f | %.0f | %.2f | %.0f | %.0f |\n", name,
         (double)h->draws / (double)frames, (double)h->captures / (double)frames,
         (h->ground_triangles + h->mesh_triangles) / (double)frames, 1e6 * update / (double)frames,
-        (double)median, (double)(costs[first + frames * 99 / 100] / median),
+        median, costs[first + frames * 99 / 100] / median,
         h->ground_triangles > 0.0 ? rate * h->ground_seconds / h->ground_triangles : 0.0,
         h->mesh_triangles > 0.0 ? rate * h->mesh_seconds / h->mesh_triangles : 0.0);
     terrimp_view_destroy(view);
     free(costs);
-    return median;
+    return (float)median;
 }
 
 static void fly_views(size_t frames, double rate)

@@ -163,7 +163,7 @@ static void step(terrimp_terrain *terrain, terrimp_view *view, uint32_t *node)
         terrimp_terrain_height(terrain, from[0], from[2], &height, way, &count);
         break;
     default: /* most of the time pages come */
-        FUZZ_CHECK(terrimp_view_wants(view, wants, 16, &count) == TERRIMP_OK);
+        FUZZ_CHECK(terrimp_pages_wants(terrain, wants, 16, &count) == TERRIMP_OK);
         for (i = 0; i <= count && i < 16u; i++) {
             *node = i < count ? wants[i].node : *node;
             if (terrimp_page_get_info(terrain, *node, &info) != TERRIMP_OK ||

@@ -58,6 +58,7 @@ machine() # name, prefix, flags, "judged" or ""
     linked "$2" "$object" $draws || exit 1
     row "$1" "run time, a host that opens, updates, renders" $work/part.o "$4"
     largest "$2" $work/part.o
+    needs_no_pages "$1" "$2" $work/part.o
     $compile -DTERRIMP_NO_BUILD $leave_out -o $work/small.o || exit 1
     linked "$2" $work/small.o $draws || exit 1
     row "$1" "without splits, BOUND, morphing" $work/part.o "$4"
@@ -68,6 +69,15 @@ machine() # name, prefix, flags, "judged" or ""
     linked "$2" $work/fixed.o terrimp_sorted_next || exit 1
     row "$1" "of that what runs for each triangle" $work/part.o
     [ -z "$2" ] || needs_no_float "$1" "$2" $work/part.o
+}
+
+# A host that opens no terrain in pages has no code of the room Residency but to find that out.
+needs_no_pages() # name, prefix, object
+{
+    found=$("$2nm" "$3" | awk '$3 ~ /^terrimpi_page_/ && $3 != "terrimpi_page_of" { print $3 }')
+    [ -n "$found" ] || { echo "    has no code for pages"; return; }
+    echo "    FAILED: the host has code for pages:" $found
+    failed=1
 }
 
 # With TERRIMP_FIXED what runs for each triangle has no floats, in software or in registers.

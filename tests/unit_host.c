@@ -718,6 +718,48 @@ static void the_nearer_of_two_pixels_wins(void)
     }
 }
 
+/* Any triangles, dithered and with holes: what covers in one order is covered in the other. */
+static void covered_pixels_are_left_alone(void)
+{
+    enum { ROW = (RASTER_WIDTH + 31) / 32, TRIANGLES = 40, SKY = 0x1234 };
+    static raster_scene s;
+    static uint16_t painted[RASTER_PITCH * (RASTER_HEIGHT + 2)];
+    uint32_t covered[ROW * RASTER_HEIGHT + 2];
+    uint16_t indices[TRIANGLES * 3];
+    float xyz[30][3];
+    int round, order, i;
+    for (round = 0; round < 40; round++) {
+        int shares[TRIANGLES];
+        open_raster_scene(&s, round % 2);
+        for (i = 0; i < 500; i++)
+            s.texels[random_bits() % (RASTER_SIDE * RASTER_SIDE)] = RASTER_KEY;
+        for (i = 0; i < 90; i++)
+            xyz[i / 3][i % 3] = s.camera.eye[i % 3] + random_float(-1.0f, 1.0f) * 30.0f;
+        for (i = 0; i < TRIANGLES * 3; i++)
+            indices[i] = (uint16_t)(random_bits() % 30);
+        for (i = 0; i < TRIANGLES; i++)
+            shares[i] = random_bits() % 2 ? RASTER_ALL : (int)(random_bits() % 32);
+        s.r.depth = NULL;
+        for (order = 0; order < 2; order++) {
+            covered[0] = covered[ROW * RASTER_HEIGHT + 1] = 77;
+            s.r.covered = order ? covered + 1 : NULL;
+            raster_clear(&s.r, order ? RASTER_KEY : SKY);
+            if (order)
+                raster_clear_covered(&s.r);
+            for (i = 0; i < TRIANGLES; i++) {
+                int k = order ? i : TRIANGLES - 1 - i;
+                s.style.share = shares[k];
+                raster_draw(&s.r, &s.style, xyz[0], indices + 3 * k, 3);
+            }
+            if (!order)
+                memcpy(painted, s.pixels, sizeof painted);
+        }
+        raster_fill_rest(&s.r, SKY);
+        CHECK(memcmp(painted, s.pixels, sizeof painted) == 0);
+        CHECK(covered[0] == 77 && covered[ROW * RASTER_HEIGHT + 1] == 77);
+    }
+}
+
 /* Here r / q is z / 10. */
 static void a_part_of_a_picture_keeps_to_its_depth(void)
 {
@@ -830,6 +872,7 @@ int main(void)
     RUN(rasterised_pixels_are_what_their_rays_meet);
     RUN(rasterised_triangles_stay_in_their_target);
     RUN(the_nearer_of_two_pixels_wins);
+    RUN(covered_pixels_are_left_alone);
     RUN(a_part_of_a_picture_keeps_to_its_depth);
     RUN(a_share_of_the_pixels_is_spread_evenly);
     RUN(a_mipmap_is_the_mean_of_its_texels_and_never_the_key);

@@ -5,6 +5,14 @@
 
 #include "unit_bad_input.h"
 
+/* The terrain that views look at. -DPAGED_SIDE=4097u -DPAGED_CHUNK=64u takes a minute. */
+#ifndef PAGED_SIDE
+#define PAGED_SIDE 513u
+#define PAGED_CHUNK 16u
+#endif
+#define PAGED_CHUNKS (((PAGED_SIDE - 1u) / PAGED_CHUNK) * ((PAGED_SIDE - 1u) / PAGED_CHUNK))
+#define PAGED_ALL (PAGED_CHUNKS / 3u * 4u + 100u) /* nodes of it, or more */
+
 /* A land, its pages as a file in memory, and the terrain that is opened from them. */
 typedef struct paged_land {
     land l;
@@ -25,7 +33,7 @@ static int paged_read(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_
                       void *samples, size_t row_bytes)
 {
     const terrimp_heightfield *f = &((const paged_land *)user)->l.desc.field;
-    size_t size = f->format == TERRIMP_FORMAT_U8 ? 1u : 2u;
+    size_t size = f->format == TERRIMP_FORMAT_U8 ? 1u : f->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
     uint32_t r;
     if (x + cols > f->width || z + rows > f->depth) {
         CHECK(!"a block reads beyond the terrain");
@@ -230,7 +238,8 @@ static void check_pages_say_the_same(const paged_land *p, uint32_t same_to)
 
 static void pages_say_what_memory_does(void)
 {
-    static const int formats[] = {TERRIMP_FORMAT_U8, TERRIMP_FORMAT_U16, TERRIMP_FORMAT_S16};
+    static const int formats[] = {TERRIMP_FORMAT_U8, TERRIMP_FORMAT_U16, TERRIMP_FORMAT_S16,
+                                  TERRIMP_FORMAT_F32};
     uint32_t turn;
     for (turn = 0; turn < 12u; turn++) {
         paged_land p;
@@ -238,7 +247,7 @@ static void pages_say_what_memory_does(void)
         uint32_t block_level = turn % 3u, chunk = turn % 2u ? 16u : 8u;
         if (turn % 4u == 1u)
             width = depth = 257u;
-        if (paged_prepare(&p, width, depth, formats[turn % 3u], turn % 5u ? LAND_HILLS : LAND_NOISE,
+        if (paged_prepare(&p, width, depth, formats[turn % 4u], turn % 5u ? LAND_HILLS : LAND_NOISE,
                           chunk, block_level) && paged_build(&p)) {
             if (paged_open(&p, p.l.info.node_count + 8u)) {
                 paged_fetch_all(&p);
@@ -471,6 +480,18 @@ static void pages_are_closed_upwards(void)
     }
     CHECK(full > 0 && given > 10u);
     free(past);
+    free(p.memory);
+    paged_open(&p, 9); /* what is coming stays, however long nobody has asked for it */
+    CHECK(paged_fetch(&p, node = p.l.info.node_count - 1u) == TERRIMP_OK);
+    for (count = 0; count < 4u; count++)
+        CHECK(paged_fetch(&p, --node) == TERRIMP_OK);
+    for (; count < 8u; count++) /* a row, below two of the four */
+        CHECK(terrimp_page_begin(p.opened, --node, &page) == TERRIMP_OK);
+    for (turn = 0; turn < 4u; turn++)
+        terrimp_pages_next_frame(p.opened);
+    CHECK(terrimp_pages_withdrawn(p.opened, coming, 64, &count) == TERRIMP_OK && count == 4u);
+    CHECK(terrimp_page_begin(p.opened, node - 1u, &page) == TERRIMP_OK); /* for the fourth */
+    CHECK(terrimp_page_begin(p.opened, node - 2u, &page) == TERRIMP_E_CAPACITY);
     paged_free(&p);
 }
 
@@ -574,9 +595,6 @@ static void bad_pages(void)
     GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
     p.desc.terrain.height_low = p.desc.terrain.height_high;
     GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
-    p.desc.terrain.height_low = 0.0f;
-    p.desc.terrain.field.format = TERRIMP_FORMAT_F32;
-    GIVES(TERRIMP_E_RANGE, terrimp_pages_build_block(&p.desc, 0, p.scratch, p.scratch_bytes));
     p.desc.read = NULL;
     GIVES(TERRIMP_E_NULL, terrimp_pages_build_end(&p.desc, p.scratch, p.scratch_bytes));
     paged_free(&p);
@@ -586,8 +604,8 @@ static void bad_pages(void)
 
 /* What a frame draws: where slots lie, and what follows from it, hangs on the order of captures. */
 typedef struct paged_frame {
-    terrimp_ground_command ground[2000];
-    terrimp_impostor_command impostors[2000];
+    terrimp_ground_command ground[PAGED_ALL];
+    terrimp_impostor_command impostors[PAGED_ALL];
     uint32_t ground_count, impostor_count, captures, captured;
     paged_land *p; /* NULL: all is in memory */
     int in_capture;
@@ -612,7 +630,7 @@ static void paged_ground(void *user, const terrimp_ground_command *c)
     paged_frame *f = (paged_frame *)user;
     CHECK(!f->p || paged_is_here(f->p, c->node)); /* the host would fill its buffers now */
     f->captured += f->in_capture ? 1u : 0u;
-    if (!f->in_capture && f->ground_count < 2000u)
+    if (!f->in_capture && f->ground_count < PAGED_ALL)
         f->ground[f->ground_count++] = *c;
 }
 
@@ -621,7 +639,7 @@ static void paged_impostor(void *user, const terrimp_impostor_command *c)
     paged_frame *f = (paged_frame *)user;
     terrimp_impostor_command *own = &f->impostors[f->impostor_count];
     CHECK(!f->p || paged_is_here(f->p, c->node));
-    if (f->impostor_count == 2000u)
+    if (f->impostor_count == PAGED_ALL)
         return;
     f->impostor_count++;
     *own = *c;
@@ -647,18 +665,19 @@ static terrimp_result paged_render(terrimp_view *view, paged_frame *frame, paged
 typedef struct paged_host {
     paged_land *p;
     uint32_t coming[64], count;
-    uint32_t reads, again; /* those of pages that had been read before */
-    uint32_t *times;       /* [node_count] each page has been read */
+    uint32_t reads;
+    uint32_t *times;       /* [node_count] each page has been read, */
+    uint32_t *at_rest;     /* ... and since the eye rests; NULL: it does not matter */
     uint32_t pace;         /* percent of those coming that come in a frame */
 } paged_host;
 
 /* Returns whether anything is wanted or coming. */
-static int paged_serve(paged_host *h, terrimp_view *view)
+static int paged_serve(paged_host *h)
 {
     terrimp_want wants[64];
     uint32_t count, i, gone[64], gone_count;
     int busy;
-    CHECK(terrimp_view_wants(view, wants, 64, &count) == TERRIMP_OK);
+    CHECK(terrimp_pages_wants(h->p->opened, wants, 64, &count) == TERRIMP_OK);
     busy = count > 0;
     for (i = 0; i < count; i++) {
         terrimp_page_info info;
@@ -675,7 +694,9 @@ static int paged_serve(paged_host *h, terrimp_view *view)
             continue;
         memcpy(page, h->p->file + info.offset, info.bytes);
         h->reads++;
-        h->again += h->times[wants[i].node]++ > 0;
+        h->times[wants[i].node]++;
+        if (h->at_rest)
+            h->at_rest[wants[i].node]++;
         h->coming[h->count++] = wants[i].node;
     }
     busy |= h->count > 0;
@@ -688,6 +709,8 @@ static int paged_serve(paged_host *h, terrimp_view *view)
             CHECK(terrimp_page_fail(h->p->opened, node) == TERRIMP_OK);
             h->reads--;
             h->times[node]--;
+            if (h->at_rest && h->at_rest[node] > 0)
+                h->at_rest[node]--;
         } else if (random_range(1, 100) <= h->pace) {
             CHECK(terrimp_page_put(h->p->opened, node) == TERRIMP_OK);
         } else {
@@ -701,7 +724,8 @@ static int paged_serve(paged_host *h, terrimp_view *view)
 
 /* All of the terrain in sight is drawn, by ground or a picture, and ground meets ground: neighbours
    differ by one level at most, and both know of it. */
-static void check_paged_frame(const land *l, const paged_frame *frame, const terrimp_camera *camera)
+static void check_paged_frame(const land *l, const paged_frame *frame, const terrimp_camera *camera,
+                              int hides)
 {
     const terrimp_quadtree *tree = terrimp_terrain_tree(l->terrain);
     uint8_t *drawn = (uint8_t *)calloc(1, l->info.node_count); /* 1 ground, 2 impostor */
@@ -748,7 +772,7 @@ static void check_paged_frame(const land *l, const paged_frame *frame, const ter
                 cracks += up > 1u || (up == 1u) != (k >> side & 1u);
         }
     }
-    CHECK(holes == 0);
+    CHECK(holes == 0 || hides);
     CHECK(cracks == 0);
     free(drawn);
 }
@@ -777,13 +801,14 @@ static paged_land *paged_wide(void)
 {
     static paged_land p;
     if (!p.file)
-        CHECK(paged_prepare(&p, 513, 513, TERRIMP_FORMAT_U16, LAND_HILLS, 16, 0) &&
+        CHECK(paged_prepare(&p, PAGED_SIDE, PAGED_SIDE, TERRIMP_FORMAT_U16, LAND_HILLS, PAGED_CHUNK,
+                            0) &&
               paged_build(&p));
     check_state = CHECK_SEED;
     return &p;
 }
 
-static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode)
+static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode, terrimp_hider *hider)
 {
     terrimp_view_desc desc;
     terrimp_view *view = NULL;
@@ -791,43 +816,86 @@ static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode)
     desc.mode = mode;
     desc.tolerance_px = 2.0f;
     desc.atlas_size = 4096;
+    desc.max_impostors = 4000;
+    desc.hider = hider;
     CHECK(terrimp_view_create(terrain, &desc, NULL, &view) == TERRIMP_OK);
     return view;
 }
 
-/* Whatever the order in which pages come: in the end the eye sees what it sees of memory. */
+/* Whether any chunk of a node is in sight, not only its skirts or the air between chunks. */
+static int paged_shows(const land *l, const terrimp_frustum *frustum, uint32_t node)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(l->terrain);
+    terrimp_node n = terrimpi_tree_node(tree, node), child;
+    terrimp_box box;
+    uint32_t i;
+    int shows = 0;
+    CHECK(terrimp_geomip_box(tree, node, &box) == TERRIMP_OK);
+    if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+        return 0;
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_tree_quarter(tree, &n, i, &child))
+            shows |= paged_shows(l, frustum, child.number);
+    return n.level == 0 || shows;
+}
+
+/* Leaves out what is not in sight by that: FULL and IMPOSTOR draw more of it in memory, or less. */
+static void paged_show(const land *l, const terrimp_camera *camera, paged_frame *frame)
+{
+    terrimp_frustum frustum;
+    uint32_t i, count = frame->ground_count;
+    CHECK(terrimp_camera_frustum(camera, &frustum) == TERRIMP_OK);
+    for (i = frame->ground_count = 0; i < count; i++)
+        if (paged_shows(l, &frustum, frame->ground[i].node))
+            frame->ground[frame->ground_count++] = frame->ground[i];
+    count = frame->impostor_count;
+    for (i = frame->impostor_count = 0; i < count; i++)
+        if (paged_shows(l, &frustum, frame->impostors[i].node))
+            frame->impostors[frame->impostor_count++] = frame->impostors[i];
+}
+
+/* Whatever the order in which pages come: in the end the eye sees what it sees of memory, in all
+   modes; with a horizon, that and what would be hidden by ground that is not here. */
 static void pages_settle_to_what_memory_shows(void)
 {
     static paged_frame frames[2];
+    static terrimp_horizon horizons[2];
     paged_land *p = paged_wide();
-    uint32_t turn;
+    uint32_t turn, hidden = 0;
+    float *walls = (float *)malloc(terrimp_walls_bytes(&p->l.terrain->tree));
+    CHECK(terrimp_walls_build(&p->l.terrain->tree, NULL, walls) == TERRIMP_OK);
     for (turn = 0; turn < 12u && check_bad == 0; turn++) {
-        int mode = turn % 4u == 3u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        static const int modes[] = {TERRIMP_MODE_AUTO, TERRIMP_MODE_FULL, TERRIMP_MODE_GEOMIP,
+                                    TERRIMP_MODE_IMPOSTOR};
+        int mode = modes[turn % 4u], hides = turn % 3u == 2u;
         terrimp_view *views[2];
         terrimp_camera camera = paged_camera(&p->l, turn);
         terrimp_stats stats[2] = {{0}, {0}};
         paged_host host;
-        uint32_t frame, quiet = 0;
+        uint32_t frame, quiet = 0, i, k;
         memset(&host, 0, sizeof host);
         free(p->memory);
-        paged_open(p, 2000);
+        paged_open(p, PAGED_ALL);
         host.p = p;
         host.pace = turn % 3u == 0 ? 10u : 60u;
         host.times = (uint32_t *)calloc(p->l.info.node_count, sizeof *host.times);
-        views[0] = paged_view(p->l.terrain, mode);
-        views[1] = paged_view(p->opened, mode);
+        for (frame = 0; frame < 2u; frame++) {
+            const terrimp_terrain *t = frame ? p->opened : p->l.terrain;
+            CHECK(terrimp_horizon_init(&horizons[frame], &t->tree, walls) == TERRIMP_OK);
+            views[frame] = paged_view(t, mode, hides ? &horizons[frame].hider : NULL);
+        }
         for (frame = 0; frame < 2000u && quiet < 8u; frame++) {
             terrimp_result result;
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             result = terrimp_view_update(views[1], &camera);
             CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && frame < 50u));
-            if (paged_serve(&host, views[1]) || result != TERRIMP_OK)
+            if (paged_serve(&host) || result != TERRIMP_OK)
                 quiet = 0;
             if (result != TERRIMP_OK)
                 continue;
             CHECK(paged_render(views[1], &frames[1], p) == TERRIMP_OK);
             if (frame % 8u == 0)
-                check_paged_frame(&p->l, &frames[1], &camera);
+                check_paged_frame(&p->l, &frames[1], &camera, hides);
             quiet = frames[1].captures ? 0 : quiet + 1u;
         }
         CHECK(quiet == 8u);
@@ -839,48 +907,69 @@ static void pages_settle_to_what_memory_shows(void)
         CHECK(terrimp_view_get_stats(views[0], &stats[0]) == TERRIMP_OK);
         CHECK(terrimp_view_get_stats(views[1], &stats[1]) == TERRIMP_OK);
         CHECK(stats[1].late == 0 && stats[0].late == 0);
-        CHECK(frames[0].ground_count == frames[1].ground_count);
-        CHECK(frames[0].impostor_count == frames[1].impostor_count);
-        CHECK(memcmp(frames[0].ground, frames[1].ground, sizeof frames[0].ground) == 0);
-        CHECK(memcmp(frames[0].impostors, frames[1].impostors, sizeof frames[0].impostors) == 0);
-        CHECK(stats[0].triangles == stats[1].triangles);
+        for (frame = 0; frame < 2u && mode % 2 == 1; frame++)
+            paged_show(&p->l, &camera, &frames[frame]);
+        hidden += stats[1].hidden;
+        CHECK(stats[1].hidden <= stats[0].hidden);
+        if (stats[1].hidden == stats[0].hidden) { /* else a sample that would hide is not here */
+            CHECK(frames[0].ground_count == frames[1].ground_count);
+            CHECK(frames[0].impostor_count == frames[1].impostor_count);
+            CHECK(mode % 2 == 1 || stats[0].triangles == stats[1].triangles);
+        }
+        for (i = k = 0; i < frames[0].ground_count; i++, k++) {
+            while (k < frames[1].ground_count && memcmp(&frames[0].ground[i], &frames[1].ground[k],
+                                                        sizeof frames[0].ground[0]) != 0)
+                k++;
+            CHECK(k < frames[1].ground_count);
+        }
+        for (i = k = 0; i < frames[0].impostor_count; i++, k++) {
+            while (k < frames[1].impostor_count &&
+                   memcmp(&frames[0].impostors[i], &frames[1].impostors[k],
+                          sizeof frames[0].impostors[0]) != 0)
+                k++;
+            CHECK(k < frames[1].impostor_count);
+        }
         terrimp_view_destroy(views[0]);
         terrimp_view_destroy(views[1]);
         free(host.times);
     }
+    CHECK(hidden > 0);
+    free(walls);
     free(p->memory);
     p->memory = NULL;
 }
 
-/* A flight with far too few slots: no holes, no cracks; nothing is read again while the eye rests.
-   With enough slots nothing is read again at all, but what failed to come. */
+/* A flight with far too few slots: no holes, no cracks. While the eye rests, no page is read twice
+   that fits: of ground, which needs all of its pages at once, none at all; of pictures, which are
+   made one after the other, none when there are enough slots, else one in ten. With enough slots
+   nothing is read twice in the whole flight, but for what failed to come. */
 static void pages_fly_without_holes(void)
 {
     static paged_frame frame;
     paged_land *p = paged_wide();
     uint32_t turn;
-    for (turn = 0; turn < 6u && check_bad == 0; turn++) {
-        static const uint32_t slots[] = {40, 100, 1500};
-        int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+    for (turn = 0; turn < 8u && check_bad == 0; turn++) {
+        static const uint32_t slots[] = {40, 100, PAGED_ALL, 200};
+        int mode = turn / 4u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
         terrimp_camera camera = paged_camera(&p->l, turn);
         terrimp_view *view;
         paged_host host;
-        uint32_t i, k, once = 0, before = 0, at_rest = 0;
+        uint32_t i, k, once = 0, rested = 0, again = 0;
         memset(&host, 0, sizeof host);
         free(p->memory);
-        paged_open(p, slots[turn % 3u]);
+        paged_open(p, slots[turn % 4u]);
         host.p = p;
         host.pace = 50;
-        host.times = (uint32_t *)calloc(p->l.info.node_count, sizeof *host.times);
-        view = paged_view(p->opened, mode);
+        host.times = (uint32_t *)calloc(2u * p->l.info.node_count, sizeof *host.times);
+        view = paged_view(p->opened, mode, NULL);
         for (i = 0; i < 300u; i++) {
             terrimp_result result;
             int rests = i % 100u >= 50u;
             if (!rests) {
                 camera.eye[0] += camera.forward[0] * 2.0f;
                 camera.eye[2] += camera.forward[2] * 2.0f;
-                if (camera.eye[0] < 25.0f || camera.eye[0] > 487.0f || camera.eye[2] < 25.0f ||
-                    camera.eye[2] > 487.0f)
+                if (camera.eye[0] < 25.0f || camera.eye[0] > (float)PAGED_SIDE - 26.0f ||
+                    camera.eye[2] < 25.0f || camera.eye[2] > (float)PAGED_SIDE - 26.0f)
                     camera.forward[0] = -camera.forward[0], camera.forward[2] = -camera.forward[2];
             }
             if (i == 150u)
@@ -888,24 +977,72 @@ static void pages_fly_without_holes(void)
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             result = terrimp_view_update(view, &camera);
             CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && i < 40u));
-            paged_serve(&host, view);
-            if (i % 100u == 60u)
-                before = host.again;
-            if (i % 100u == 99u)
-                at_rest += host.again - before;
+            paged_serve(&host);
+            host.at_rest = rests ? host.times + p->l.info.node_count : NULL;
+            for (k = 0; k < p->l.info.node_count && i % 100u == 99u; k++) {
+                uint32_t *times = &host.at_rest[k];
+                rested += *times;
+                again += *times > 1u ? *times - 1u : 0u;
+                *times = 0;
+            }
             if (result != TERRIMP_OK)
                 continue;
             CHECK(paged_render(view, &frame, p) == TERRIMP_OK);
             if (i % 3u == 0)
-                check_paged_frame(&p->l, &frame, &camera);
+                check_paged_frame(&p->l, &frame, &camera, 0);
         }
         for (k = 0; k < p->l.info.node_count; k++)
             once += host.times[k] > 0;
-        CHECK(at_rest <= 2u); /* not one, but for what was withdrawn with them */
-        if (slots[turn % 3u] == 1500u)
+        CHECK(rested > 0 && again * 10u <= rested);
+        CHECK(again == 0 || (mode == TERRIMP_MODE_AUTO && slots[turn % 4u] < PAGED_ALL));
+        if (slots[turn % 4u] == PAGED_ALL)
             CHECK(host.reads * 10u <= once * 11u);
         terrimp_view_destroy(view);
         free(host.times);
+    }
+    free(p->memory);
+    p->memory = NULL;
+}
+
+/* Two views of one terrain: the list is what either alone would ask for, at the greater urgency. */
+static void pages_are_wanted_by_all_views(void)
+{
+    paged_land *p = paged_wide();
+    uint32_t turn, i, k;
+    for (turn = 0; turn < 6u && check_bad == 0; turn++) {
+        static terrimp_want wants[3][600];
+        terrimp_view *views[2];
+        uint32_t count[3], shared = 0;
+        free(p->memory);
+        paged_open(p, 1200);
+        for (i = p->l.info.node_count; i-- > p->l.info.node_count - 20u;)
+            paged_fetch(p, i);
+        for (i = 0; i < 2u; i++)
+            views[i] = paged_view(p->opened, i ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO, NULL);
+        for (k = 0; k < 3u; k++) { /* the first, the second, both */
+            check_state = CHECK_SEED + turn;
+            CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
+            for (i = 0; i < 2u; i++) {
+                terrimp_camera camera = paged_camera(&p->l, turn + i);
+                if (k == 2u || k == i)
+                    CHECK(terrimp_view_update(views[i], &camera) == TERRIMP_OK);
+            }
+            CHECK(terrimp_pages_wants(p->opened, wants[k], 600, &count[k]) == TERRIMP_OK);
+        }
+        for (k = 0; k < 2u; k++)
+            for (i = 0; i < count[k]; i++) {
+                const terrimp_want *w = &wants[k][i];
+                uint32_t at = 0;
+                while (at < count[2] && wants[2][at].node != w->node)
+                    at++;
+                CHECK(at < count[2] && wants[2][at].urgency >= w->urgency);
+                shared += k == 1u && at < count[2];
+                for (at = 0; k == 1u && at < count[0]; at++)
+                    shared -= wants[0][at].node == w->node;
+            }
+        CHECK(count[0] > 0 && count[1] > 0 && count[2] == count[0] + shared);
+        for (i = 0; i < 2u; i++)
+            terrimp_view_destroy(views[i]);
     }
     free(p->memory);
     p->memory = NULL;
@@ -921,6 +1058,7 @@ static void pages_tests(void)
     RUN(pages_answer_heights_and_rays);
     RUN(pages_settle_to_what_memory_shows);
     RUN(pages_fly_without_holes);
+    RUN(pages_are_wanted_by_all_views);
 }
 
 #endif

@@ -29,6 +29,7 @@ void raster_begin(raster *r, uint16_t *pixels, uint16_t *depth, int pitch, int w
 {
     r->pixels = pixels;
     r->depth = depth;
+    r->covered = NULL;
     r->pitch = pitch;
     r->width = width;
     r->height = height;
@@ -51,6 +52,29 @@ void raster_clear_depth(const raster *r)
 {
     if (r->depth)
         memset(r->depth, 0, (size_t)r->width * (size_t)r->height * sizeof *r->depth);
+}
+
+static uint32_t *covered_row(const raster *r, int y)
+{
+    return r->covered + y * ((r->width + 31) / 32);
+}
+
+void raster_clear_covered(const raster *r)
+{
+    memset(r->covered, 0, (size_t)r->height * (size_t)((r->width + 31) / 32) * sizeof *r->covered);
+}
+
+void raster_fill_rest(const raster *r, uint16_t colour)
+{
+    int x, y, i;
+    for (y = 0; y < r->height; y++)
+        for (x = 0; x < r->width; x += 32) {
+            uint32_t free_ones = ~covered_row(r, y)[x / 32];
+            uint16_t *pixels = r->pixels + y * r->pitch + x;
+            for (i = 0; free_ones && x + i < r->width; i++, free_ones >>= 1)
+                if (free_ones & 1u)
+                    pixels[i] = colour;
+        }
 }
 
 /* ---- Spans -------------------------------------------------------------- */
@@ -116,12 +140,50 @@ static void cover_run(const sampler *from, run k, uint16_t *pixel, int count, in
     }
 }
 
+/* The same from front to back: pixels that are not covered. */
+static void fill_free_run(const sampler *from, run k, uint16_t *pixel, uint32_t *covered, int x,
+                          int count, int share, uint32_t at)
+{
+    uint32_t *word = covered + x / 32, seen = *word, bit = 1u << x % 32;
+    for (; count > 0; count--, pixel++, at += 3242174889u) {
+        if (!(seen & bit) && (int)(at >> 27) < share) {
+            uint16_t texel = from->texels[(k.v >> 16 << from->log2_side) + (k.u >> 16)];
+            if (texel != RASTER_KEY) {
+                *pixel = texel;
+                seen |= bit;
+            }
+        }
+        k.u += k.du, k.v += k.dv;
+        bit <<= 1;
+        if (!bit) {
+            *word++ = seen;
+            seen = count > 1 ? *word : 0;
+            bit = 1;
+        }
+    }
+    if (bit > 1)
+        *word = seen;
+}
+
+/* Whether all pixels of a span are covered. */
+static int is_covered(const uint32_t *covered, int x, int end)
+{
+    for (; x < end; x = (x | 31) + 1) {
+        uint32_t wanted = 0xffffffffu << x % 32;
+        if (end < (x | 31) + 1)
+            wanted &= ~(0xffffffffu << end % 32);
+        if (wanted & ~covered[x / 32])
+            return 0;
+    }
+    return 1;
+}
+
 /* Divides at every 16th pixel and at the last one; between them the texture goes straight. */
 static void fill_span(const raster *r, const sampler *from, gradient at, const gradient *dx,
                       int x, int end, int y, int share)
 {
     int32_t u = to_texels(from, at.s / at.q), v = to_texels(from, at.t / at.q);
-    int32_t depth = to_depth(at.depth);
+    int32_t depth = r->depth ? to_depth(at.depth) : 0;
     while (x < end) {
         int count = end - x > 16 ? 16 : end - x;
         int steps = x + count < end ? count : count - 1; /* not beyond the last pixel */
@@ -129,14 +191,14 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
         uint32_t at_dither;
         run k;
         k.u = u, k.v = v, k.depth = depth, k.du = k.dv = k.step = 0;
-        at.depth += walked * dx->depth, at.s += walked * dx->s;
-        at.t += walked * dx->t, at.q += walked * dx->q;
+        at.s += walked * dx->s, at.t += walked * dx->t, at.q += walked * dx->q;
         if (steps) {
             u = to_texels(from, at.s / at.q);
             v = to_texels(from, at.t / at.q);
             k.du = (u - k.u) / steps, k.dv = (v - k.v) / steps;
         }
         if (steps && r->depth) {
+            at.depth += walked * dx->depth;
             depth = to_depth(at.depth);
             k.step = (depth - k.depth) / steps;
         }
@@ -144,6 +206,9 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
         if (r->depth)
             fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count,
                      share, at_dither);
+        else if (r->covered)
+            fill_free_run(from, k, r->pixels + y * r->pitch + x, covered_row(r, y), x, count,
+                          share, at_dither);
         else
             cover_run(from, k, r->pixels + y * r->pitch + x, count, share, at_dither);
         x += count;
@@ -159,9 +224,10 @@ static int first_pixel(float edge, int limit)
     return edge > 0.0f ? edge < (float)limit ? (int)(edge + 0.5f) : limit : 0;
 }
 
-static float edge_at(const raster_corner *top, const raster_corner *bottom, float y)
+/* How far an edge goes to the right from a row to the next. */
+static float slope_of(const raster_corner *top, const raster_corner *bottom)
 {
-    return top->x + (bottom->x - top->x) * ((y - top->y) / (bottom->y - top->y));
+    return bottom->y > top->y ? (bottom->x - top->x) / (bottom->y - top->y) : 0.0f;
 }
 
 /* The mipmap whose texels are about as large as the triangle's pixels, by their areas. */
@@ -193,6 +259,7 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
     float area = bx * cy - cx * by, scale = 1.0f / area;
     float left = b->x < c->x ? b->x : c->x, right = b->x < c->x ? c->x : b->x;
     const raster_corner *top = a, *middle = b, *bottom = c, *swap;
+    float slopes[3];
     gradient dx, dy;
     sampler from;
     int y, end;
@@ -220,16 +287,19 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
     dy.t = ((c->t - a->t) * bx - (b->t - a->t) * cx) * scale;
     dx.q = ((b->q - a->q) * cy - (c->q - a->q) * by) * scale;
     dy.q = ((c->q - a->q) * bx - (b->q - a->q) * cx) * scale;
+    slopes[0] = slope_of(top, bottom);
+    slopes[1] = slope_of(top, middle);
+    slopes[2] = slope_of(middle, bottom);
     from = choose_level(style->texture, a, b, c, fabsf(area));
     for (; y < end; y++) {
-        float centre = (float)y + 0.5f, one = edge_at(top, bottom, centre);
-        float other = centre < middle->y ? edge_at(top, middle, centre)
-                                         : edge_at(middle, bottom, centre);
+        float centre = (float)y + 0.5f, one = top->x + (centre - top->y) * slopes[0];
+        float other = centre < middle->y ? top->x + (centre - top->y) * slopes[1]
+                                         : middle->x + (centre - middle->y) * slopes[2];
         int x = first_pixel(one < other ? one : other, r->width);
         int x_end = first_pixel(one < other ? other : one, r->width);
         float across = (float)x + 0.5f - a->x, down = centre - a->y;
         gradient at;
-        if (x >= x_end)
+        if (x >= x_end || (r->covered && is_covered(covered_row(r, y), x, x_end)))
             continue;
         at.depth = a->depth + across * dx.depth + down * dy.depth;
         at.s = a->s + across * dx.s + down * dy.s;

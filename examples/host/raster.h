@@ -38,6 +38,9 @@ typedef struct raster {
     uint16_t *pixels;      /* of the target's corner; what is drawn stays within width x height */
     uint16_t *depth;       /* rows without gaps; z_near / w, larger is closer. NULL: none, what
                               is drawn later covers what was drawn before */
+    uint32_t *covered;     /* instead of depth, for triangles from front to back: rows of
+                              (width + 31) / 32 words, a bit for each pixel that has been drawn and
+                              is left alone from then on. NULL, as after raster_begin: none */
     int pitch;             /* pixels from a row to the next */
     int width, height;
     int row_0_is_top;      /* as on a screen; else as in a texture whose row 0 is t = 0 */
@@ -69,6 +72,10 @@ void raster_clear(const raster *r, uint16_t colour);
 
 /* Makes the target's depth farthest, if it has one. */
 void raster_clear_depth(const raster *r);
+
+/* Makes all of the target free; at the end fills what still is. For targets with covered. */
+void raster_clear_covered(const raster *r);
+void raster_fill_rest(const raster *r, uint16_t colour);
 
 /* Draws the counter-clockwise ones of index_count / 3 triangles. Nearer pixels win, and of equally
    near ones the first. Indices below RASTER_VERTICES. */
