@@ -51,17 +51,20 @@ row() # what, before, asked, now, command
     cat << 'END'
 # A scene around the terrain
 
-`make scene-table` measures this anew. Before: version 0.4.1, by a host that was written from its README alone; a dash where nothing of the kind
-was there.
+`make scene-table` measures this anew. Before: version 0.4.1, by a host that was written from its
+README alone; a dash where nothing of the kind was there.
 
 ## Houses and seas
 
-400 houses, eight directions, 640 x 512 pixels; three heights of a sea. From one place: 34 degrees, from a quarter of the terrain's range
-of heights over its middle. Gliding: 50 degrees, six steps of a sample, so that all pictures are seen from elsewhere than they were made
-from. Through: pixels of houses that a ridge of the full mesh hides; sunk: pixels of them that impostors hide. Whole pictures. Before, over
-N42E001 from one place: 153 of 9,637 through, 55 sunk, 29.8 dB with a sea. Asked: 80 wrong of 9,637, 30 with exact depth; 40 dB.
+400 houses, eight directions, 640 x 512 pixels; three heights of a sea. From one place: 34 degrees,
+from a quarter of the terrain's range of heights over its middle. Gliding: 50 degrees, six steps of
+a sample, so that all pictures are seen from elsewhere than they were made from. Through: pixels of
+houses that a ridge of the full mesh hides; sunk: pixels of them that impostors hide; then both, of
+9,637. PSNR of whole pictures; pixels of sky where the full mesh has none. Before, over N42E001 from
+one place: 153 of 9,637 through, 55 sunk, 29.8 dB with a sea. Asked: 80 wrong of 9,637, 30 with
+exact depth; 40 dB.
 
-| scene | depth | pixels of houses | through | sunk | wrong of 9,637 | least dB | with a sea | pixels of sky |
+| scene | depth | pixels | through | sunk | of 9,637 | least dB | with a sea | sky |
 |---|---|--:|--:|--:|--:|--:|--:|--:|
 END
     houses='\([0-9]*\) pixels of houses \([0-9]*\) shine through, \([0-9]*\) are sunk'
@@ -96,7 +99,8 @@ END
     row "the same, gliding a sample a frame" - "38 dB" \
         "$(pick least relit 's/.*, 1 cells.* worst \([0-9.]*\);.*/\1/p') dB" "build/render lit_when"
     row "two terrains side by side, pixels of sky between them" "175 in 120 frames" 0 \
-        "$(pick most tiles 's/.*, \([0-9]*\) when they are joined/\1/p')" "build/render side_by_side"
+        "$(pick most tiles 's/.*, \([0-9]*\) when they are joined/\1/p')" \
+        "build/render side_by_side"
     row "captures that fail, or are lost" "worn for ever" "made again" "$(laws failing)" \
         "build/unit capture"
     for side in ${SIDES:-1025 2049 4097}; do
