@@ -20018,10 +20018,10 @@ static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *ou
    anew, and then once more beginning with those that are made now. */
 static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *best)
 {
-    uint32_t n = p->desc->candidate_count, turn = 0, i;
+    uint32_t n = p->desc->candidate_count, start = 0, turn = 0, i;
     uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
     while (n > 0 && turn / 2u / n <= n / 2u && tries-- > 0) {
-        uint32_t a = turn / 2u % n, b = (a + turn / 2u / n) % n;
+        uint32_t a = (start + turn / 2u) % n, b = (a + turn / 2u / n) % n;
         terrimp_placement attempt;
         for (i = 0; i < n; i++) {
             int made = terrimpi_place_uses(p, p->best, i), reverse = i == a || i == b;
@@ -20034,6 +20034,7 @@ static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *be
             (attempt.unsolved == best->unsolved && attempt.memory < best->memory)) {
             *best = attempt;
             memcpy(p->best, p->shown, p->desc->gain_count);
+            start = a + 1u;
             turn = 0;
         }
     }
