@@ -926,16 +926,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_alloc(terrimp_live_atlas *atlas, u
    Cost: O(slots + free rectangles). */
 TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, uint32_t slot);
 
-/* The largest rectangle of a shape that could be allocated now, for hosts that take a smaller slot
-   rather than none.
-
-   width, height  the size wanted [Limits: 1..65536]
-   size       [2] out: that size if it fits; else reduced, both sides alike, until one texel more of
-              its tighter side would fit nowhere; {0, 0} when nothing of the shape fits
-   Cost       O(free rectangles) */
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2]);
-
 /* ==== Terrain ============================================================ >>terrain */
 
 typedef struct terrimp_terrain terrimp_terrain; /* built from a heightfield; read-only then */
@@ -1527,7 +1517,8 @@ typedef struct terrimp_view_desc {
     float max_angle_rad;    /* a picture seen from farther round than this is renewed
                                [Limits: 0.001..1.5] [Default 0 -> 0.0873 (5 degrees); in AUTO so
                                much times the root of tolerance_px, but 5 to 15 degrees] */
-    float texels_per_px;    /* sharpness of a picture when it is made
+    float texels_per_px;    /* sharpness of a picture when it is made; 0.7 of it where the atlases
+                               are full: what has no room even then is ground
                                [Limits: 0.1..8] [Default 0 -> 2; in AUTO 2 over the root of
                                tolerance_px, but 0.7 to 2] */
     float impostor_px;      /* AUTO: an impostor whose side covers more pixels is split
@@ -1536,8 +1527,8 @@ typedef struct terrimp_view_desc {
                                [Limits: 64..32768] [Default 0 -> 4096] */
     uint32_t atlas_count;   /* atlas textures [Limits: 1..16] [Default 0 -> 1] */
     uint32_t max_slot;      /* texels along a side of a picture's slot at most: what would need more
-                               is coarser [Limits: 12..atlas_size]
-                               [Default 0 -> half of atlas_size] */
+                               is coarser, and ground where 0.7 texels_per_px would need more
+                               [Limits: 12..atlas_size] [Default 0 -> half of atlas_size] */
     uint32_t max_impostors; /* pictures kept at most [Limits: 1..65534] [Default 0 -> 1024] */
     uint32_t max_ground;    /* ground nodes drawn at most; AUTO and GEOMIP coarsen the ground rather
                                than exceed it, FULL and IMPOSTOR need the chunks in sight
@@ -1604,7 +1595,9 @@ typedef struct terrimp_impostor_command {
     float place_matrix[16]; /* with exact_depth: takes (s / q, t / q, d, 1), d the depth that the
                              picture has there, 0..1, to the place relative to the frame's eye,
                              times a factor. For a host that keeps the depth of its atlases and
-                             writes that place's own: see terrimp_place_matrix. Else 0 */
+                             writes the farther of that place's depth and the mesh's own, which
+                             is in front of a slope that was hidden from the picture, but behind
+                             the ridge that hid it: see terrimp_place_matrix. Else 0 */
     float offset[2];      /* [wu] as for ground */
 } terrimp_impostor_command;
 
@@ -1651,8 +1644,7 @@ typedef struct terrimp_stats {
     float shortfall;             /* part of these that was put off, 0..1 */
     float reuse;                 /* for how many frames a picture is drawn, a running mean */
     uint64_t texels_used, texels_free; /* of all atlases */
-    uint32_t atlas_failures;     /* pictures that found no room of their size, so far: coarser ones
-                                    are made */
+    uint32_t atlas_failures;     /* pictures that found no room, so far */
     uint32_t evictions;          /* pictures given up for others, so far */
     uint32_t late;               /* nodes and pictures that pages were missing for */
     float ground_tolerance_px;   /* what max_ground and max_cost made of it */
@@ -6439,38 +6431,6 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
     return TERRIMP_OK;
 }
 
-TERRIMP_API terrimp_result terrimp_live_atlas_room(const terrimp_live_atlas *atlas, uint32_t width,
-                                                   uint32_t height, uint32_t size[2])
-{
-    uint32_t i, best_x = 0, best_y = 0;
-    TERRIMPI_REFUSE(!atlas || !size, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(!atlas->slots, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(!terrimpi_within_u32(width, 1u, 65536u) ||
-                    !terrimpi_within_u32(height, 1u, 65536u), TERRIMP_E_RANGE);
-    for (i = 0; i < atlas->free_count; i++) {
-        const terrimp_rect *spot = &atlas->free_rects[i];
-        uint32_t x = terrimpi_min_u32(spot->width, atlas->desc.padding + width);
-        uint32_t y = terrimpi_min_u32(spot->height, atlas->desc.padding + height);
-        if (x <= atlas->desc.padding || y <= atlas->desc.padding)
-            continue;
-        x -= atlas->desc.padding;
-        y -= atlas->desc.padding;
-        if (x * height < y * width) /* both products are below 2^31 + 2^16 */
-            y = x * height / width;
-        else
-            x = y * width / height;
-        if (x > 0 && y > 0 && (x > best_x || y > best_y)) {
-            best_x = x;
-            best_y = y;
-        }
-    }
-    if (atlas->unused == atlas->desc.max_slots)
-        best_x = best_y = 0;
-    size[0] = best_x;
-    size[1] = best_y;
-    return TERRIMP_OK;
-}
-
 /* ==== Terrain ============================================================ >>impl-terrain */
 /* Based on: Hess 2010, sections 3.1, 4.2 and 6.5 (coarse meshes, skirts, meshes for many chunks);
    de Boer 2000, section 2.2 (quadtree).
@@ -7110,10 +7070,16 @@ static size_t terrimpi_terrain_ground_vertices(const terrimp_terrain *t)
     return (size_t)(t->desc.chunk_quads + 1u) * (t->desc.chunk_quads + 1u);
 }
 
-/* The samples of a page, [chunk_quads + 1]^2 in 16 bits. */
+/* The samples of a page, [chunk_quads + 1]^2. */
 static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node)
 {
     return terrimpi_corners_of(t, node) + t->index_limit / 4u;
+}
+
+/* Bytes of a sample in a page: as the field's, but two at least. */
+static uint32_t terrimpi_page_sample_bytes(const terrimp_heightfield *field)
+{
+    return field->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
 }
 
 /* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
@@ -7123,8 +7089,8 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     terrimp_heightfield f = t->desc.field;
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     f.samples = terrimpi_page_samples(t, node);
-    f.format = f.format == TERRIMP_FORMAT_S16 ? f.format : TERRIMP_FORMAT_U16;
-    f.row_bytes = 2u * (t->desc.chunk_quads + 1u);
+    f.row_bytes = terrimpi_page_sample_bytes(&f) * (t->desc.chunk_quads + 1u);
+    f.format = f.format == TERRIMP_FORMAT_U8 ? TERRIMP_FORMAT_U16 : f.format;
     f.origin_x = terrimpi_terrain_x(t, p.x);
     f.origin_z = terrimpi_terrain_z(t, p.z);
     f.spacing_x *= (float)(1u << p.level);
@@ -8517,7 +8483,7 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 {
     uint32_t side = t->desc.chunk_quads + 1u;
     uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
-                     t->index_limit + 2u * side * side;
+                     t->index_limit + terrimpi_page_sample_bytes(&t->desc.field) * side * side;
     return (bytes + 15u) / 16u * 16u;
 }
 
@@ -8605,7 +8571,6 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     head->bake.bytes != TERRIMP_PAGES_HEADER_BYTES ||
                     terrimpi_bake_hash(header) != head->bake.checksum ||
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
-                    t->desc.field.format == TERRIMP_FORMAT_F32 ||
                     head->block_level >= t->tree.level_count ||
                     terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
@@ -9640,6 +9605,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          are older are torn */
 #define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
+#define TERRIMPI_VIEW_FILL 0.7f       /* of the atlases, that pictures in use may fill, */
+#define TERRIMPI_VIEW_SOFTEST 0.7f    /* ... with so much of texels_per_px at least */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
 #define TERRIMPI_VIEW_FLIP 1.25f      /* how much cheaper another kind must be to be changed to */
 #define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
@@ -9649,8 +9616,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
 #define TERRIMPI_VIEW_COARSER 1.3f    /* ... a step towards it */
-#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; when costs fall with the square
-                                         of that, for max_cost */
+#define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; for max_cost, from which costs fall
+                                         with the square of the tolerance, at least so much */
+#define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
@@ -9738,6 +9706,7 @@ typedef struct terrimpi_frame {
     terrimp_frustum frustum;
     float middle[2];               /* [wu] the repetition of the eye, less the first one */
     terrimpi_motion motion;
+    float density;                 /* texels a pixel of what is captured */
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
 } terrimpi_frame;
@@ -10031,12 +10000,10 @@ static terrimp_rect terrimpi_cache_rect(const terrimpi_cache *c,
     return c->atlases[slot->atlas].slots[slot->slot];
 }
 
-/* Finds room for a picture, giving up the oldest ones that this frame does not draw; a smaller one,
-   but not less than a quarter of each side, is better than none. */
+/* Finds room for a picture, giving up the oldest ones that this frame does not draw. */
 static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
                                terrimpi_cache_slot_place *slot)
 {
-    uint32_t room[2];
     do {
         for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++)
             if (terrimp_live_atlas_alloc(&c->atlases[slot->atlas], size[0], size[1], &slot->slot) ==
@@ -10044,13 +10011,6 @@ static int terrimpi_cache_slot(terrimpi_cache *c, const uint32_t size[2],
                 return 1;
     } while (terrimpi_cache_evict(c));
     c->failures++;
-    for (slot->atlas = 0; slot->atlas < c->atlas_count; slot->atlas++) {
-        terrimp_live_atlas *atlas = &c->atlases[slot->atlas];
-        terrimp_live_atlas_room(atlas, size[0], size[1], room);
-        if (room[0] * 4u >= size[0] && room[1] * 4u >= size[1] &&
-            room[0] > 2u * TERRIMPI_CAPTURE_MARGIN && room[1] > 2u * TERRIMPI_CAPTURE_MARGIN)
-            return terrimp_live_atlas_alloc(atlas, room[0], room[1], &slot->slot) == TERRIMP_OK;
-    }
     return 0;
 }
 
@@ -10376,8 +10336,7 @@ static float terrimpi_view_life(const terrimpi_frame *f, uint32_t node, float cl
 
 static float terrimpi_view_sharpness(const terrimpi_frame *f, float closest)
 {
-    return f->pixel_factor * f->desc->texels_per_px /
-           terrimpi_max(closest, 1e-6f * f->desc->fade_start);
+    return f->pixel_factor * f->density / terrimpi_max(closest, 1e-6f * f->desc->fade_start);
 }
 
 /* The level of the ground that a picture is made of: the coarsest that shows no error in it. */
@@ -10389,7 +10348,15 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
-                                       (f->pixel_factor * f->desc->texels_per_px), is_known);
+                                       (f->pixel_factor * f->density), is_known);
+}
+
+/* Whether a slot may be as large as the softest picture of a camera. */
+static int terrimpi_view_has_slot(const terrimpi_frame *f, const terrimp_capture *c)
+{
+    float side = terrimpi_max(c->tan_right - c->tan_left, c->tan_up - c->tan_down);
+    return side * f->side_px * TERRIMPI_VIEW_SOFTEST * f->desc->texels_per_px <=
+           (float)(f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN);
 }
 
 /* Whether a point lies over the terrain, or beyond sides where another one goes on. */
@@ -10804,6 +10771,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     v.ground.draw_capacity = v.desc.max_ground;
     v.ground_scale = 1.0f;
     terrimpi_view_set_ground(&v.desc, &v.ground);
+    v.frame.density = v.desc.texels_per_px;
     v.frame.desc = &made->desc;
     v.frame.terrain = v.terrain;
     *made = v;
@@ -11173,12 +11141,13 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
 
 /* ---- ground or impostors? ---- */
 
-/* Fills in what a candidate costs. Returns 0 when no camera fits: the eye is too close. */
+/* Fills in what a candidate costs. Returns 0 when no camera fits, since the eye is too close, or no
+   slot. */
 static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_cache *cache,
                                        terrimpi_candidate *c)
 {
     const terrimp_costs *costs = &f->desc->costs;
-    float k = f->side_px, density = f->desc->texels_per_px;
+    float k = f->side_px;
     terrimp_capture camera;
     terrimp_mesh_info mesh;
     terrimp_box box;
@@ -11189,7 +11158,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
         return 0;
     if (terrimpi_camera_fit(&box, f->camera.eye,
                             f->camera.orthographic ? f->camera.forward : NULL, &camera) !=
-        TERRIMP_OK)
+            TERRIMP_OK || !terrimpi_view_has_slot(f, &camera))
         return 0;
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     c->picture = terrimpi_cache_find(cache, c->node.number);
@@ -11208,7 +11177,7 @@ static int terrimpi_candidate_estimate(const terrimpi_frame *f, const terrimpi_c
     source = terrimpi_view_source(f, &c->node, c->closest, &is_known);
     c->is_known = (uint8_t)is_known;
     quads = f->terrain->desc.chunk_quads << (c->node.level - source);
-    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * density * density,
+    c->capture_cost = terrimpi_cost_capture(costs, c->pixels * f->density * f->density,
                                             TERRIMPI_VIEW_BORDER * (float)(quads * quads));
     return 1;
 }
@@ -11496,10 +11465,16 @@ static const terrimpi_view_kind terrimpi_view_kinds[TERRIMPI_VIEW_KIND_COUNT] = 
     {NULL, NULL, NULL, terrimpi_view_floor_emit}
 };
 
+/* What a frame costs: its draws, and captures in the mean frame; and the pixels that are wanted of
+   pictures. */
+typedef struct terrimpi_frame_sums {
+    float drawn, spread, pixels;
+} terrimpi_frame_sums;
+
 /* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
-   TERRIMPI_VIEW_FLIP. Adds to what captures cost in the mean frame, and draws in this one. */
-static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float *spread,
-                                 float *drawn)
+   TERRIMPI_VIEW_FLIP. Adds it to the frame's sums. */
+static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
+                                 terrimpi_frame_sums *sums)
 {
     terrimpi_region_offer offers[TERRIMPI_VIEW_KIND_SHOWS];
     int possible[TERRIMPI_VIEW_KIND_SHOWS], kind, best = TERRIMPI_VIEW_KIND_GROUND;
@@ -11525,13 +11500,23 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region, float
                     !v->candidates[region->first_candidate + i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
         v->kind_of[region->node] = (uint8_t)best;
-    *spread += offers[best].upkeep;
-    *drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
+    sums->spread += offers[best].upkeep;
+    sums->drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
-        terrimpi_cache_picture *p = v->candidates[region->first_candidate + i].picture;
-        if (p)
-            p->seen = v->frame.number;
+        const terrimpi_candidate *c = &v->candidates[region->first_candidate + i];
+        sums->pixels += c->pixels;
+        if (c->picture)
+            c->picture->seen = v->frame.number;
     }
+}
+
+/* The texels a pixel that the next frame's pictures get: what the atlases have room for. */
+static float terrimpi_view_density(const terrimp_view_desc *d, float pixels)
+{
+    float side = (float)d->atlas_size;
+    float room = TERRIMPI_VIEW_FILL * side * side * (float)d->atlas_count;
+    return terrimpi_clamp(TERRIMP_SQRTF(room / terrimpi_max(pixels, 1.0f)),
+                          TERRIMPI_VIEW_SOFTEST * d->texels_per_px, d->texels_per_px);
 }
 
 /* ---- the schedule of captures ---- */
@@ -11604,7 +11589,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_plan *plan = &job->plan;
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
-    float texels = 1.5f + f->desc->tolerance_px * f->desc->texels_per_px; /* bilinear, parallax */
+    float texels = 1.5f + f->desc->tolerance_px * f->density; /* bilinear, parallax */
     uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;
@@ -11630,8 +11615,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
     terrimpi_mesh_write(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
     if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->mesh_xyz,
-                              mesh.vertex_count, f->side_px * f->desc->texels_per_px, largest,
-                              &plan->camera, size))
+                              mesh.vertex_count, f->side_px * f->density, largest,
+                              &plan->camera, size) ||
+        !terrimpi_view_has_slot(f, &plan->camera))
         return 0;
     distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
@@ -11647,7 +11633,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->in_pieces = f->desc->max_capture_triangles ||
                      ((job->triangles > room ||
                        (f->desc->max_cost > 0.0f &&
-                        c->capture_cost > costs->triangle * (float)room)) && !v->open);
+                        terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
+                                              (float)job->triangles) >
+                            costs->triangle * (float)room)) && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -12003,29 +11991,44 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
+/* What max_cost leaves for captures: those of the mean frame, up to a share of it, and the smallest
+   piece of the picture that has been begun. */
+static float terrimpi_view_reserve(const terrimp_view *v, float spread)
+{
+    float least = (float)terrimpi_spending_least(&v->frame), piece = 0.0f;
+    if (v->open)
+        piece = v->jobs[0].cost * terrimpi_min(least / (float)v->jobs[0].triangles, 1.0f);
+    return terrimpi_max(terrimpi_min(spread, TERRIMPI_VIEW_RESERVE * v->desc.max_cost),
+                        terrimpi_min(piece, 2.0f * TERRIMPI_VIEW_RESERVE * v->desc.max_cost));
+}
+
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
-static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f, float *spread,
-                                        float *drawn)
+static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
+                                        terrimpi_frame_sums *sums)
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
+    float finer = max_cost > 0.0f ? TERRIMP_SQRTF(v->cost / max_cost) : TERRIMPI_VIEW_FINER;
     uint32_t tries, i;
-    if (!(v->cost > max_cost * TERRIMPI_VIEW_FINER * TERRIMPI_VIEW_FINER) || !(max_cost > 0.0f))
-        v->ground_scale = terrimpi_max(1.0f, scale * TERRIMPI_VIEW_FINER);
+    if (finer <= TERRIMPI_VIEW_FINER)
+        v->ground_scale = terrimpi_max(1.0f, scale * terrimpi_max(finer, TERRIMPI_VIEW_FINEST));
     for (tries = 0;; tries++) {
         TERRIMPI_TRY(terrimpi_view_cut(v, f));
         if (!f->camera.orthographic != !v->frame.camera.orthographic)
             terrimp_view_invalidate(v); /* no picture is of use to a camera of the other kind */
         v->frame = *f;
-        *spread = *drawn = 0.0f;
+        memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->region_count; i++)
-            terrimpi_view_decide(v, &v->regions[i], spread, drawn);
-        v->cost = *drawn + terrimpi_min(*spread, TERRIMPI_VIEW_RESERVE * max_cost);
+            terrimpi_view_decide(v, &v->regions[i], sums);
+        v->cost = sums->drawn + terrimpi_view_reserve(v, sums->spread);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
-        v->ground_scale = v->ground_scale < scale ? scale : v->ground_scale * TERRIMPI_VIEW_DEARER;
+        finer = v->ground_scale;
+        v->ground_scale *= TERRIMPI_VIEW_DEARER;
+        if (finer < scale)
+            v->ground_scale = terrimpi_min(v->ground_scale, scale);
     }
 }
 
@@ -12033,7 +12036,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 {
     terrimp_camera resolved;
     terrimpi_frame frame;
-    float reuse, spread, drawn, middle[2] = {0.0f, 0.0f};
+    terrimpi_frame_sums sums;
+    float reuse, middle[2] = {0.0f, 0.0f};
     int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
@@ -12049,7 +12053,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
                         TERRIMP_E_PAGE);
     }
-    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &spread, &drawn));
+    TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
     terrimpi_view_cancel(view);
@@ -12059,9 +12063,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     if (!terrimpi_view_full(&view->desc))
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
-    terrimpi_view_schedule(view, spread, drawn);
+    terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
     terrimpi_view_count_frame(view);
+    view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
 
@@ -12093,6 +12098,7 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
         }
         terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                          p->texture_matrix[i]);
+        camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
         if (v->cache.places)
             terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
                                            v->cache.places[p - v->cache.pictures].matrix[i]);
@@ -16951,8 +16957,7 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     memset(&t, 0, sizeof t);
     TERRIMPI_TRY(terrimp_terrain_desc_resolve(&d.terrain, &t.desc));
     TERRIMPI_REFUSE(!terrimpi_terrain_count(&t), TERRIMP_E_OVERFLOW);
-    TERRIMPI_REFUSE(t.desc.field.format == TERRIMP_FORMAT_F32 ||
-                    !(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(t.desc.height_low < t.desc.height_high), TERRIMP_E_RANGE);
     top = t.tree.level_count - 1u;
     TERRIMPI_DEFAULT(d.block_level, t.desc.field.width <= 4097u && t.desc.field.depth <= 4097u
                                         ? top : 4u);
@@ -17170,17 +17175,19 @@ static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t
 }
 
 /* Copies the samples of a node of the part into its page. */
-static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n, uint16_t *out)
+static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n,
+                                    unsigned char *out)
 {
     const terrimp_quadtree *t = &w->part->tree;
-    uint32_t i, j, quads = t->chunk_quads;
+    uint32_t i, j, quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field);
     for (j = 0; j <= quads; j++) {
-        const void *row = terrimpi_field_row(&t->field, terrimpi_tree_row(t, n->level,
-                                                                          n->z * quads + j));
-        for (i = 0; i <= quads; i++) {
+        const unsigned char *row = (const unsigned char *)terrimpi_field_row(
+            &t->field, terrimpi_tree_row(t, n->level, n->z * quads + j));
+        for (i = 0; i <= quads; i++, out += size) {
             uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
-            *out++ = t->field.format == TERRIMP_FORMAT_U8 ? ((const uint8_t *)row)[x]
-                                                          : ((const uint16_t *)row)[x];
+            uint16_t wide = row[t->field.format == TERRIMP_FORMAT_U8 ? x : 0];
+            memcpy(out, t->field.format == TERRIMP_FORMAT_U8 ? (const void *)&wide : row + x * size,
+                   size);
         }
     }
 }
@@ -17215,7 +17222,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
     at += 4u * t->vertex_limit;
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
-    terrimpi_paging_samples(w, n, (uint16_t *)(void *)(w->page + at + t->index_limit));
+    terrimpi_paging_samples(w, n, w->page + at + t->index_limit);
     memcpy(w->page, &head, sizeof head);
     head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
@@ -17301,13 +17308,13 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
 {
     const terrimp_quadtree *t = &w->part->tree;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t quads = t->chunk_quads, i, j, x, z;
+    uint32_t quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field), i, j, x, z;
     terrimpi_page_head head;
     const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
                                 4u * w->whole.vertex_limit + w->whole.index_limit;
     TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
     for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++, from += 2) {
+        for (i = 0; i <= quads; i++, from += size) {
             uint16_t sample;
             x = terrimpi_tree_col(t, 0, n->x * quads + i);
             z = terrimpi_tree_row(t, 0, n->z * quads + j);
@@ -17315,7 +17322,7 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
             if (t->field.format == TERRIMP_FORMAT_U8)
                 w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
             else
-                memcpy(w->samples + ((size_t)z * t->field.width + x) * 2u, &sample, sizeof sample);
+                memcpy(w->samples + ((size_t)z * t->field.width + x) * size, from, size);
         }
     t->nodes[n->number] = head.record.ground;
     w->part->meshes[n->number] = head.record.mesh;
@@ -17334,7 +17341,7 @@ static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uin
     uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
     uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
     uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
-    uint16_t line[256]; /* either is 1 */
+    float line[256]; /* of any format; either is 1 */
     for (k = 0; k < cols * rows; k += 256u) {
         f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
         f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
@@ -20457,8 +20464,8 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
           terrimp_texture_coordinates take positions relative to the eye of the picture;
           exact_depth; terrimp_view_set; a hider, which hides what lies behind ridges; first what
           draws, then what builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement.
-          Gone: the pair of atlases (a benchmark has it), evict, query, rect and reset of the live
-          atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
+          Gone: the pair of atlases (a benchmark has it), evict, query, rect, reset and room of the
+          live atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
           terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any

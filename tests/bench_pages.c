@@ -3,12 +3,12 @@
    The large terrains repeat one block of 1024 x 1024 samples, so that the file needs no 13 GB: what
    is read is that block's pages with the node's number put in.
    Build:  make bench_pages
-   Use:    build/bench_pages [SIDE]
+   Use:    build/bench_pages [SIDE], or build/bench_pages SIDE pictures
    Expect: lines for tests/results/pages.md. */
 #define _XOPEN_SOURCE 700
 #define _DEFAULT_SOURCE
 #define TERRIMP_IMPLEMENTATION
-#include "terrimp.h"
+#include "bench_pages_draw.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,6 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
+enum { DELAY = 7, AT_ONCE = 64 }; /* frames that a slow read takes, and how many are under way */
 enum { BLOCK = 1024, BLOCK_LEVEL = 4, BLOCK_PAGES = 341, FRAMES = 400 };
 
 typedef struct world {
@@ -366,9 +367,202 @@ static void bench_whole(void)
            times[1][FRAMES / 2] / times[0][FRAMES / 2], times[1][FRAMES / 2] * 1e6);
 }
 
+/* ---- pictures ---- */
+
+/* Light from the north-west on the terrain, repeated over a texture. */
+static raster_texture make_colour(const world *w, uint32_t side)
+{
+    enum { SIDE = 1 << LOG2_COLOUR };
+    uint32_t step = (side - 1u) / SIDE ? (side - 1u) / SIDE : 1u, x, z;
+    uint8_t *rgb = malloc(3u * SIDE * SIDE);
+    raster_texture colour;
+    for (z = 0; z < SIDE; z++)
+        for (x = 0; x < SIDE; x++) {
+            uint32_t i = x * step % BLOCK, j = z * step % BLOCK;
+            float here = w->samples[j * BLOCK + i];
+            float right = w->samples[j * BLOCK + (i + step) % BLOCK] - here;
+            float down = w->samples[(j + step) % BLOCK * BLOCK + i] - here;
+            float light = 0.6f + 0.4f * (right + down) / (1.0f + fabsf(right) + fabsf(down));
+            uint8_t *to = rgb + 3u * (z * SIDE + x);
+            to[0] = (uint8_t)(light * (90.0f + 0.12f * here));
+            to[1] = (uint8_t)(light * (140.0f + 0.05f * here));
+            to[2] = (uint8_t)(light * 70.0f);
+        }
+    raster_make_texture(&colour, malloc(sizeof(uint16_t) * SIDE * SIDE / 3u * 4u + 64u), rgb,
+                        LOG2_COLOUR);
+    free(rgb);
+    return colour;
+}
+
+/* A terrain in pages with the reads that are under way. */
+typedef struct stream {
+    world *w;
+    terrimp_terrain *terrain;
+    painter *p;
+    uint32_t nodes[AT_ONCE], due[AT_ONCE], count, reads, once;
+    void *to[AT_ONCE];
+    unsigned char *seen;
+    double sum, worst;
+    uint32_t holes, frames, behind; /* ... and last frame that was 0.5 dB behind memory's */
+} stream;
+
+static int stream_open(stream *s, world *w, const unsigned char *header, uint32_t slots,
+                       const raster_texture *colour)
+{
+    size_t bytes = terrimp_pages_bytes(header, TERRIMP_PAGES_HEADER_BYTES, slots);
+    terrimp_heightfield field;
+    memset(s, 0, sizeof *s);
+    memset(&field, 0, sizeof field);
+    field.spacing_x = field.spacing_z = 30.0f;
+    s->w = w;
+    s->worst = 99.0;
+    if (terrimp_pages_open(&field, header, TERRIMP_PAGES_HEADER_BYTES, slots, malloc(bytes), bytes,
+                           &s->terrain) != TERRIMP_OK)
+        return 0;
+    s->seen = calloc(1, terrimp_terrain_tree(s->terrain)->node_count);
+    s->p = painter_open(s->terrain, TERRIMP_MODE_AUTO, 0.0f,
+                        30.0f * (float)(w->desc.terrain.field.width - 1u), colour);
+    return s->p != NULL;
+}
+
+/* Forgets a read: it has come, or is not wanted any more. */
+static void stream_end(stream *s, uint32_t i)
+{
+    s->count--;
+    s->nodes[i] = s->nodes[s->count];
+    s->due[i] = s->due[s->count];
+    s->to[i] = s->to[s->count];
+}
+
+/* A frame: takes what is due, draws, gives up what is not wanted, begins the rest. What is read at
+   once is there for the next frame. */
+static terrimp_result stream_frame(stream *s, const terrimp_camera *camera, uint32_t frame,
+                                   uint32_t delay)
+{
+    terrimp_want wants[AT_ONCE];
+    terrimp_page_info page;
+    terrimp_result result;
+    uint32_t gone[AT_ONCE], count, i, k;
+    for (i = 0; i < s->count;) {
+        if (s->due[i] > frame) {
+            i++;
+            continue;
+        }
+        terrimp_page_get_info(s->terrain, s->nodes[i], &page);
+        if (!load_node(s->w, page.offset, s->nodes[i], s->to[i], page.bytes) ||
+            terrimp_page_put(s->terrain, s->nodes[i]) != TERRIMP_OK)
+            exit(1);
+        stream_end(s, i);
+    }
+    terrimp_pages_next_frame(s->terrain);
+    result = painter_draw(s->p, *camera);
+    terrimp_pages_withdrawn(s->terrain, gone, AT_ONCE, &count);
+    for (i = 0; i < count; i++)
+        for (k = 0; k < s->count; k++)
+            if (s->nodes[k] == gone[i]) {
+                terrimp_page_fail(s->terrain, gone[i]);
+                stream_end(s, k);
+                break;
+            }
+    terrimp_pages_wants(s->terrain, wants, AT_ONCE, &count);
+    for (i = 0; i < count && s->count < AT_ONCE; i++)
+        if (terrimp_page_begin(s->terrain, wants[i].node, &s->to[s->count]) == TERRIMP_OK) {
+            s->nodes[s->count] = wants[i].node;
+            s->due[s->count++] = frame + delay;
+            s->reads++;
+            s->once += !s->seen[wants[i].node];
+            s->seen[wants[i].node] = 1;
+        }
+    return result;
+}
+
+/* Flies and jumps, with all in memory, with pages that are read at once, and from a slow disk. */
+static void bench_pictures(uint32_t side)
+{
+    enum { LEG = 150, LEGS = 4 };
+    world w;
+    stream s[2];
+    unsigned char header[TERRIMP_PAGES_HEADER_BYTES];
+    terrimp_pages_info info;
+    terrimp_terrain_desc desc;
+    terrimp_terrain *in_memory;
+    terrimp_camera camera;
+    raster_texture colour;
+    painter *memory, *truth;
+    uint32_t frame, i, leg, holes = 0, back[LEGS] = {0};
+    double sum = 0.0, least = 99.0;
+    int16_t *samples = malloc((size_t)side * side * sizeof *samples);
+    if (!samples || !make_world(&w, side))
+        return;
+    make_samples(&w);
+    colour = make_colour(&w, side);
+    read_samples(&w, 0, 0, side, side, samples, side * sizeof *samples);
+    desc = w.desc.terrain;
+    desc.field.samples = samples;
+    desc.field.row_bytes = 0;
+    desc.field.spacing_x = desc.field.spacing_z = 30.0f;
+    move(&w, 0, header, NULL, sizeof header);
+    if (terrimp_pages_check(header, sizeof header, &info) != TERRIMP_OK ||
+        terrimp_terrain_create(&desc, NULL, &in_memory) != TERRIMP_OK ||
+        !stream_open(&s[0], &w, header, 900, &colour) ||
+        !stream_open(&s[1], &w, header, 900, &colour))
+        return;
+    memory = painter_open(in_memory, TERRIMP_MODE_AUTO, 0.0f, 30.0f * (float)(side - 1u), &colour);
+    truth = painter_open(in_memory, TERRIMP_MODE_GEOMIP, 0.25f, 30.0f * (float)(side - 1u),
+                         &colour);
+    camera = camera_of(&info);
+    camera.width_px = WIDTH;
+    camera.height_px = HEIGHT;
+    for (frame = 0; frame < LEG * LEGS; frame++) {
+        double own;
+        leg = frame / LEG;
+        if (frame % LEG == 0 && leg > 0) { /* a jump */
+            camera.eye[0] = 30.0f * (float)side * (0.2f + 0.5f * grain(leg, 3));
+            camera.eye[2] = 30.0f * (float)side * (0.2f + 0.6f * grain(leg, 5));
+        }
+        camera.eye[0] += leg % 2u ? 10.0f : 60.0f;
+        if (painter_draw(memory, camera) != TERRIMP_OK || painter_draw(truth, camera) != TERRIMP_OK)
+            return;
+        own = painter_psnr(memory, truth, &holes);
+        sum += own;
+        least = fmin(least, own);
+        for (i = 0; i < 2u; i++) {
+            double psnr;
+            if (stream_frame(&s[i], &camera, frame, i ? DELAY : 0u) != TERRIMP_OK ||
+                (i == 0 && frame % LEG < 2u * info.level_count))
+                continue; /* nothing is here yet; a level comes in each frame */
+            psnr = painter_psnr(s[i].p, truth, &s[i].holes);
+            s[i].sum += own - psnr;
+            s[i].worst = fmin(s[i].worst, psnr);
+            s[i].frames++;
+            if (i == 1u && psnr < own - 0.5)
+                back[leg] = frame % LEG + 1u;
+        }
+    }
+    printf("%u x %u, %u frames of %d x %d with %d jumps, PSNR against ground at 0.25 px: in memory "
+           "%.2f dB (worst %.2f), %u pixels of sky that is not\n", (unsigned)side, (unsigned)side,
+           LEG * LEGS, WIDTH, HEIGHT, LEGS - 1, sum / (LEG * LEGS), least, (unsigned)holes);
+    for (i = 0; i < 2u; i++)
+        printf("%s: %.3f dB less in the mean of %u frames, worst %.2f dB, %u pixels of sky, %u "
+               "reads, %.3f over pages\n", i ? "117 ms a read, 64 under way" : "read at once",
+               s[i].sum / s[i].frames, (unsigned)s[i].frames, s[i].worst, (unsigned)s[i].holes,
+               (unsigned)s[i].reads, (double)s[i].reads / s[i].once);
+    printf("back to within 0.5 dB of memory for good, frames after start and jumps:");
+    for (leg = 0; leg < LEGS; leg++)
+        printf(" %u", (unsigned)back[leg]);
+    printf("\n");
+    painter_close(memory), painter_close(truth), painter_close(s[0].p), painter_close(s[1].p);
+    terrimp_terrain_destroy(in_memory);
+    fclose(w.file);
+}
+
 int main(int argc, char **argv)
 {
     uint32_t side = argc > 1 ? (uint32_t)atoi(argv[1]) : 0u;
+    if (argc > 2) {
+        bench_pictures(side);
+        return 0;
+    }
     bench_whole();
     printf("| side | wu a frame | slots | limit, MiB | resident at most, MiB | reads over pages | "
            "frames that lacked some | MB a second, second half |\n|--:|--:|--:|--:|--:|--:|--:|"

@@ -848,6 +848,22 @@ static void hills_look_like_the_full_mesh(void)
     scene_close(&s);
 }
 
+/* Want of room costs no quality: pictures are softer together, and what has no room is ground. */
+static void small_atlases_cost_no_quality(void)
+{
+    static const uint32_t sides[] = {64, 256, 512, 1024};
+    manner m = manner_named("auto");
+    size_t i;
+    scene s;
+    open_hills(&s, 640, 512, 60.0f);
+    for (i = 0; i < sizeof sides / sizeof *sides; i++) {
+        gl_terrain_close(&s.gl);
+        scene_fill(&s, sides[i]);
+        CHECK(flight_likeness(&s, &m, 3.0f, 16, HILLS_DB) >= HILLS_DB);
+    }
+    scene_close(&s);
+}
+
 /* ---- Two parts ---------------------------------------------------------- */
 
 /* By how much more like the full mesh the block has to be, [dB]. */
@@ -1629,6 +1645,7 @@ int main(int argc, char **argv)
     RUN(inputs_that_once_had_holes_have_none);
     RUN(silhouettes_stand_where_they_should);
     RUN(hills_look_like_the_full_mesh);
+    RUN(small_atlases_cost_no_quality);
     RUN(a_real_tile_looks_like_the_full_mesh);
     RUN(houses_and_seas_meet_the_terrain);
     RUN(what_ridges_hide_shows_no_pixel);

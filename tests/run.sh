@@ -155,6 +155,8 @@ unit="-std=c99 -I. tests/unit.c -lm -o"
 # ---- the list: slow suites first, or the last one would run alone
 
 suite "unit tests, built as the README says" "$CC $unit build/test/unit && build/test/unit"
+suite "pages of 4097 x 4097 samples" "$CC -O2 -DPAGED_SIDE=4097u -DPAGED_CHUNK=64u $unit \
+    build/test/unit-pages && build/test/unit-pages pages_"
 for compiler in gcc clang; do
     if sanitizers_work $compiler; then
         suite "unit tests, $compiler with sanitizers" \

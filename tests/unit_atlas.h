@@ -634,36 +634,6 @@ static void live_atlas_counts_what_is_there(void)
     }
 }
 
-/* What room says fits, has the shape that was asked for, and is as large as can be. */
-static void live_room_is_the_largest_of_its_shape(void)
-{
-    int run, step, reduced = 0;
-    for (run = 0; run < 10; run++) {
-        live_model m;
-        live_open(&m, random_range(20, 300), random_range(20, 300), random_range(0, 3), LIVE_SLOTS);
-        for (step = 0; step < 150; step++) {
-            uint32_t width = random_range(1, 150), height = random_range(1, 150), w, h;
-            uint32_t size[2] = {77, 77};
-            live_churn(&m, 2, 60);
-            CHECK(terrimp_live_atlas_room(&m.atlas, width, height, size) == TERRIMP_OK);
-            w = size[0];
-            h = size[1];
-            if (w == width || h == height || w == 0) {
-                CHECK((w == width) == (h == height) && (w == 0) == (h == 0));
-                CHECK(w > 0 ? live_fits(&m, w, h)
-                            : !live_fits(&m, (width - 1u) / height + 1u,
-                                         (height - 1u) / width + 1u));
-                continue;
-            }
-            reduced++;
-            CHECK(live_fits(&m, w, h) && !live_fits(&m, w + 1u, h + 1u));
-            CHECK(w * height < (h + 1u) * width && h * width < (w + 1u) * height);
-        }
-        live_close(&m);
-    }
-    CHECK(reduced > 50);
-}
-
 /* Where the memory for free rectangles is too small some room is overlooked, but slots still keep
    apart and the whole atlas comes back. */
 static void live_atlas_survives_a_full_list_of_holes(void)
@@ -750,7 +720,7 @@ static void live_atlas_refuses_without_a_change(void)
     terrimp_live_atlas_desc desc, bad;
     terrimp_live_atlas atlas, before, unused;
     unsigned char *memory, *copy;
-    uint32_t slot = 77u, size[2], first, k;
+    uint32_t slot = 77u, first, k;
     size_t bytes;
     memset(&unused, 0, sizeof unused);
     memset(&desc, 0, sizeof desc);
@@ -798,17 +768,8 @@ static void live_atlas_refuses_without_a_change(void)
     CHECK(terrimp_live_atlas_free(&atlas, 4) == TERRIMP_E_STATE);    /* never in use */
     CHECK(terrimp_live_atlas_free(&atlas, 5) == TERRIMP_E_RANGE);
     CHECK(terrimp_live_atlas_free(&atlas, 0xffffffffu) == TERRIMP_E_RANGE);
-    memset(size, UNTOUCHED, sizeof size);
-    CHECK(terrimp_live_atlas_room(NULL, 1, 1, size) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_room(&atlas, 1, 1, NULL) == TERRIMP_E_NULL);
-    CHECK(terrimp_live_atlas_room(&atlas, 0, 1, size) == TERRIMP_E_RANGE);
-    CHECK(terrimp_live_atlas_room(&atlas, 1, 0, size) == TERRIMP_E_RANGE);
-    CHECK(terrimp_live_atlas_room(&atlas, 65537, 1, size) == TERRIMP_E_RANGE);
-    CHECK(terrimp_live_atlas_room(&atlas, 1, 0xffffffffu, size) == TERRIMP_E_RANGE);
-    CHECK(is_untouched(size, sizeof size));
     CHECK(terrimp_live_atlas_alloc(&unused, 1, 1, &k) == TERRIMP_E_STATE);
     CHECK(terrimp_live_atlas_free(&unused, 0) == TERRIMP_E_STATE);
-    CHECK(terrimp_live_atlas_room(&unused, 1, 1, size) == TERRIMP_E_STATE);
     CHECK(memcmp(&before, &atlas, sizeof atlas) == 0 && memcmp(copy, memory, bytes) == 0);
 
     CHECK(terrimp_live_atlas_alloc(&atlas, 65, 1, &k) == TERRIMP_E_CAPACITY);
@@ -832,7 +793,6 @@ static void atlas_tests(void)
     RUN(live_holes_are_maximal);
     RUN(live_slots_go_where_they_fit_best);
     RUN(live_atlas_counts_what_is_there);
-    RUN(live_room_is_the_largest_of_its_shape);
     RUN(live_atlas_survives_a_full_list_of_holes);
     RUN(live_atlas_stays_full);
     RUN(live_atlas_is_deterministic);

@@ -258,47 +258,79 @@ static void sorted_needs_no_depth_buffer(void)
     CHECK(seen > 1000 * ORDER_WIDE * ORDER_HIGH / 10);
 }
 
-/* The same over real elevation, where that is at hand: 16-bit samples, rows of any length. */
-static void sorted_needs_no_depth_buffer_over_tile(const char *name)
+enum { TILE = 1153 }; /* 18 pages of 64 quads */
+static int16_t tile_samples[TILE * TILE];
+
+/* The first samples of a tile of elevation, the last column and row once more the first ones: with
+   a cliff at the seam it can repeat. Returns 0 when it is not at hand. */
+static int sorted_read_tile(const char *name)
 {
-    enum { TILE = 1201 };
-    static uint8_t bytes[TILE * TILE * 2];
-    static int16_t samples[TILE * TILE];
     const char *folder = getenv("TERRIMP_DATA");
-    terrimp_sorted_desc desc;
-    terrimp_sorted s;
     char path[512];
+    uint8_t bytes[2];
     FILE *file;
-    size_t i, got;
-    int faults = 0, seen = 0;
+    long x, z, side = 1201;
     snprintf(path, sizeof path, "%s/%s", folder ? folder : "../shared/data", name);
     file = fopen(path, "rb");
     if (!file) {
         SKIP(path);
-        return;
+        return 0;
     }
-    got = fread(bytes, 1, sizeof bytes, file);
+    fseek(file, 0, SEEK_END);
+    side = ftell(file) > 2 * 3601 * 3600 ? 3601 : side;
+    for (z = 0; z < TILE; z++) {
+        fseek(file, 2 * side * (z % (TILE - 1)), SEEK_SET);
+        for (x = 0; x < TILE - 1; x++) {
+            int16_t *sample = &tile_samples[z * TILE + x];
+            int value = fread(bytes, 1, 2, file) == 2 ? bytes[0] << 8 | bytes[1] : 0x8000;
+            *sample = (int16_t)(value > 32767 ? value - 65536 : value);
+            if (value == 0x8000)
+                *sample = x ? sample[-1] : 0;
+        }
+        tile_samples[z * TILE + x] = tile_samples[z * TILE];
+    }
     fclose(file);
-    CHECK(got == sizeof bytes);
-    for (i = 0; i < TILE * TILE; i++) {
-        int value = bytes[2 * i] << 8 | bytes[2 * i + 1];
-        value = value > 32767 ? value - 65536 : value;
-        samples[i] = (int16_t)(value == -32768 && i ? samples[i - 1] : value);
-    }
+    return 1;
+}
+
+static terrimp_camera sorted_tile_camera(const terrimp_heightfield *field)
+{
+    terrimp_sorted_desc place;
+    terrimp_camera camera;
+    float ground = 0.0f;
+    memset(&place, 0, sizeof place);
+    place.field = *field;
+    camera = sorted_camera(&place);
+    (void)terrimp_heightfield_height(field, camera.eye[0], camera.eye[2], &ground);
+    camera.eye[1] = ground + random_float(2.0f, 400.0f);
+    camera.z_near = 1.0f, camera.z_far = 30000.0f;
+    return camera;
+}
+
+/* The same over real elevation, where that is at hand: 16-bit samples, rows of any length; half of
+   the frames without end, over seams. */
+static void sorted_needs_no_depth_buffer_over_tile(const char *name)
+{
+    terrimp_sorted_desc desc;
+    terrimp_sorted s;
+    int i, faults = 0, seen = 0;
+    if (!sorted_read_tile(name))
+        return;
     memset(&desc, 0, sizeof desc);
-    desc.field.samples = samples;
+    desc.field.samples = tile_samples;
     desc.field.width = desc.field.depth = TILE;
     desc.field.format = TERRIMP_FORMAT_S16;
     desc.field.spacing_x = 68.3f, desc.field.spacing_z = 92.6f;
-    CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
     for (i = 0; i < 1000; i++) {
-        terrimp_camera camera = sorted_camera(&s.desc);
-        float ground = 0.0f;
-        (void)terrimp_heightfield_height(&desc.field, camera.eye[0], camera.eye[2], &ground);
-        camera.eye[1] = ground + random_float(2.0f, 400.0f);
-        camera.z_near = 1.0f, camera.z_far = 30000.0f;
+        terrimp_camera camera;
+        desc.field.wrap = i >= 500;
+        desc.field.width = TILE - (i < 500 ? 37u : 0u);
+        desc.field.row_bytes = sizeof *tile_samples * TILE;
+        if (i % 500 == 0)
+            CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
+        camera = sorted_tile_camera(&s.desc.field);
         s.desc.scale = random_float(2.0f, 8.0f);
-        s.desc.front_to_back = (int)(i & 1u);
+        s.desc.front_to_back = i & 1;
         sorted_frame(&s, &camera);
         faults += order_faults(&s, &camera, &seen);
     }
@@ -575,6 +607,53 @@ static void views_in_painters_order_need_no_depth_buffer(void)
     CHECK(h.seen > 50 * ORDER_WIDE * ORDER_HIGH);
 }
 
+/* Views of real elevation, where that is at hand, half of them without end: TERRIMP_LONG makes them
+   1,000 eyes on each tile in each mode, and counts what AUTO shows wrongly, too. */
+static void views_of_tiles_need_no_depth_buffer(void)
+{
+    static const char *const tiles[4] = {"N42E001.hgt", "N49E011.hgt", "N41E001.hgt",
+                                         "N48W125.hgt"};
+    enum { CROP = 129 };
+    static order_host h;
+    static land l;
+    int is_long = getenv("TERRIMP_LONG") != NULL, frames = is_long ? 125 : 2, i, k, mode, wrap;
+    for (i = 0; i < (is_long ? 4 : 1); i++)
+        for (k = 0; k < 4 && sorted_read_tile(tiles[i]); k++) { /* crops of the tile */
+            int first_x = k % 2 * 700, first_z = k / 2 * 700, x, z;
+            for (wrap = 0; wrap < 2; wrap++) {
+                land_prepare(&l, CROP, CROP, TERRIMP_FORMAT_F32, LAND_FLAT);
+                for (z = 0; z < CROP; z++)
+                    for (x = 0; x < CROP; x++)
+                        l.samples[z * CROP + x] =
+                            tile_samples[(first_z + z % (CROP - wrap)) * TILE + first_x +
+                                         x % (CROP - wrap)];
+                l.desc.field.spacing_x = 0.74f; /* in units of 92.6 m */
+                l.desc.field.height_scale = 1.0f / 92.6f;
+                l.desc.field.wrap = wrap;
+                l.desc.chunk_quads = 16;
+                if (!land_build(&l))
+                    return;
+                for (mode = TERRIMP_MODE_FULL; mode <= TERRIMP_MODE_AUTO; mode++) {
+                    terrimp_view_desc d;
+                    memset(&d, 0, sizeof d);
+                    d.sorted = 1;
+                    d.mode = mode;
+                    memset(&h, 0, sizeof h);
+                    h.l = &l;
+                    if (mode == TERRIMP_MODE_IMPOSTOR || (mode == TERRIMP_MODE_AUTO && !is_long))
+                        continue;
+                    order_fly(&h, &d, frames);
+                    if (is_long)
+                        printf("  %s crop %d%s mode %d: %d of %d wrong\n", tiles[i], k,
+                               wrap ? " without end" : "", mode, h.faults, h.seen);
+                    CHECK(h.faults == 0 || mode == TERRIMP_MODE_AUTO);
+                    CHECK(h.faults <= h.seen / 10000);
+                }
+                land_free(&l);
+            }
+        }
+}
+
 static void pictures_are_made_in_painters_order(void)
 {
     static order_host h;
@@ -846,7 +925,8 @@ static void views_keep_to_their_cost(void)
             ratio = pace_fly(&l, &d, &least, &limited, &most, &rests);
             /* A picture is made in pieces of whole nodes, which some frames have no room for. */
             if (mode == TERRIMP_MODE_AUTO)
-                CHECK(ratio < 0.5f * free_ratio && limited < 1.02f * d.max_cost);
+                CHECK(ratio < 0.34f * free_ratio && limited < 0.95f * d.max_cost &&
+                      (turn == 0 || most <= 1.01f * d.max_cost));
             else
                 CHECK(ratio <= 1.2f && most <= 1.05f * d.max_cost && rests);
             CHECK(median > d.max_cost * 0.5f && least > 0.8f * d.max_cost);
@@ -1920,6 +2000,7 @@ static void sorted_tests(void)
 {
     RUN(sorted_needs_no_depth_buffer);
     RUN(views_in_painters_order_need_no_depth_buffer);
+    RUN(views_of_tiles_need_no_depth_buffer);
     RUN(pictures_are_made_in_painters_order);
     RUN(views_keep_to_their_cost);
     RUN(views_without_end_or_of_a_cost_refuse_bad_input);

@@ -111,8 +111,10 @@ static const char impostor_vertex[] = VERTEX_HEAD
 
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
    them; the division brings them back. Of a picture in two parts each keeps to its own depths. With
-   EXACT it has the depth of what it shows, which its capture left in the atlas; with RELIT it is
-   lit as the ground is. */
+   EXACT it has the depth of what it shows, which its capture left in the atlas; but where a slope
+   was hidden from the capture that is the ridge before it: the mesh, which stands proud of the
+   slope, is behind the ridge, and nothing is nearer than the mesh. With RELIT it is lit as the
+   ground is. */
 static const char impostor_main[] =
     "uniform sampler2D atlas, atlas_depth, atlas_normals;\n"
     "uniform float alpha;\n"
@@ -126,7 +128,7 @@ static const char impostor_main[] =
     "    c.rgb /= c.a;\n"
     "#ifdef EXACT\n"
     "    vec4 at = depth_matrix * vec4(st, texture(atlas_depth, st).r, 1.0);\n"
-    "    gl_FragDepth = 0.5 * at.z / at.w + 0.5;\n"
+    "    gl_FragDepth = max(0.5 * at.z / at.w + 0.5, gl_FragCoord.z);\n"
     "#endif\n"
     "#ifdef RELIT\n"
     "    c.rgb = lit(c.rgb, texture(atlas_normals, st).rg / c.a);\n"
