@@ -13,6 +13,7 @@
 ##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
 ##                  BENCH_ALL=1      the whole protocol, for hours
 ## make figures   takes what bench left over into README.md and tests/results
+## make scene-table   measures what stands around the terrain: tests/results/scene.md
 ## make check-portable   every compiler, other machines under an emulator, no operating system
 ## make sizes     bytes of code for small machines
 ## make fuzz SECONDS=60   looks for input that breaks the library, so long for each fuzzer
@@ -129,6 +130,9 @@ bench: $(BENCHES) town prepared $(patsubst %.c,build/bench/%.hgt,$(notdir $(wild
 figures:
 	@sh tests/figures.sh
 
+scene-table:
+	@MAKE='$(MAKE)' sh tests/scene.sh
+
 # The rough terrain on which other engines have been measured.
 build/bench/rough.hgt: ../shared/tools/rough.c
 	@mkdir -p $(@D)
@@ -190,7 +194,7 @@ $(BUILD)/viewer $(BUILD)/test_viewer: GL_LIBS = -lglfw -lGL
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
-.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz golden \
+.PHONY: all help deps demo test bench figures scene-table clean deps-portable check-portable sizes coverage analyse fuzz golden \
         $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer compare_pictures test-viewer deps-viewer web \
         deps-web test-web
 .SECONDARY:

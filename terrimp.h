@@ -1316,9 +1316,10 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    pages that a frame uses stay where they are until the next frame's update. A page lies in its
    slot until another needs it, and what the host has made of it is good as long: a mesh has its
    place in the host's buffers by the slot (terrimp_terrain_get_mesh). Walls and visible sets are
-   those of the same terrain in memory. Views draw pages without morph_ratio. */
+   those of the same terrain in memory. A view's morph_ratio is the file's at most, with the rule
+   PICTURE. */
 
-#define TERRIMP_PAGES_VERSION 1u
+#define TERRIMP_PAGES_VERSION 2u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
 
 /* What a header says. */
@@ -1330,6 +1331,7 @@ typedef struct terrimp_pages_info {
     uint32_t block_level;    /* see terrimp_pages_desc */
     uint32_t stamp;          /* that all its pages bear: pages of another file are refused */
     float height_scale, height_offset;
+    float morph_ratio;       /* of views, at most: see terrimp_pages_desc */
 } terrimp_pages_info;
 
 /* Looks at a header. Errors: E_BAKE when it is damaged or cut short; E_ORDER. */
@@ -1350,6 +1352,16 @@ TERRIMP_API size_t terrimp_pages_bytes(const void *header, size_t bytes, uint32_
 TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, const void *header,
                                               size_t bytes, uint32_t slot_count, void *memory,
                                               size_t memory_bytes, terrimp_terrain **terrain);
+
+/* Goes on after an edit: the blocks that reach to what was edited, and the end, have been built
+   anew. All pages are given up, and come again; what views show of it is theirs to be told
+   (terrimp_view_touch).
+
+   header      [bytes] as it is now
+   Errors      E_STATE while a page is coming; E_BAKE when the header is damaged or of another file:
+               nothing has changed */
+TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
+                                               size_t bytes);
 
 typedef enum terrimp_page_state {
     TERRIMP_PAGE_ABSENT = 0,
@@ -2399,10 +2411,13 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
    blocks, ground and meshes are made of every 2^block_level-th sample, and their errors are those
    against these, and what the blocks miss added. */
 typedef struct terrimp_pages_desc {
-    terrimp_terrain_desc terrain; /* (required) but its samples; U8, U16 or S16, without voids;
+    terrimp_terrain_desc terrain; /* (required) but its samples, which are without voids;
                                      height_low and height_high have to be given */
     uint32_t block_level;         /* blocks are the nodes of this level
                                      [Default 0 -> 4; all for up to 4097 x 4097 samples] */
+    float morph_ratio;            /* of views, at most; more makes ground finer, also where it does
+                                     not morph. Above 1, chunks are of a multiple of 4 quads
+                                     [Limits: 1..4] [Default 0 -> 1] */
     uint32_t stamp;               /* any number: it and the settings make the stamp of the pages */
     void *user;                   /* the first argument of each of these; they return 0 for "no" */
     int (*read)(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows, void *samples,
@@ -4547,11 +4562,13 @@ typedef struct terrimpi_page_slot {
 struct terrimp_pages {
     terrimpi_page_slot *slots; /* [slot_count] */
     unsigned char *pages;      /* [slot_count][page_bytes] */
-    const unsigned char *root; /* the record of the root */
+    unsigned char *header;     /* a copy */
+    const unsigned char *root; /* the record of the root in it */
     const float *lows;         /* heights of the floor's vertices */
     uint16_t *slot_of;         /* [node_count] 1 + the slot of a node, 0: it has none */
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
+    float morph_ratio;         /* of views, at most */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
@@ -4559,6 +4576,7 @@ struct terrimp_pages {
 };
 
 struct terrimpi_mip_frame;
+struct terrimpi_mip_ground;
 
 /* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
    which opens none has no code of it. */
@@ -4570,7 +4588,7 @@ typedef struct terrimpi_page_calls {
     uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
                        const float away[3]);
-    void (*fill_ground)(const terrimp_terrain *t, uint32_t node, float *xyz);
+    struct terrimpi_mip_ground (*ground)(const terrimp_quadtree *t, const terrimp_node *node);
     terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
                          uint32_t *level);
     float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
@@ -4908,14 +4926,43 @@ static float terrimpi_mip_between(float a, float b, uint32_t k, uint32_t n)
     return k == 0 ? a : k == n ? b : a + (b - a) * ((float)k / (float)n);
 }
 
-/* Height of the triangles of a level at a sample. */
-static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint32_t x, uint32_t z)
+/* Where the samples of ground are: in the tree's field; or in the page of a node, of a level, from
+   its column i0 and row j0 on, quads + 1 along a side. */
+typedef struct terrimpi_mip_ground {
+    const terrimp_quadtree *tree;
+    terrimp_heightfield field;
+    uint32_t level, i0, j0, quads;
+} terrimpi_mip_ground;
+
+static terrimpi_mip_ground terrimpi_mip_ground_of(const terrimp_quadtree *t)
 {
+    terrimpi_mip_ground g;
+    g.tree = t;
+    g.field = t->field;
+    g.level = g.i0 = g.j0 = 0;
+    g.quads = TERRIMP_MAX_DIM;
+    return g;
+}
+
+/* A sample of the tree's field; one beyond a page is of no consequence. */
+static float terrimpi_mip_sample(const terrimpi_mip_ground *g, uint32_t x, uint32_t z)
+{
+    uint32_t part = (1u << g->level) - 1u; /* the last ones may be closer */
+    return terrimpi_field_sample(
+        &g->field, terrimpi_min_u32(((x + part) >> g->level) - g->i0, g->quads),
+        terrimpi_min_u32(((z + part) >> g->level) - g->j0, g->quads));
+}
+
+/* Height of the triangles of a level at a sample. */
+static float terrimpi_mip_height(const terrimpi_mip_ground *g, uint32_t level, uint32_t x,
+                                 uint32_t z)
+{
+    const terrimp_quadtree *t = g->tree;
     uint32_t i = x >> level, j = z >> level;
     uint32_t x0 = terrimpi_tree_col(t, level, i), x1 = terrimpi_tree_col(t, level, i + 1u);
     uint32_t z0 = terrimpi_tree_row(t, level, j), z1 = terrimpi_tree_row(t, level, j + 1u);
-    float a = terrimpi_field_sample(&t->field, x0, z0), b, c, u, v;
-    float d = terrimpi_field_sample(&t->field, x1, z1);
+    float a = terrimpi_mip_sample(g, x0, z0), b, c, u, v;
+    float d = terrimpi_mip_sample(g, x1, z1);
     uint32_t wide = x1 - x0, deep = z1 - z0, right, down;
     right = x - x0;
     down = z - z0;
@@ -4923,8 +4970,8 @@ static float terrimpi_mip_height(const terrimp_quadtree *t, uint32_t level, uint
                                                                   diagonal */
         return wide == 0 ? terrimpi_mip_between(a, d, down, deep ? deep : 1u)
                          : terrimpi_mip_between(a, d, right, wide);
-    b = terrimpi_field_sample(&t->field, x1, z0);
-    c = terrimpi_field_sample(&t->field, x0, z1);
+    b = terrimpi_mip_sample(g, x1, z0);
+    c = terrimpi_mip_sample(g, x0, z1);
     if (right == 0)
         return terrimpi_mip_between(a, c, down, deep);
     if (down == 0)
@@ -5367,69 +5414,76 @@ TERRIMP_API terrimp_result terrimp_geomip_select(const terrimp_quadtree *tree,
 /* ---- vertices and morphing ---- */
 
 /* How far a vertex of a level's lattice moves between the levels `from` and `from` + 1 above. */
-static float terrimpi_mip_move(const terrimp_quadtree *t, uint32_t level, uint32_t i, uint32_t j,
+static float terrimpi_mip_move(const terrimpi_mip_ground *g, uint32_t level, uint32_t i, uint32_t j,
                                uint32_t from)
 {
-    uint32_t x = terrimpi_tree_col(t, level, i), z = terrimpi_tree_row(t, level, j);
-    return terrimpi_mip_height(t, level + from + 1u, x, z) -
-           terrimpi_mip_height(t, level + from, x, z);
+    uint32_t x = terrimpi_tree_col(g->tree, level, i), z = terrimpi_tree_row(g->tree, level, j);
+    return terrimpi_mip_height(g, level + from + 1u, x, z) -
+           terrimpi_mip_height(g, level + from, x, z);
 }
 
 /* The moves of a node's vertex (i, j); (i0, j0) is the node's first one on the lattice. */
-static void terrimpi_mip_vertex(const terrimp_quadtree *t, uint32_t level, uint32_t i0, uint32_t j0,
-                                uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
+static void terrimpi_mip_vertex(const terrimpi_mip_ground *g, uint32_t level, uint32_t i0,
+                                uint32_t j0, uint32_t i, uint32_t j, terrimp_geomip_vertex *vertex)
 {
-    uint32_t last = t->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
+    uint32_t last = g->tree->chunk_quads - 1u, both = i & j & 1u; /* odd and odd: on a diagonal */
     int odd = (i | j) & 1u, along_x = j == 0 || j == last + 1u, along_z = i == 0 || i == last + 1u;
-    vertex->height = terrimpi_field_sample(&t->field, terrimpi_tree_col(t, level, i0 + i),
-                                        terrimpi_tree_row(t, level, j0 + j));
+    vertex->height = terrimpi_mip_sample(g, terrimpi_tree_col(g->tree, level, i0 + i),
+                                         terrimpi_tree_row(g->tree, level, j0 + j));
     vertex->move = vertex->beside[0] = vertex->beside[1] = 0.0f;
     if ((along_x && along_z) || (!odd && (along_x || along_z)))
-        vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 1);
+        vertex->move = terrimpi_mip_move(g, level, i0 + i, j0 + j, 1);
     else if (odd)
-        vertex->move = terrimpi_mip_move(t, level, i0 + i, j0 + j, 0);
+        vertex->move = terrimpi_mip_move(g, level, i0 + i, j0 + j, 0);
     if (!odd)
         return;
     if (j == 1u)
-        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i - both, j0, 1);
+        vertex->beside[0] = 0.5f * terrimpi_mip_move(g, level, i0 + i - both, j0, 1);
     if (j == last)
-        vertex->beside[0] = 0.5f * terrimpi_mip_move(t, level, i0 + i + both, j0 + last + 1u, 1);
+        vertex->beside[0] = 0.5f * terrimpi_mip_move(g, level, i0 + i + both, j0 + last + 1u, 1);
     if (i == 1u)
-        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0, j0 + j - both, 1);
+        vertex->beside[1] = 0.5f * terrimpi_mip_move(g, level, i0, j0 + j - both, 1);
     if (i == last)
-        vertex->beside[1] = 0.5f * terrimpi_mip_move(t, level, i0 + last + 1u, j0 + j + both, 1);
+        vertex->beside[1] = 0.5f * terrimpi_mip_move(g, level, i0 + last + 1u, j0 + j + both, 1);
     if (along_x) /* between two border vertices: one of them moves */
-        vertex->beside[0] = 0.5f * (terrimpi_mip_move(t, level, i0 + i - 1u, j0 + j, 1) +
-                                    terrimpi_mip_move(t, level, i0 + i + 1u, j0 + j, 1));
+        vertex->beside[0] = 0.5f * (terrimpi_mip_move(g, level, i0 + i - 1u, j0 + j, 1) +
+                                    terrimpi_mip_move(g, level, i0 + i + 1u, j0 + j, 1));
     if (along_z)
-        vertex->beside[1] = 0.5f * (terrimpi_mip_move(t, level, i0 + i, j0 + j - 1u, 1) +
-                                    terrimpi_mip_move(t, level, i0 + i, j0 + j + 1u, 1));
+        vertex->beside[1] = 0.5f * (terrimpi_mip_move(g, level, i0 + i, j0 + j - 1u, 1) +
+                                    terrimpi_mip_move(g, level, i0 + i, j0 + j + 1u, 1));
+}
+
+/* The vertices of a node, and how they morph: what is not NULL. */
+static void terrimpi_mip_fill(const terrimpi_mip_ground *g, const terrimp_node *n, float *xyz,
+                              terrimp_geomip_vertex *vertices)
+{
+    const terrimp_quadtree *t = g->tree;
+    uint32_t i, j, i0 = n->x * t->chunk_quads, j0 = n->z * t->chunk_quads;
+    for (j = 0; j <= t->chunk_quads; j++)
+        for (i = 0; i <= t->chunk_quads; i++) {
+            if (xyz) {
+                *xyz++ = terrimpi_tree_x(t, n->level, i0 + i);
+                *xyz++ = terrimpi_mip_sample(g, terrimpi_tree_col(t, n->level, i0 + i),
+                                             terrimpi_tree_row(t, n->level, j0 + j));
+                *xyz++ = terrimpi_tree_z(t, n->level, j0 + j);
+            }
+            if (vertices)
+                terrimpi_mip_vertex(g, n->level, i0, j0, i, j, vertices++);
+        }
 }
 
 TERRIMP_API terrimp_result terrimp_geomip_fill_vertices(const terrimp_quadtree *tree, uint32_t node,
                                                         float *xyz,
                                                         terrimp_geomip_vertex *vertices)
 {
+    terrimpi_mip_ground ground;
     terrimp_node n;
-    uint32_t i, j, i0, j0;
     TERRIMPI_REFUSE(!tree || (!xyz && !vertices), TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(tree->pages, TERRIMP_E_PAGE);
     TERRIMPI_REFUSE(node >= tree->node_count, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_tree_opens(tree, node), TERRIMP_E_PAGE);
     n = terrimpi_tree_node(tree, node);
-    i0 = n.x * tree->chunk_quads;
-    j0 = n.z * tree->chunk_quads;
-    for (j = 0; j <= tree->chunk_quads; j++)
-        for (i = 0; i <= tree->chunk_quads; i++) {
-            if (xyz) {
-                *xyz++ = terrimpi_tree_x(tree, n.level, i0 + i);
-                *xyz++ = terrimpi_field_sample(&tree->field,
-                                               terrimpi_tree_col(tree, n.level, i0 + i),
-                                               terrimpi_tree_row(tree, n.level, j0 + j));
-                *xyz++ = terrimpi_tree_z(tree, n.level, j0 + j);
-            }
-            if (vertices)
-                terrimpi_mip_vertex(tree, n.level, i0, j0, i, j, vertices++);
-        }
+    ground = tree->pages ? tree->pages->calls->ground(tree, &n) : terrimpi_mip_ground_of(tree);
+    terrimpi_mip_fill(&ground, &n, xyz, vertices);
     return TERRIMP_OK;
 }
 
@@ -6468,8 +6522,8 @@ typedef struct terrimpi_mesh_point_steps {
 typedef struct terrimpi_record {
     terrimp_geomip_node ground;
     terrimpi_mesh mesh;
-    float held; /* the largest of its rms and of half of what its children hold: what PICTURE asks
-                   of a node for those below it */
+    float held; /* the largest of its rms and of what its children ask for, see
+                   terrimpi_page_held_by: what PICTURE asks of a node for those below it */
 } terrimpi_record;
 
 struct terrimp_terrain {
@@ -7105,10 +7159,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_ground(const terrimp_terrain *te
 {
     TERRIMPI_TRY(terrimpi_check_page(terrain, node, xyz));
     TERRIMPI_REFUSE(capacity < 3u * terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
-    if (!terrain->tree.pages)
-        return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
-    terrain->tree.pages->calls->fill_ground(terrain, node, xyz);
-    return TERRIMP_OK;
+    return terrimp_geomip_fill_vertices(&terrain->tree, node, xyz, NULL);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *terrain,
@@ -7116,8 +7167,7 @@ TERRIMP_API terrimp_result terrimp_terrain_fill_morph(const terrimp_terrain *ter
                                                       terrimp_geomip_vertex *vertices,
                                                       size_t capacity)
 {
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, vertices));
-    TERRIMPI_REFUSE(terrain->tree.pages, TERRIMP_E_PAGE);
+    TERRIMPI_TRY(terrimpi_check_page(terrain, node, vertices));
     TERRIMPI_REFUSE(capacity < terrimpi_terrain_ground_vertices(terrain), TERRIMP_E_CAPACITY);
     return terrimp_geomip_fill_vertices(&terrain->tree, node, NULL, vertices);
 }
@@ -8476,6 +8526,7 @@ typedef struct terrimpi_page_head {
 typedef struct terrimpi_pages_head {
     terrimpi_bake bake; /* of no arrays: bytes are those of the header */
     uint32_t block_level, stamp;
+    float morph_ratio;
     terrimpi_record root;
 } terrimpi_pages_head;
 
@@ -8572,6 +8623,7 @@ static terrimp_result terrimpi_pages_read(const void *header, size_t bytes, terr
                     terrimpi_bake_hash(header) != head->bake.checksum ||
                     !terrimpi_bake_header(&head->bake, TERRIMP_PAGES_VERSION, t) ||
                     head->block_level >= t->tree.level_count ||
+                    !terrimpi_within(head->morph_ratio, 1.0f, 4.0f) ||
                     terrimpi_page_end(&t->tree, head->block_level) > 0xffffffffu ||
                     !terrimpi_record_ok(&head->root), TERRIMP_E_BAKE);
     for (i = 0; i < terrimpi_floor_of(t).ground_vertices + terrimpi_floor_of(t).wall_points; i++) {
@@ -8603,6 +8655,7 @@ TERRIMP_API terrimp_result terrimp_pages_check(const void *header, size_t bytes,
     info->stamp = head.stamp;
     info->height_scale = t.desc.field.height_scale;
     info->height_offset = t.desc.field.height_offset;
+    info->morph_ratio = head.morph_ratio;
     return TERRIMP_OK;
 }
 
@@ -8703,6 +8756,13 @@ static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t nod
     return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
+/* What a child asks of its parent's `held`: PICTURE counts rms times the length of a quad, and when
+   nodes morph they measure at least morph_ratio^2 times what their children do. */
+static float terrimpi_page_held_by(float morph_ratio, float held)
+{
+    return 0.5f * morph_ratio * morph_ratio * held;
+}
+
 /* Whether the records of a node's children are held by its own. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
@@ -8718,7 +8778,7 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
         if (!terrimpi_record_ok(&r) || r.ground.low < own->ground.low ||
             r.ground.high > own->ground.high || r.ground.error > own->ground.error ||
             r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
-            0.5f * r.held > own->held)
+            terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
     }
     return 1;
@@ -8962,19 +9022,6 @@ static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mi
     }
 }
 
-static void terrimpi_page_fill_ground(const terrimp_terrain *t, uint32_t node, float *xyz)
-{
-    terrimp_heightfield f = terrimpi_page_field(t, node);
-    terrimp_node n = terrimpi_tree_node(&t->tree, node);
-    uint32_t quads = t->desc.chunk_quads, i, j;
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++) {
-            *xyz++ = terrimpi_tree_x(&t->tree, n.level, n.x * quads + i);
-            *xyz++ = terrimpi_field_sample(&f, i, j);
-            *xyz++ = terrimpi_tree_z(&t->tree, n.level, n.z * quads + j);
-        }
-}
-
 TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
                                                uint32_t capacity, uint32_t *count)
 {
@@ -9003,6 +9050,19 @@ TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp
 static const terrimp_terrain *terrimpi_page_terrain(const terrimp_quadtree *t)
 {
     return (const terrimp_terrain *)(const void *)t->pages - 1;
+}
+
+/* The samples of a node whose page is here. */
+static terrimpi_mip_ground terrimpi_page_ground(const terrimp_quadtree *t, const terrimp_node *node)
+{
+    terrimpi_mip_ground g;
+    g.tree = t;
+    g.field = terrimpi_page_field(terrimpi_page_terrain(t), node->number);
+    g.level = node->level;
+    g.quads = t->chunk_quads;
+    g.i0 = node->x * g.quads;
+    g.j0 = node->z * g.quads;
+    return g;
 }
 
 /* The ground at a position: of the finest node whose page is here. */
@@ -9071,7 +9131,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
 {
     static const terrimpi_page_calls calls = {
         terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
-        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_fill_ground,
+        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_ground,
         terrimpi_page_at,         terrimpi_page_sample};
     terrimp_terrain t;
     terrimpi_pages_head head;
@@ -9087,6 +9147,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     p.node_count = t.tree.node_count;
     p.block_level = head.block_level;
     p.stamp = head.stamp;
+    p.morph_ratio = head.morph_ratio;
     p.frame = 2;
     p.calls = &calls;
     TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
@@ -9109,6 +9170,7 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     terrimpi_pages_layout(&t, &p, (unsigned char *)memory, &copy);
     memset(memory, 0, (size_t)(p.pages - (unsigned char *)memory));
     memcpy(copy, header, TERRIMP_PAGES_HEADER_BYTES);
+    p.header = copy;
     p.root = copy + offsetof(terrimpi_pages_head, root);
     p.lows = (const float *)(const void *)(copy + sizeof head);
     for (i = 0; i < slot_count; i++)
@@ -9117,6 +9179,28 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     *t.tree.pages = p;
     *(terrimp_terrain *)memory = t;
     *terrain = (terrimp_terrain *)memory;
+    return TERRIMP_OK;
+}
+
+TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
+                                               size_t bytes)
+{
+    terrimp_terrain t;
+    terrimpi_pages_head head;
+    struct terrimp_pages *p;
+    uint32_t i;
+    TERRIMPI_TRY(terrimpi_page_check(terrain, 0, header));
+    TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
+    p = terrain->tree.pages;
+    TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
+    for (i = 0; i < p->slot_count; i++)
+        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].is_here, TERRIMP_E_STATE);
+    memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
+    terrain->sample_low = t.sample_low;
+    terrain->sample_high = t.sample_high;
+    memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
+    for (i = 0; i < p->slot_count; i++)
+        p->slots[i].node = p->node_count;
     return TERRIMP_OK;
 }
 
@@ -9832,8 +9916,10 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
-    TERRIMPI_REFUSE(terrain->tree.pages &&
-                    d.morph_ratio > 1.0f, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(terrain->tree.pages && d.morph_ratio > 1.0f &&
+                    (d.morph_ratio > terrain->tree.pages->morph_ratio ||
+                     (d.ground_rule != TERRIMP_GEOMIP_PICTURE &&
+                      d.ground_rule != TERRIMP_GEOMIP_DEFAULT)), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -16962,6 +17048,9 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     TERRIMPI_DEFAULT(d.block_level, t.desc.field.width <= 4097u && t.desc.field.depth <= 4097u
                                         ? top : 4u);
     d.block_level = terrimpi_min_u32(d.block_level, top);
+    TERRIMPI_DEFAULT(d.morph_ratio, 1.0f);
+    TERRIMPI_REFUSE(!terrimpi_within(d.morph_ratio, 1.0f, 4.0f) ||
+                    (d.morph_ratio > 1.0f && t.desc.chunk_quads % 4u != 0), TERRIMP_E_RANGE);
     d.terrain = t.desc;
     *block_count = t.tree.level_x[d.block_level] * t.tree.level_z[d.block_level];
     *out = d;
@@ -16972,7 +17061,7 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
 static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
 {
     const terrimp_terrain_desc *t = &d->terrain;
-    uint32_t words[13], i, hash = 2166136261u;
+    uint32_t words[14], i, hash = 2166136261u;
     words[0] = d->stamp;
     words[1] = t->field.width;
     words[2] = t->field.depth;
@@ -16986,7 +17075,8 @@ static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
     words[10] = terrimpi_bake_float_bits(t->height_low);
     words[11] = terrimpi_bake_float_bits(t->height_high);
     words[12] = terrimpi_bake_float_bits(t->proud);
-    for (i = 0; i < 13u; i++)
+    words[13] = terrimpi_bake_float_bits(d->morph_ratio);
+    for (i = 0; i < 14u; i++)
         hash = terrimpi_bake_hash_word(hash, words[i]);
     return hash;
 }
@@ -17159,7 +17249,9 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
         ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
         ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
         terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
-        w->held[n->number] = terrimpi_max(w->held[n->number], 0.5f * w->held[child.number]);
+        w->held[n->number] = terrimpi_max(w->held[n->number],
+                                          terrimpi_page_held_by(w->desc->morph_ratio,
+                                                                w->held[child.number]));
     }
     terrimpi_build_hold(mesh, ground->low, ground->high);
     return TERRIMP_OK;
@@ -17407,6 +17499,7 @@ static terrimp_result terrimpi_paging_header(const terrimpi_paging *w)
     head.bake.range_low = w->part->range_low;
     head.bake.range_step = w->part->range_step;
     head.block_level = w->desc->block_level;
+    head.morph_ratio = w->desc->morph_ratio;
     head.stamp = w->stamp;
     head.root = top.record;
     memcpy(room, &head, sizeof head);

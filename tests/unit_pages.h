@@ -295,6 +295,69 @@ static void pages_are_built_in_any_order(void)
     }
 }
 
+/* After an edit: blocks that reach to it are built anew, others are as they were; old pages are
+   refused, and the new ones say what memory does. */
+static void pages_are_edited(void)
+{
+    uint32_t turn;
+    for (turn = 0; turn < 3u; turn++) {
+        paged_land p;
+        unsigned char header[TERRIMP_PAGES_HEADER_BYTES], *old;
+        size_t scratch_bytes;
+        void *scratch;
+        uint16_t *samples;
+        uint32_t i, x, z, width = 8u * random_range(16, 24), depth = random_range(90, 150), block;
+        uint32_t root, rebuilt = 0;
+        terrimp_rect edit;
+        terrimp_page_info info;
+        void *page;
+        if (!paged_prepare(&p, width, depth, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2) ||
+            !paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
+            return;
+        paged_fetch_all(&p);
+        old = (unsigned char *)malloc(p.bytes);
+        memcpy(old, p.file, p.bytes);
+        edit.x = random_range(0, width - 9u), edit.y = random_range(0, depth - 9u);
+        edit.width = edit.height = 8u;
+        samples = (uint16_t *)(void *)(uintptr_t)p.l.desc.field.samples;
+        for (z = edit.y; z < edit.y + 8u; z++)
+            for (x = edit.x; x < edit.x + 8u; x++)
+                samples[z * width + x] = (uint16_t)(samples[z * width + x] / 2u);
+        for (block = 0; block < p.block_count; block++) { /* of 32 x 32 quads, and some more */
+            uint32_t across = (width - 2u) / 32u + 1u;
+            x = block % across * 32u, z = block / across * 32u;
+            if (edit.x + 8u + 8u < x || edit.x > x + 32u + 8u || edit.y + 8u + 8u < z ||
+                edit.y > z + 32u + 8u)
+                continue;
+            CHECK(paged_build_block(&p, block) == TERRIMP_OK);
+            rebuilt++;
+        }
+        CHECK(rebuilt > 0 && rebuilt < p.block_count && paged_build_end(&p) == TERRIMP_OK);
+        scratch_bytes = terrimp_terrain_scratch_bytes(&p.l.desc);
+        scratch = malloc(scratch_bytes);
+        CHECK(terrimp_terrain_rebuild(p.l.terrain, &edit, scratch, scratch_bytes) ==
+              TERRIMP_OK);
+        memcpy(header, p.file, sizeof header);
+        header[100] ^= 1u;
+        CHECK(terrimp_pages_renew(p.opened, header, sizeof header) == TERRIMP_E_BAKE);
+        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes) == TERRIMP_OK);
+        root = p.l.info.node_count - 1u;
+        CHECK(!paged_is_here(&p, root));
+        CHECK(terrimp_page_begin(p.opened, root, &page) == TERRIMP_OK);
+        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes) == TERRIMP_E_STATE);
+        CHECK(terrimp_page_get_info(p.opened, root, &info) == TERRIMP_OK);
+        memcpy(page, old + info.offset, info.bytes);
+        CHECK(terrimp_page_put(p.opened, root) ==
+              (memcmp(page, p.file + info.offset, info.bytes) ? TERRIMP_E_BAKE : TERRIMP_OK));
+        for (i = root + 1u; i-- > 0;)
+            CHECK(paged_is_here(&p, i) || paged_fetch(&p, i) == TERRIMP_OK);
+        check_pages_say_the_same(&p, 2);
+        free(scratch);
+        free(old);
+        paged_free(&p);
+    }
+}
+
 /* Everything that can be wrong with a page that comes, or with when it comes. */
 static void pages_that_are_no_good_are_refused(void)
 {
@@ -808,12 +871,14 @@ static paged_land *paged_wide(void)
     return &p;
 }
 
-static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode, terrimp_hider *hider)
+static terrimp_view *paged_view(const terrimp_terrain *terrain, int mode, float morph_ratio,
+                                terrimp_hider *hider)
 {
     terrimp_view_desc desc;
     terrimp_view *view = NULL;
     memset(&desc, 0, sizeof desc);
     desc.mode = mode;
+    desc.morph_ratio = morph_ratio;
     desc.tolerance_px = 2.0f;
     desc.atlas_size = 4096;
     desc.max_impostors = 4000;
@@ -882,7 +947,7 @@ static void pages_settle_to_what_memory_shows(void)
         for (frame = 0; frame < 2u; frame++) {
             const terrimp_terrain *t = frame ? p->opened : p->l.terrain;
             CHECK(terrimp_horizon_init(&horizons[frame], &t->tree, walls) == TERRIMP_OK);
-            views[frame] = paged_view(t, mode, hides ? &horizons[frame].hider : NULL);
+            views[frame] = paged_view(t, mode, 0.0f, hides ? &horizons[frame].hider : NULL);
         }
         for (frame = 0; frame < 2000u && quiet < 8u; frame++) {
             terrimp_result result;
@@ -939,6 +1004,70 @@ static void pages_settle_to_what_memory_shows(void)
     p->memory = NULL;
 }
 
+/* Morphing: vertices move as those of memory do, to the far edges of any size; and from pages that
+   are made for it, as many nodes morph as far. */
+static void pages_morph_as_memory_does(void)
+{
+    static paged_frame frames[2];
+    uint32_t turn;
+    for (turn = 0; turn < 4u && check_bad == 0; turn++) {
+        paged_land p;
+        terrimp_view *views[2];
+        terrimp_geomip_vertex *vertices[2];
+        terrimp_view_desc desc;
+        uint32_t node, count, morphs = 0, i;
+        float ratio = random_float(1.1f, 2.0f);
+        if (!paged_prepare(&p, turn ? random_range(120, 200) : 257u,
+                           turn ? random_range(120, 200) : 257u, TERRIMP_FORMAT_U16, LAND_HILLS, 8,
+                           turn < 2u ? 0u : 2u))
+            return;
+        p.desc.morph_ratio = ratio;
+        if (!paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
+            return;
+        CHECK(fabsf(p.info.morph_ratio - ratio) < 1e-6f);
+        memset(&desc, 0, sizeof desc);
+        desc.morph_ratio = ratio + 0.1f;
+        CHECK(terrimp_view_desc_resolve(p.opened, &desc, &desc) == TERRIMP_E_RANGE);
+        desc.morph_ratio = ratio;
+        desc.ground_rule = TERRIMP_GEOMIP_DISTANCE;
+        CHECK(terrimp_view_desc_resolve(p.opened, &desc, &desc) == TERRIMP_E_RANGE);
+        paged_fetch_all(&p);
+        count = p.l.info.ground_vertex_count;
+        for (i = 0; i < 2u; i++) {
+            vertices[i] = (terrimp_geomip_vertex *)calloc(count, sizeof *vertices[0]);
+            views[i] = paged_view(i ? p.opened : p.l.terrain, TERRIMP_MODE_GEOMIP, ratio, NULL);
+        }
+        for (node = 0; node < p.l.info.node_count; node++) {
+            for (i = 0; i < 2u; i++)
+                CHECK(terrimp_terrain_fill_morph(i ? p.opened : p.l.terrain, node, vertices[i],
+                                                 count) == TERRIMP_OK);
+            CHECK(memcmp(vertices[0], vertices[1], count * sizeof *vertices[0]) == 0);
+        }
+        for (i = 0; i < 40u && turn < 2u; i++) { /* above blocks errors are others */
+            terrimp_camera camera = paged_camera(&p.l, i);
+            CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+            CHECK(terrimp_view_update(views[0], &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_update(views[1], &camera) == TERRIMP_OK);
+            CHECK(paged_render(views[0], &frames[0], NULL) == TERRIMP_OK);
+            CHECK(paged_render(views[1], &frames[1], &p) == TERRIMP_OK);
+            CHECK(frames[0].ground_count == frames[1].ground_count);
+            for (node = 0; node < frames[0].ground_count; node++) {
+                const terrimp_ground_command *a = &frames[0].ground[node];
+                const terrimp_ground_command *b = &frames[1].ground[node];
+                CHECK(a->node == b->node && a->first_index == b->first_index);
+                CHECK(fabsf(a->morph - b->morph) < 1e-3f);
+                morphs += a->morph > 0.01f && a->morph < 0.99f;
+            }
+        }
+        CHECK(morphs > 0 || turn >= 2u);
+        for (i = 0; i < 2u; i++) {
+            free(vertices[i]);
+            terrimp_view_destroy(views[i]);
+        }
+        paged_free(&p);
+    }
+}
+
 /* A flight with far too few slots: no holes, no cracks. While the eye rests, no page is read twice
    that fits: of ground, which needs all of its pages at once, none at all; of pictures, which are
    made one after the other, none when there are enough slots, else one in ten. With enough slots
@@ -961,7 +1090,7 @@ static void pages_fly_without_holes(void)
         host.p = p;
         host.pace = 50;
         host.times = (uint32_t *)calloc(2u * p->l.info.node_count, sizeof *host.times);
-        view = paged_view(p->opened, mode, NULL);
+        view = paged_view(p->opened, mode, 0.0f, NULL);
         for (i = 0; i < 300u; i++) {
             terrimp_result result;
             int rests = i % 100u >= 50u;
@@ -1018,7 +1147,8 @@ static void pages_are_wanted_by_all_views(void)
         for (i = p->l.info.node_count; i-- > p->l.info.node_count - 20u;)
             paged_fetch(p, i);
         for (i = 0; i < 2u; i++)
-            views[i] = paged_view(p->opened, i ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO, NULL);
+            views[i] = paged_view(p->opened, i ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO, 0.0f,
+                                  NULL);
         for (k = 0; k < 3u; k++) { /* the first, the second, both */
             check_state = CHECK_SEED + turn;
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
@@ -1053,10 +1183,12 @@ static void pages_tests(void)
     RUN(bad_pages);
     RUN(pages_say_what_memory_does);
     RUN(pages_are_built_in_any_order);
+    RUN(pages_are_edited);
     RUN(pages_that_are_no_good_are_refused);
     RUN(pages_are_closed_upwards);
     RUN(pages_answer_heights_and_rays);
     RUN(pages_settle_to_what_memory_shows);
+    RUN(pages_morph_as_memory_does);
     RUN(pages_fly_without_holes);
     RUN(pages_are_wanted_by_all_views);
 }
