@@ -121,7 +121,7 @@ demo: flyover
 test: | $(DEPS)
 	@sh tests/run.sh
 
-bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
+bench: $(BENCHES) town prepared $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
 	@for name in $(BENCHES); do \
 	    start=$$(date +%s); echo; echo "---- $$name"; $(BUILD)/$$name || exit 1; \
 	    echo "---- $$name took $$(($$(date +%s) - start)) s"; \

@@ -20114,19 +20114,19 @@ static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *ou
 }
 
 /* Attempts to do the reverse with one or two candidates, to be made or not, as long as that pays
-   and work is left to spend: each candidate alone, then all pairs. Each time all others are chosen
-   anew, and then once more beginning with those that are made now. */
+   and work is left to spend: each candidate alone, then all pairs. The others are chosen anew, in
+   the next round beginning with those that are made now. */
 static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *best)
 {
-    uint32_t n = p->desc->candidate_count, turn = 0, i;
+    uint32_t n = p->desc->candidate_count, start = 0, turn = 0, i;
     uint32_t tries = TERRIMPI_PLACE_WORK / (p->desc->gain_count + p->desc->view_count + n + 1u);
-    while (n > 0 && turn / 2u / n <= n / 2u && tries-- > 0) {
-        uint32_t a = turn / 2u % n, b = (a + turn / 2u / n) % n;
+    while (n > 0 && turn / n <= n && tries-- > 0) {
+        uint32_t a = (start + turn) % n, b = (a + turn / n / 2u) % n, keep = turn / n % 2u;
         terrimp_placement attempt;
         for (i = 0; i < n; i++) {
             int made = terrimpi_place_uses(p, p->best, i), reverse = i == a || i == b;
             p->wish[i] = reverse ? (made ? TERRIMPI_PLACE_NEVER : TERRIMPI_PLACE_FIRST)
-                                 : (made && turn % 2u ? TERRIMPI_PLACE_FIRST : 0);
+                                 : (made && keep ? TERRIMPI_PLACE_FIRST : 0);
         }
         terrimpi_place_attempt(p, &attempt);
         turn++;
@@ -20134,6 +20134,7 @@ static void terrimpi_place_improve(terrimpi_place_work *p, terrimp_placement *be
             (attempt.unsolved == best->unsolved && attempt.memory < best->memory)) {
             *best = attempt;
             memcpy(p->best, p->shown, p->desc->gain_count);
+            start = a + 1u;
             turn = 0;
         }
     }

@@ -638,14 +638,20 @@ static void views_of_tiles_need_no_depth_buffer(void)
                     memset(&d, 0, sizeof d);
                     d.sorted = 1;
                     d.mode = mode;
+                    if (mode == TERRIMP_MODE_AUTO) { /* many pictures */
+                        d.ground_tolerance_px = 0.05f;
+                        d.tolerance_px = 3.0f;
+                        d.costs.capture = d.costs.draw = 1.0f;
+                    }
                     memset(&h, 0, sizeof h);
                     h.l = &l;
                     if (mode == TERRIMP_MODE_IMPOSTOR || (mode == TERRIMP_MODE_AUTO && !is_long))
                         continue;
                     order_fly(&h, &d, frames);
                     if (is_long)
-                        printf("  %s crop %d%s mode %d: %d of %d wrong\n", tiles[i], k,
-                               wrap ? " without end" : "", mode, h.faults, h.seen);
+                        printf("  %s crop %d%s mode %d: %d of %d wrong, %d impostors\n",
+                               tiles[i], k, wrap ? " without end" : "", mode, h.faults, h.seen,
+                               h.impostors_now);
                     CHECK(h.faults == 0 || mode == TERRIMP_MODE_AUTO);
                     CHECK(h.faults <= h.seen / 10000);
                 }
