@@ -1137,6 +1137,41 @@ static void pages_fly_without_holes(void)
     p->memory = NULL;
 }
 
+/* One of four quarters is missing, so the whole is one draw; the pages of the others are of use all
+   the same, down to the finest, or they would be given up and asked for again. */
+static void pages_asked_for_are_in_use(void)
+{
+    paged_land *p = paged_wide();
+    const terrimp_quadtree *tree = terrimp_terrain_tree(p->l.terrain);
+    terrimp_camera camera = paged_camera(&p->l, 1);
+    terrimp_view *view;
+    terrimp_stats stats;
+    uint32_t node, used = 0;
+    free(p->memory);
+    paged_open(p, PAGED_ALL);
+    for (node = tree->node_count; node-- > 0;) {
+        terrimp_node n = terrimpi_tree_node(tree, node);
+        uint32_t up = tree->level_count - 2u - n.level;
+        if (n.level + 1u == tree->level_count || !(n.x >> up & n.z >> up & 1u))
+            CHECK(paged_fetch(p, node) == TERRIMP_OK);
+    }
+    camera.eye[0] = camera.eye[2] = 0.3f * (float)PAGED_SIDE;
+    camera.forward[0] = camera.forward[2] = 1.0f;
+    view = paged_view(p->opened, TERRIMP_MODE_GEOMIP, 0.0f, NULL);
+    for (node = 0; node < 3u; node++)
+        CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
+    CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+    CHECK(terrimp_view_get_stats(view, &stats) == TERRIMP_OK && stats.ground == 1u);
+    for (node = 0; node < tree->level_first[1]; node++) {
+        const terrimpi_page_slot *slot = terrimpi_page_slot_of(p->opened->tree.pages, node);
+        used += slot && slot->used == p->opened->tree.pages->frame;
+    }
+    CHECK(used > 4u);
+    terrimp_view_destroy(view);
+    free(p->memory);
+    p->memory = NULL;
+}
+
 /* Two views of one terrain: the list is what either alone would ask for, at the greater urgency. */
 static void pages_are_wanted_by_all_views(void)
 {
@@ -1194,6 +1229,7 @@ static void pages_tests(void)
     RUN(pages_settle_to_what_memory_shows);
     RUN(pages_morph_as_memory_does);
     RUN(pages_fly_without_holes);
+    RUN(pages_asked_for_are_in_use);
     RUN(pages_are_wanted_by_all_views);
 }
 
