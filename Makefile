@@ -13,6 +13,7 @@
 ##                  BENCH_FRAMES=N   frames of a flight; BENCH_ONLY=NAME: of one scene
 ##                  BENCH_ALL=1      the whole protocol, for hours
 ## make figures   takes what bench left over into README.md and tests/results
+## make scene-table   measures what stands around the terrain: tests/results/scene.md
 ## make check-portable   every compiler, other machines under an emulator, no operating system
 ## make sizes     bytes of code for small machines
 ## make fuzz SECONDS=60   looks for input that breaks the library, so long for each fuzzer
@@ -120,7 +121,7 @@ demo: flyover
 test: | $(DEPS)
 	@sh tests/run.sh
 
-bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
+bench: $(BENCHES) town prepared $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared/tools/rough.c)))
 	@for name in $(BENCHES); do \
 	    start=$$(date +%s); echo; echo "---- $$name"; $(BUILD)/$$name || exit 1; \
 	    echo "---- $$name took $$(($$(date +%s) - start)) s"; \
@@ -128,6 +129,9 @@ bench: $(BENCHES) $(patsubst %.c,build/bench/%.hgt,$(notdir $(wildcard ../shared
 
 figures:
 	@sh tests/figures.sh
+
+scene-table:
+	@MAKE='$(MAKE)' sh tests/scene.sh
 
 # The rough terrain on which other engines have been measured.
 build/bench/rough.hgt: ../shared/tools/rough.c
@@ -190,7 +194,7 @@ $(BUILD)/viewer $(BUILD)/test_viewer: GL_LIBS = -lglfw -lGL
 
 -include $(wildcard $(BUILD)/*.d $(BUILD)/*/*.d)
 
-.PHONY: all help deps demo test bench figures clean deps-portable check-portable sizes coverage analyse fuzz golden \
+.PHONY: all help deps demo test bench figures scene-table clean deps-portable check-portable sizes coverage analyse fuzz golden \
         $(EXAMPLES) $(EXAMPLES_CPP) $(BENCHES) $(TESTS) viewer test_viewer compare_pictures test-viewer deps-viewer web \
         deps-web test-web
 .SECONDARY:

@@ -13,6 +13,7 @@ extern "C" {
 #include "host/scene.h"
 }
 
+#include <cmath>
 #include <cstdio>
 #include <future>
 #include <memory>
@@ -57,6 +58,7 @@ View make_view(const Terrain &terrain, int mode)
     terrimp_view *view = nullptr;
     desc.mode = mode;
     desc.atlas_size = atlas_size;
+    desc.exact_depth = 1;
     check(terrimp_view_create(terrain.get(), &desc, nullptr, &view));
     return View(view);
 }
@@ -113,7 +115,8 @@ Frame record(terrimp_view *view, const terrimp_camera &camera)
 /* One program draws everything: ground wears the lightmap, impostors the atlas, both through a
    texture matrix. Pictures hold colours times alpha, hence the division; of a picture in two parts
    each shows only what lies within its own depth. What fades in shows on the pixels whose
-   threshold lies below its alpha. */
+   threshold lies below its alpha. An impostor's depth is that of the terrain in its picture, or of
+   its mesh where that is farther: see place_matrix in terrimp_impostor_command. */
 const float world_origin[3] = {};
 const char vertex_source[] =
     "#version 330 core\n"
@@ -127,9 +130,10 @@ const char vertex_source[] =
     "}\n";
 const char fragment_source[] =
     "#version 330 core\n"
-    "uniform sampler2D picture;\n"
+    "uniform sampler2D picture, depths;\n"
+    "uniform mat4 view, projection, place_matrix;\n"
     "uniform float alpha;\n"
-    "uniform bool part;\n"
+    "uniform bool impostor, part;\n"
     "in vec4 strq;\n"
     "out vec4 colour;\n"
     "void main() {\n"
@@ -139,9 +143,17 @@ const char fragment_source[] =
     "    vec4 c = textureProj(picture, strq);\n"
     "    if (c.a < 0.5) discard;\n"
     "    colour = vec4(c.rgb / c.a, 1.0);\n"
+    "    gl_FragDepth = gl_FragCoord.z;\n"
+    "    if (impostor) {\n"
+    "        vec2 st = strq.xy / strq.w;\n"
+    "        vec4 at = place_matrix * vec4(st, texture(depths, st).r, 1.0);\n"
+    "        at = projection * vec4(mat3(view) * at.xyz, at.w);\n"
+    "        gl_FragDepth = max(gl_FragCoord.z, 0.5 * at.z / at.w + 0.5);\n"
+    "    }\n"
     "}\n";
 
-GLuint make_texture(uint32_t size, GLenum format, const uint8_t *texels, GLint smaller)
+GLuint make_texture(uint32_t size, GLint kept, GLenum format, GLenum type, const uint8_t *texels,
+                    GLint smaller)
 {
     GLuint texture;
     glGenTextures(1, &texture);
@@ -150,8 +162,7 @@ GLuint make_texture(uint32_t size, GLenum format, const uint8_t *texels, GLint s
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, GLsizei(size), GLsizei(size), 0, format,
-                 GL_UNSIGNED_BYTE, texels);
+    glTexImage2D(GL_TEXTURE_2D, 0, kept, GLsizei(size), GLsizei(size), 0, format, type, texels);
     return texture;
 }
 
@@ -162,6 +173,7 @@ public:
     Renderer(const Renderer &) = delete;
     Renderer &operator=(const Renderer &) = delete;
     std::vector<uint8_t> draw(const Frame &frame);
+    std::vector<float> distances(const Frame &frame);
 
 private:
     GLuint vertices_of(uint32_t node);
@@ -224,18 +236,21 @@ Renderer::Renderer(const terrimp_terrain *terrain, const scene &shown)
                                       indices.size()));
     meshes_ = make_array(xyz, make_buffer(GL_ARRAY_BUFFER, indices.data(), indices.size() * 2));
 
-    lightmap_ = make_texture(SCENE_SIDE, GL_RGB, shown.lightmap, GL_LINEAR_MIPMAP_LINEAR);
+    lightmap_ = make_texture(SCENE_SIDE, GL_RGBA8, GL_RGB, GL_UNSIGNED_BYTE, shown.lightmap,
+                             GL_LINEAR_MIPMAP_LINEAR);
     glGenerateMipmap(GL_TEXTURE_2D);
 
-    GLuint depth;
-    glGenRenderbuffers(1, &depth);
-    glBindRenderbuffer(GL_RENDERBUFFER, depth);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, atlas_size, atlas_size);
-    atlas_ = make_texture(atlas_size, GL_RGBA, nullptr, GL_LINEAR);
+    GLuint depth = make_texture(atlas_size, GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT,
+                                GL_UNSIGNED_INT, nullptr, GL_LINEAR);
+    atlas_ = make_texture(atlas_size, GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, nullptr, GL_LINEAR);
     glGenFramebuffers(1, &atlas_frame_);
     glBindFramebuffer(GL_FRAMEBUFFER, atlas_frame_);
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, atlas_, 0);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
+    glActiveTexture(GL_TEXTURE1);
+    glBindTexture(GL_TEXTURE_2D, depth);
+    glActiveTexture(GL_TEXTURE0);
+    glUniform1i(uniform("depths"), 1);
     glEnable(GL_DEPTH_TEST);
     glEnable(GL_CULL_FACE);
     glEnable(GL_SCISSOR_TEST);
@@ -266,7 +281,8 @@ void Renderer::begin_capture(const terrimp_capture_command &c)
     glViewport(x, y, GLsizei(c.slot.width), GLsizei(c.slot.height));
     glScissor(x, y, GLsizei(c.slot.width), GLsizei(c.slot.height));
     glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
-    glClear((c.clear ? GL_COLOR_BUFFER_BIT : 0u) | GL_DEPTH_BUFFER_BIT);
+    if (c.clear)
+        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     set_camera(c.view, c.projection, c.eye);
     on_screen_ = false;
     capturing_ = true;
@@ -317,7 +333,10 @@ std::vector<uint8_t> Renderer::draw(const Frame &frame)
             continue;
         }
         turn_to_screen(frame.camera, frame.stats.z_far);
+        glUniform1i(uniform("impostor"), c.kind == Command::impostor);
         glUniform1i(uniform("part"), c.kind == Command::impostor && c.mesh.part_count > 1);
+        if (c.kind == Command::impostor)
+            glUniformMatrix4fv(uniform("place_matrix"), 1, GL_FALSE, c.mesh.place_matrix);
         (c.kind == Command::impostor ? glDisable : glEnable)(GL_CULL_FACE);
         if (c.kind == Command::impostor)
             draw_range(meshes_, c.mesh.base_vertex, c.mesh.first_index, c.mesh.index_count,
@@ -332,6 +351,17 @@ std::vector<uint8_t> Renderer::draw(const Frame &frame)
     turn_to_screen(frame.camera, frame.stats.z_far); // also when there is nothing to draw
     context_read(&context_, rgb.data());
     return rgb;
+}
+
+/* How far along forward the last frame's pixels lie, by their depth. */
+std::vector<float> Renderer::distances(const Frame &frame)
+{
+    const float front = frame.camera.z_near, back = frame.stats.z_far;
+    std::vector<float> depth(size_t(width) * height);
+    glReadPixels(0, 0, width, height, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
+    for (float &d : depth)
+        d = front * back / (back - d * (back - front));
+    return depth;
 }
 
 /* ---- A terrain and a flight --------------------------------------------- */
@@ -352,19 +382,30 @@ bool fly(const char *program)
     Renderer renderer(terrain.get(), shown);
     std::vector<uint8_t> rgb;
     Frame frame = record(view.get(), scene_camera(0, width, height));
+    size_t pixels = 0, off = 0; // of terrain; those whose depth is off by 1 % of the distance
     for (int i = 0; i < SCENE_FRAMES; i++) {
         std::future<Frame> next = std::async(std::launch::async, record, view.get(),
                                              scene_camera(i + 1, width, height));
         rgb = renderer.draw(frame);
         if (scene_judges(i)) {
-            const auto full = renderer.draw(record(yardstick.get(), frame.camera));
+            const auto ours = renderer.distances(frame);
+            const Frame truth = record(yardstick.get(), frame.camera);
+            const auto full = renderer.draw(truth);
+            const auto there = renderer.distances(truth);
+            for (size_t k = 0; k < there.size(); k++) {
+                const bool seen = there[k] < 0.999f * truth.stats.z_far;
+                pixels += seen;
+                off += seen && std::fabs(ours[k] - there[k]) > 0.01f * there[k];
+            }
             scene_judge(&shown, i, &frame.stats, rgb.data(), full.data(), width, height);
         }
         frame = next.get();
     }
     check(image_write_beside(program, "cpp_host.png", rgb.data(), width, height));
     check(glGetError() == GL_NO_ERROR ? nullptr : "OpenGL reports an error");
-    return scene_accepts(&shown, 37.0);
+    std::printf("depth off by more than 1 %% of the distance: %.2f %% of the pixels\n",
+                100.0 * double(off) / double(pixels));
+    return scene_accepts(&shown, 37.0) && off * 100 < pixels;
 }
 
 } // namespace

@@ -266,7 +266,7 @@ int main(int argc, char **argv)
     wish.eyes.min[0] = wish.eyes.min[2] = 60, wish.eyes.max[0] = wish.eyes.max[2] = 100;
     wish.eyes.min[1] = wish.eyes.max[1] = 75;
     wish.cell_levels = CELL_LEVELS, wish.directions = DIRECTIONS, wish.fov_rad = 1.35f;
-    wish.max_angle_rad = 0.08f;
+    wish.max_angle_rad = 0.08f, wish.shafts = 1;
     {
         terrimp_camera camera = scene_camera(0, WIDTH, HEIGHT);
         need(terrimp_camera_pixel_factor(&camera, &wish.pixel_factor));

@@ -121,7 +121,7 @@ static void count_scene(scene *s, const terrimp_view_desc *settings, const scene
 static void check_scene(scene *s)
 {
     static const scene_look looks[2] = {
-        { "from one place", 1, 34.4f, 2.5f, { 50, 100 }, { 400, 60 }, { 35.0, 44.0 } },
+        { "from one place", 1, 34.4f, 2.5f, { 50, 100 }, { 400, 60 }, { 33.0, 40.0 } },
         { "gliding", 0, 50.0f, 1.5f, { 50, 150 }, { 800, 300 }, { 37.0, 38.5 } },
     };
     terrimp_view_desc settings = settings_of(TERRIMP_MODE_AUTO);

@@ -453,13 +453,14 @@ static uint32_t prepared_over(const terrimp_place_terrain_desc *d, const terrimp
     for (n = 0; n < eyes; n++) {
         float eye[3], direction = random_float(0.0f, 6.2831f), cost;
         uint32_t x, z, view;
+        terrimp_place_picture square;
         terrimp_box cell;
         for (i = 0; i < 3; i++)
             eye[i] = random_float(d->eyes.min[i], d->eyes.max[i]);
         x = (uint32_t)((eye[0] - 2400.0f) / 40.0f);
         z = (uint32_t)((eye[2] - 2400.0f) / 40.0f);
         view = (z * 8 + x) * 12 + (uint32_t)(direction / 6.2831853f * 12.0f);
-        terrimpi_prepare_square(&p, 0, x, z, &cell);
+        terrimpi_prepare_square(&p, z * 8 + x, &square, &cell);
         terrimpi_prepare_ground(&p, &cell);
         cost = prepare_frame(d, shown[view], whole, s->cluster_count - 1, eye, direction);
         CHECK(cost <= prepare_left[view] + 1.0f);

@@ -2689,6 +2689,144 @@ static void the_field_that_is_wrong_is_named(void)
     land_free(&l);
 }
 
+/* ---- units of length, and eyes far away ---- */
+
+typedef struct unit_record {
+    uint32_t hash, impostors, captures;
+    int infinite; /* numbers of matrices */
+} unit_record;
+
+static void unit_note(unit_record *r, const uint32_t *numbers, uint32_t count, const float *matrix)
+{
+    uint32_t i;
+    r->hash = hash_bytes(r->hash, numbers, count * sizeof *numbers);
+    for (i = 0; matrix && i < 16u; i++)
+        r->infinite += !(fabsf(matrix[i]) <= FLT_MAX);
+}
+
+static void unit_capture(void *user, const terrimp_capture_command *c)
+{
+    unit_record *r = (unit_record *)user;
+    uint32_t what[4];
+    what[0] = c->node;
+    what[1] = c->part;
+    what[2] = c->slot.width;
+    what[3] = c->slot.height;
+    unit_note(r, what, 4, c->view);
+    unit_note(r, what, 0, c->projection);
+    r->captures++;
+}
+
+static void unit_end(void *user, const terrimp_capture_command *c)
+{
+    (void)user;
+    (void)c;
+}
+
+static void unit_impostor(void *user, const terrimp_impostor_command *c)
+{
+    unit_note((unit_record *)user, &c->node, 1, c->texture_matrix);
+    unit_note((unit_record *)user, &c->part, 1, c->place_matrix);
+    ((unit_record *)user)->impostors++;
+}
+
+static void unit_ground(void *user, const terrimp_ground_command *c)
+{
+    unit_note((unit_record *)user, &c->node, 1, NULL);
+    unit_note((unit_record *)user, &c->first_index, 1, NULL);
+}
+
+static terrimp_callbacks unit_callbacks(unit_record *r)
+{
+    terrimp_callbacks callbacks;
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.user = r;
+    callbacks.begin_capture = unit_capture;
+    callbacks.end_capture = unit_end;
+    callbacks.draw_impostor = unit_impostor;
+    callbacks.draw_ground = unit_ground;
+    return callbacks;
+}
+
+/* The same terrain, camera and flight in units 2^k times as long: the same decisions. */
+static void units_of_length_change_no_decision(void)
+{
+    static const int powers[] = { 0, -40, -10, 10, 30 };
+    terrimp_view_desc d = eager_settings();
+    unit_record first = { 0, 0, 0, 0 };
+    size_t i;
+    int mode, frame;
+    d.exact_depth = 1;
+    for (i = 0; i < sizeof powers / sizeof powers[0]; i++) {
+        float unit = ldexpf(1.0f, powers[i]);
+        unit_record r = { 2166136261u, 0, 0, 0 };
+        terrimp_callbacks callbacks = unit_callbacks(&r);
+        land l;
+        make_hills(&l);
+        l.desc.field.spacing_x = l.desc.field.spacing_z = l.desc.field.height_scale = unit;
+        for (mode = TERRIMP_MODE_GEOMIP; mode <= TERRIMP_MODE_AUTO && (l.terrain || land_build(&l));
+             mode++) {
+            terrimp_view *view = NULL;
+            d.mode = mode;
+            CHECK(terrimp_view_create(l.terrain, &d, NULL, &view) == TERRIMP_OK);
+            for (frame = 0; view && frame < 30; frame++) {
+                terrimp_camera camera;
+                memset(&camera, 0, sizeof camera);
+                camera.eye[0] = (float)(frame - 20) * unit;
+                camera.eye[1] = 30.0f * unit;
+                camera.eye[2] = (0.5f * (float)frame - 10.0f) * unit;
+                camera.forward[0] = camera.forward[2] = 1.0f;
+                camera.forward[1] = -0.4f;
+                camera.width_px = 640;
+                camera.height_px = 400;
+                camera.z_near = 0.5f * unit;
+                camera.z_far = 1000.0f * unit;
+                CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+                CHECK(terrimp_view_render(view, &callbacks) == TERRIMP_OK);
+            }
+            terrimp_view_destroy(view);
+        }
+        CHECK(r.infinite == 0 && r.captures > 20 && r.impostors > 100);
+        if (i == 0)
+            first = r;
+        CHECK(memcmp(&r, &first, sizeof r) == 0);
+        land_free(&l);
+    }
+}
+
+/* From wherever a float can be: an error, or numbers that are finite. */
+static void matrices_from_far_away_are_finite(void)
+{
+    unit_record r = { 0, 0, 0, 0 };
+    terrimp_callbacks callbacks = unit_callbacks(&r);
+    terrimp_view_desc d = eager_settings();
+    float at;
+    land l;
+    make_hills(&l);
+    d.mode = TERRIMP_MODE_IMPOSTOR;
+    d.exact_depth = 1;
+    for (at = 1e3f; at < 1e38f && (l.terrain || land_build(&l)); at *= 10.0f) {
+        terrimp_view *view = NULL;
+        terrimp_camera camera;
+        memset(&camera, 0, sizeof camera);
+        camera.eye[0] = -at;
+        camera.eye[1] = 0.3f * at;
+        camera.forward[0] = 1.0f;
+        camera.forward[1] = -0.3f;
+        camera.width_px = 640;
+        camera.height_px = 480;
+        camera.z_near = 1.0f;
+        camera.z_far = 2.0f * at;
+        camera.fov_y_rad = 0.01f;
+        CHECK(terrimp_view_create(l.terrain, &d, NULL, &view) == TERRIMP_OK);
+        if (view && terrimp_view_update(view, &camera) == TERRIMP_OK)
+            CHECK(terrimp_view_render(view, &callbacks) == TERRIMP_OK);
+        terrimp_view_destroy(view);
+    }
+    CHECK(r.infinite == 0 && r.captures > 0);
+    land_free(&l);
+}
+
 static void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
@@ -2731,6 +2869,8 @@ static void view_tests(void)
     RUN(views_keep_to_their_blocks_and_apart);
     RUN(create_survives_every_failed_allocation);
     RUN(texels_of_the_largest_atlases_are_counted);
+    RUN(units_of_length_change_no_decision);
+    RUN(matrices_from_far_away_are_finite);
 }
 
 #endif

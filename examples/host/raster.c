@@ -31,6 +31,7 @@ void raster_begin(raster *r, uint16_t *pixels, uint16_t *depth, int pitch, int w
     r->depth = depth;
     r->covered = NULL;
     r->pitch = pitch;
+    r->depth_pitch = width;
     r->width = width;
     r->height = height;
     r->row_0_is_top = row_0_is_top;
@@ -50,8 +51,9 @@ void raster_clear(const raster *r, uint16_t colour)
 
 void raster_clear_depth(const raster *r)
 {
-    if (r->depth)
-        memset(r->depth, 0, (size_t)r->width * (size_t)r->height * sizeof *r->depth);
+    int y;
+    for (y = 0; r->depth && y < r->height; y++)
+        memset(r->depth + y * r->depth_pitch, 0, (size_t)r->width * sizeof *r->depth);
 }
 
 static uint32_t *covered_row(const raster *r, int y)
@@ -91,6 +93,13 @@ typedef struct sampler {
     float side, largest; /* largest: coordinate that is still inside, in texels */
 } sampler;
 
+/* The depth of what a texture shows: from a texel's own, e, and its place, the screen's is
+   e scale / (start + u across + v upward + e aside). */
+typedef struct relief {
+    const uint16_t *depth; /* NULL: none */
+    float scale, start, across, upward, aside;
+} relief;
+
 static int32_t to_texels(const sampler *from, float coordinate)
 {
     float texel = coordinate * from->side;
@@ -112,14 +121,22 @@ typedef struct run {
 /* The thresholds of its pixels start with `at`, a fraction of 2^32, and are so far apart that any
    few neighbours are spread over the whole range: multiples of the inverse of 1.3247, the root of
    x^3 = x + 1, along the rows, and of its square along the columns. */
-static void fill_run(const sampler *from, run k, uint16_t *pixel, uint16_t *depth, int count,
-                     int share, uint32_t at)
+static void fill_run(const sampler *from, const relief *own, run k, uint16_t *pixel,
+                     uint16_t *depth, int count, int share, uint32_t at)
 {
     for (; count > 0; count--, pixel++, depth++, at += 3242174889u) {
         uint16_t closeness = (uint16_t)(k.depth >> DEPTH_SHIFT);
         if (closeness > *depth && (int)(at >> 27) < share) {
-            uint16_t texel = from->texels[(k.v >> 16 << from->log2_side) + (k.u >> 16)];
-            if (texel != RASTER_KEY) {
+            int32_t place = (k.v >> 16 << from->log2_side) + (k.u >> 16);
+            uint16_t texel = from->texels[place];
+            if (texel != RASTER_KEY && own->depth) {
+                float e = (float)own->depth[place];
+                float exact = e * own->scale / (own->start + own->across * (float)k.u
+                                                + own->upward * (float)k.v + own->aside * e);
+                if (exact > 0.0f && exact < (float)closeness)
+                    closeness = (uint16_t)exact;
+            }
+            if (texel != RASTER_KEY && closeness > *depth) {
                 *pixel = texel;
                 *depth = closeness;
             }
@@ -179,8 +196,8 @@ static int is_covered(const uint32_t *covered, int x, int end)
 }
 
 /* Divides at every 16th pixel and at the last one; between them the texture goes straight. */
-static void fill_span(const raster *r, const sampler *from, gradient at, const gradient *dx,
-                      int x, int end, int y, int share)
+static void fill_span(const raster *r, const sampler *from, const relief *own, gradient at,
+                      const gradient *dx, int x, int end, int y, int share)
 {
     int32_t u = to_texels(from, at.s / at.q), v = to_texels(from, at.t / at.q);
     int32_t depth = r->depth ? to_depth(at.depth) : 0;
@@ -204,8 +221,8 @@ static void fill_span(const raster *r, const sampler *from, gradient at, const g
         }
         at_dither = (uint32_t)x * 3242174889u + (uint32_t)y * 2447445414u;
         if (r->depth)
-            fill_run(from, k, r->pixels + y * r->pitch + x, r->depth + y * r->width + x, count,
-                     share, at_dither);
+            fill_run(from, own, k, r->pixels + y * r->pitch + x,
+                     r->depth + y * r->depth_pitch + x, count, share, at_dither);
         else if (r->covered)
             fill_free_run(from, k, r->pixels + y * r->pitch + x, covered_row(r, y), x, count,
                           share, at_dither);
@@ -252,8 +269,8 @@ static sampler choose_level(const raster_texture *texture, const raster_corner *
     return from;
 }
 
-static void fill_triangle(const raster *r, const raster_style *style, const raster_corner *a,
-                          const raster_corner *b, const raster_corner *c)
+static void fill_triangle(const raster *r, const raster_style *style, const relief *own,
+                          const raster_corner *a, const raster_corner *b, const raster_corner *c)
 {
     float bx = b->x - a->x, by = b->y - a->y, cx = c->x - a->x, cy = c->y - a->y;
     float area = bx * cy - cx * by, scale = 1.0f / area;
@@ -305,7 +322,7 @@ static void fill_triangle(const raster *r, const raster_style *style, const rast
         at.s = a->s + across * dx.s + down * dy.s;
         at.t = a->t + across * dx.t + down * dy.t;
         at.q = a->q + across * dx.q + down * dy.q;
-        fill_span(r, &from, at, &dx, x, x_end, y, style->share);
+        fill_span(r, &from, own, at, &dx, x, x_end, y, style->share);
     }
 }
 
@@ -366,7 +383,7 @@ static int clip(const raster *r, int plane, const raster_point *polygon, int cou
     return kept;
 }
 
-static void fill_clipped_triangle(const raster *r, const raster_style *style,
+static void fill_clipped_triangle(const raster *r, const raster_style *style, const relief *own,
                                   const uint16_t triangle[3])
 {
     raster_point polygon[3 + PLANES], clipped[3 + PLANES];
@@ -381,7 +398,7 @@ static void fill_clipped_triangle(const raster *r, const raster_style *style,
     for (i = 0; i < count; i++)
         fan[i] = project(r, &polygon[i]);
     for (i = 2; i < count; i++)
-        fill_triangle(r, style, &fan[0], &fan[i - 1], &fan[i]);
+        fill_triangle(r, style, own, &fan[0], &fan[i - 1], &fan[i]);
 }
 
 static raster_point transform(const raster *r, const raster_style *style, const float p[3])
@@ -409,10 +426,36 @@ static int find_sides(const raster *r, const raster_style *style, const raster_p
     return sides;
 }
 
+/* The place's clip w is linear in s, t and d, and so in a texel's depth, 1 / z times the z_near
+   of the texture's own camera, in steps: the place matrix has 1 / z_near and that of d in its last
+   row. */
+static relief relief_of(const raster *r, const raster_style *style)
+{
+    const float *m = style->place_matrix, *c = r->matrix;
+    float side = 65536.0f * (float)(1 << style->texture->log2_side), last = 0.0f;
+    relief own = { 0 };
+    int i;
+    if (!m || m[11] >= 0.0f)
+        return own;
+    own.depth = style->texture_depth;
+    own.scale = r->z_near * m[15];
+    for (i = 0; i < 3; i++) {
+        float row = c[4 * i + 3];
+        own.across += row * m[i] / side;
+        own.upward += row * m[4 + i] / side;
+        last += row * m[8 + i] / m[11];
+        own.start += row * m[12 + i];
+    }
+    own.start -= last * m[15];
+    own.aside = (last + c[15]) * m[15] * (float)(1 << DEPTH_SHIFT) / DEPTH_STEPS;
+    return own;
+}
+
 void raster_draw(raster *r, const raster_style *style, const float *xyz, const uint16_t *indices,
                  size_t index_count)
 {
     size_t vertex_count = 0, i;
+    relief own = relief_of(r, style);
     for (i = 0; i < index_count; i++)
         if (indices[i] >= vertex_count)
             vertex_count = indices[i] + 1u;
@@ -425,9 +468,10 @@ void raster_draw(raster *r, const raster_style *style, const float *xyz, const u
     for (i = 0; i + 2 < index_count; i += 3) {
         const uint16_t *k = indices + i;
         if (!(r->sides[k[0]] | r->sides[k[1]] | r->sides[k[2]]))
-            fill_triangle(r, style, &r->corners[k[0]], &r->corners[k[1]], &r->corners[k[2]]);
+            fill_triangle(r, style, &own, &r->corners[k[0]], &r->corners[k[1]],
+                          &r->corners[k[2]]);
         else if (!(r->sides[k[0]] & r->sides[k[1]] & r->sides[k[2]]))
-            fill_clipped_triangle(r, style, k);
+            fill_clipped_triangle(r, style, &own, k);
     }
 }
 

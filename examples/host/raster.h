@@ -36,12 +36,13 @@ typedef struct raster_corner {
 /* Where triangles go, and through which camera. */
 typedef struct raster {
     uint16_t *pixels;      /* of the target's corner; what is drawn stays within width x height */
-    uint16_t *depth;       /* rows without gaps; z_near / w, larger is closer. NULL: none, what
-                              is drawn later covers what was drawn before */
+    uint16_t *depth;       /* z_near / w, larger is closer. NULL: none, what is drawn later covers
+                              what was drawn before */
     uint32_t *covered;     /* instead of depth, for triangles from front to back: rows of
                               (width + 31) / 32 words, a bit for each pixel that has been drawn and
                               is left alone from then on. NULL, as after raster_begin: none */
     int pitch;             /* pixels from a row to the next */
+    int depth_pitch;       /* the same of depth; as wide as the target after raster_begin */
     int width, height;
     int row_0_is_top;      /* as on a screen; else as in a texture whose row 0 is t = 0 */
     float matrix[16], eye[3], z_near, depth_scale;
@@ -59,6 +60,9 @@ typedef struct raster_style {
     int share;                   /* of RASTER_ALL: only pixels whose threshold of a dither pattern
                                     lies below it */
     int within_depth;            /* nonzero: only what lies where r / q is within 0..1 */
+    const float *place_matrix;   /* [16] NULL: pixels have the depth of their triangles; else that
+                                    of what the texture shows, where it is farther */
+    const uint16_t *texture_depth; /* as the texture, of the target that it once was */
 } raster_style;
 
 /* Takes a target and a camera; the buffers are not cleared. view and projection are those of
