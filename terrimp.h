@@ -12449,9 +12449,8 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_sorted_desc_resolve(desc, &d));
     if (d.low == 0.0f && d.high == 0.0f) {
-        TERRIMPI_TRY(terrimp_heightfield_validate(&d.field, NULL, NULL));
-        TERRIMPI_TRY(terrimp_heightfield_bounds(&d.field, 0, 0, d.field.width, d.field.depth,
-                                                &d.low, &d.high));
+        terrimp_rect all = terrimpi_rect(0, 0, d.field.width, d.field.depth);
+        TERRIMPI_TRY(terrimpi_field_range(&d.field, all, 0, &d.low, &d.high));
     }
     memset(sorted, 0, sizeof *sorted);
     sorted->desc = d;

@@ -129,8 +129,10 @@ static void land_span(const land *l, uint32_t node, uint32_t first[2], uint32_t 
 
 static float land_sample(const land *l, uint32_t x, uint32_t z)
 {
-    float height = -1e30f;
-    CHECK(terrimp_heightfield_read(&l->desc.field, x, z, 1, 1, 1, &height) == TERRIMP_OK);
+    const terrimp_heightfield *f = &l->desc.field;
+    float raw = terrimpi_field_raw(f, x, z), height = terrimpi_field_world_height(f, raw);
+    CHECK(x < f->width && z < f->depth && f->row_bytes > 0); /* resolved */
+    CHECK(!terrimpi_field_is_void(f, raw) && terrimpi_finite(height));
     return height;
 }
 
