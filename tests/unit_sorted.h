@@ -360,7 +360,7 @@ typedef struct order_host {
     uint8_t patterns[160][160];
     order_picture screen, capture;
     const order_picture *target; /* NULL: of a capture that is not looked at */
-    int commands_only;    /* no picture is looked at */
+    int commands_only;    /* no picture is looked at, nor what vertices are filled with */
     float xyz[3 * 129 * 129];
     terrimp_geomip_vertex morph[129 * 129];
     uint16_t indices[6 * 129 * 129], scratch[4096];
@@ -457,6 +457,13 @@ static int order_misfits(const order_host *h)
     return count;
 }
 
+static void order_fill_ground(order_host *h, uint32_t node)
+{
+    uint32_t count = h->l->info.ground_vertex_count;
+    CHECK(terrimp_terrain_fill_ground(h->l->terrain, node, h->xyz, 3u * count) == TERRIMP_OK);
+    CHECK(terrimp_terrain_fill_morph(h->l->terrain, node, h->morph, count) == TERRIMP_OK);
+}
+
 static void order_draw_ground(void *user, const terrimp_ground_command *c)
 {
     order_host *h = (order_host *)user;
@@ -473,8 +480,8 @@ static void order_draw_ground(void *user, const terrimp_ground_command *c)
     draw.morph = c->morph;
     memcpy(draw.side, c->side, sizeof draw.side);
     memcpy(draw.side_coarse, c->side_coarse, sizeof draw.side_coarse);
-    CHECK(terrimp_terrain_fill_ground(h->l->terrain, c->node, h->xyz, 3u * vertices) == TERRIMP_OK);
-    CHECK(terrimp_terrain_fill_morph(h->l->terrain, c->node, h->morph, vertices) == TERRIMP_OK);
+    if (!h->commands_only)
+        order_fill_ground(h, c->node);
     CHECK(terrimp_geomip_morph(h->l->info.chunk_quads, &draw, h->morph, h->xyz + 1, 3) ==
           TERRIMP_OK);
     eye = order_move(h, c->offset, h->xyz, vertices);
@@ -814,6 +821,8 @@ static void views_that_wrap_repeat_after_a_period(void)
             h[k].hash = 1u;
             h[k].periods = 5 * k;
             h[k].commands_only = 1;
+            for (i = 0; i < (int)one.info.node_count; i++)
+                order_fill_ground(&h[k], (uint32_t)i);
         }
         for (i = 0; i < 120; i++) {
             for (k = 0; k < 2; k++) {

@@ -1157,6 +1157,7 @@ static void make_hills(land *l)
     land_prepare(l, 97, 81, TERRIMP_FORMAT_F32, LAND_HILLS);
     l->desc.chunk_quads = 8;
     l->desc.triangle_budget = 32;
+    l->often = 1;
 }
 
 static void random_land(land *l)
@@ -2593,6 +2594,7 @@ static void edits_reach_the_ground_of_views(void)
     void *scratch;
     uint32_t x, z, before, done, mode, node, kept;
     make_hills(&l);
+    l.often = 0; /* what is opened cannot be edited */
     l.desc.height_low = -100.0f;
     l.desc.height_high = 400.0f;
     if (!land_build(&l)) {
