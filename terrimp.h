@@ -3413,6 +3413,8 @@ static terrimp_result terrimpi_field_scan_values(const terrimp_heightfield *fiel
 {
     uint32_t i;
     for (i = 0; i < count; ++i) {
+        if (!field->has_no_data && terrimpi_within(raw[i], scan->low, scan->high))
+            continue; /* between two that are good */
         if (terrimpi_field_is_void(field, raw[i])) {
             scan->voids++;
             if (scan->skip_voids)

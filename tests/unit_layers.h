@@ -347,8 +347,8 @@ static int cull_hidden(int k, float x, float y, float fx, float fy)
 }
 
 /* The same from all of 9 x 9 eyes, for 3 x 3 points of a texel. Along an axis that is 27 pairs of an
-   eye's shift of e / 4 - 1 and a point at (2 p + 1) / 6 of the texel; what is closer by some layers
-   shows a texel that is the same number of texels away for every texel. */
+   eye's shift of e / 4 - 1 and a point at (2 p + 1) / 6 of the texel; how many texels away each one
+   looks through what is some layers closer is the same for all texels. */
 static int cull_truly_hidden(int k, int x, int y)
 {
     static int away[27][CULL_LAYERS];

@@ -33,16 +33,18 @@ static uint32_t sorted_count; /* of the squares of the frame that was made last 
 /* Hills of many sizes that repeat every 512 samples: first and last column and row are equal. */
 static void sorted_make_hills(float height)
 {
-    int x, z, k;
+    static float shape[SORTED_SIDE][SORTED_SIDE]; /* all zero: not made yet */
+    int x, z, k, made = shape[1][1] != 0.0f;
     for (z = 0; z < SORTED_SIDE; z++)
         for (x = 0; x < SORTED_SIDE; x++) {
-            float h = 0.0f;
-            for (k = 1; k <= 128; k *= 2) {
+            for (k = 1; k <= 128 && !made; k *= 2) {
                 float a = (float)(x % 512 * k) * (6.2831853f / 512.0f);
                 float b = (float)(z % 512 * (k * 2 + 1) % 512) * (6.2831853f / 512.0f);
-                h += sinf(a + 1.3f * (float)k + sinf(b)) * sinf(b + 0.7f * (float)k) / (float)k;
+                shape[z][x] +=
+                    sinf(a + 1.3f * (float)k + sinf(b)) * sinf(b + 0.7f * (float)k) / (float)k;
             }
-            sorted_heights[z * SORTED_SIDE + x] = (sorted_sample)(height * h * SORTED_STEPS);
+            sorted_heights[z * SORTED_SIDE + x] =
+                (sorted_sample)(height * shape[z][x] * SORTED_STEPS);
         }
 }
 
