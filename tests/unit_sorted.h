@@ -923,16 +923,16 @@ static void views_keep_to_their_cost(void)
 {
     static land l;
     int mode, turn;
-    for (turn = 0; turn < 2; turn++)
+    for (turn = 0; turn < 2; turn++) {
+        land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
+        l.desc.field.height_scale = 0.125f;
+        l.desc.chunk_quads = turn ? 8 : 16;
+        if (!land_build(&l))
+            return;
         for (mode = TERRIMP_MODE_GEOMIP; mode <= TERRIMP_MODE_AUTO; mode += 2) {
             terrimp_view_desc d;
             float median, mean, most, least, limited, free_ratio, ratio;
             int rests;
-            land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
-            l.desc.field.height_scale = 0.125f;
-            l.desc.chunk_quads = turn ? 8 : 16;
-            if (!land_build(&l))
-                return;
             memset(&d, 0, sizeof d);
             d.mode = mode;
             d.ground_tolerance_px = 0.25f;
@@ -947,8 +947,9 @@ static void views_keep_to_their_cost(void)
             else
                 CHECK(ratio <= 1.2f && most <= 1.05f * d.max_cost && rests);
             CHECK(median > d.max_cost * 0.5f && least > 0.8f * d.max_cost);
-            land_free(&l);
         }
+        land_free(&l);
+    }
 }
 
 static void views_without_end_or_of_a_cost_refuse_bad_input(void)
