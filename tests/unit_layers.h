@@ -346,9 +346,9 @@ static int cull_hidden(int k, float x, float y, float fx, float fy)
     return 0;
 }
 
-/* The same from all of 9 x 9 eyes, for 3 x 3 points of a texel. Along an axis that is 27 pairs of an
-   eye's shift of e / 4 - 1 and a point at (2 p + 1) / 6 of the texel; how many texels away each one
-   looks through what is some layers closer is the same for all texels. */
+/* The same from all of 9 x 9 eyes, for 3 x 3 points of a texel. Along an axis that is 27 pairs of
+   an eye's shift of e / 4 - 1 and a point at (2 p + 1) / 6 of the texel; how many texels away each
+   one looks through what is some layers closer is the same for all texels. */
 static int cull_truly_hidden(int k, int x, int y)
 {
     static int away[27][CULL_LAYERS];
