@@ -219,6 +219,12 @@ static void hf_nan_is_a_void_only_with_has_no_data(void)
     CHECK(terrimp_heightfield_read(&field, 271, 1, 1, 1, 1, &height) == TERRIMP_E_VOID);
     CHECK(terrimp_heightfield_bounds(&field, 0, 0, 300, 2, &low, &high) == TERRIMP_OK);
     CHECK(low == 0.0f && high == 0.0f);
+    x = z = 0;
+    samples[1] = 1.0f;
+    samples[571] = field.no_data = 0.5f; /* a void need not be beyond the other samples */
+    CHECK(terrimp_heightfield_validate(&field, &x, &z) == TERRIMP_E_VOID && x == 271 && z == 1);
+    CHECK(terrimp_heightfield_bounds(&field, 0, 0, 300, 2, &low, &high) == TERRIMP_OK);
+    CHECK(low == 0.0f && high == 1.0f);
     samples[571] = FLT_MAX; /* a sample may be finite and its height not */
     field.height_scale = 2.0f;
     CHECK(terrimp_heightfield_validate(&field, &x, &z) == TERRIMP_E_NOT_FINITE);

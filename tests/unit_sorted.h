@@ -2005,7 +2005,7 @@ static void sorted_refuses_bad_input(void)
     CHECK(terrimp_sorted_next(NULL, &square, 1) == 0);
     memset(&s, 1, sizeof s);
     untouched = s;
-    for (i = 0; i < 24; i++) {
+    for (i = 0; i < 25; i++) {
         terrimp_result wanted = TERRIMP_E_RANGE;
         bad = good;
         switch (i) {
@@ -2032,6 +2032,9 @@ static void sorted_refuses_bad_input(void)
         case 20: bad.texels_per_px = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
         case 21: bad.field.samples = NULL, wanted = TERRIMP_E_NULL; break;
         case 22: bad.field.origin_x = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 23: bad.field.no_data = (float)sorted_heights[1000], bad.field.has_no_data = 1;
+                 wanted = TERRIMP_E_VOID;
+                 break;
         default: bad.field.wrap = 0, bad.field.width = bad.field.depth = 2;
                  bad.field.samples = no_height, no_height[3] = not_a_number();
                  wanted = TERRIMP_E_NOT_FINITE;
