@@ -3413,6 +3413,8 @@ static terrimp_result terrimpi_field_scan_values(const terrimp_heightfield *fiel
 {
     uint32_t i;
     for (i = 0; i < count; ++i) {
+        if (!field->has_no_data && terrimpi_within(raw[i], scan->low, scan->high))
+            continue; /* between two that are good */
         if (terrimpi_field_is_void(field, raw[i])) {
             scan->voids++;
             if (scan->skip_voids)
@@ -12449,9 +12451,8 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_sorted_desc_resolve(desc, &d));
     if (d.low == 0.0f && d.high == 0.0f) {
-        TERRIMPI_TRY(terrimp_heightfield_validate(&d.field, NULL, NULL));
-        TERRIMPI_TRY(terrimp_heightfield_bounds(&d.field, 0, 0, d.field.width, d.field.depth,
-                                                &d.low, &d.high));
+        terrimp_rect all = terrimpi_rect(0, 0, d.field.width, d.field.depth);
+        TERRIMPI_TRY(terrimpi_field_range(&d.field, all, 0, &d.low, &d.high));
     }
     memset(sorted, 0, sizeof *sorted);
     sorted->desc = d;

@@ -1,7 +1,7 @@
 /* Shows what stands on terrain as pictures that are made once: a town and a wood round it, a
    million triangles, for a flight along one side. Which pictures, for which stretch of the flight,
    is placed for a budget of triangles a frame. Woods become layers, houses depth meshes, in one
-   atlas.
+   atlas: host/gl_layers.c makes them, after plans of this file.
    Build:  make town
    Use:    build/town [budget [trees of a plot]]   (150000 triangles and 105 trees)
    Expect: 25 frames, every sixth beside all triangles, the last ones in town.png and town_full.png.
@@ -9,7 +9,7 @@
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 #include "host/context.h"
-#include "host/gl_terrain.h"
+#include "host/gl_layers.h"
 #include "host/image.h"
 #include "host/procedural.h"
 #include "host/quality.h"
@@ -22,7 +22,7 @@
 
 enum { WIDTH = 640, HEIGHT = 480, FRAMES = 25, SIDE = 193, GROUND = 2 * (SIDE - 1) * (SIDE - 1) };
 enum { PLOTS = 64, CLUSTERS = 85, CELLS = 8, SQUARES = 15, HOUSES = 12 };
-enum { CANDIDATES = CLUSTERS * SQUARES, GAINS = CLUSTERS * 4 * CELLS, QUADS = 200000 };
+enum { CANDIDATES = CLUSTERS * SQUARES, GAINS = CLUSTERS * 4 * CELLS };
 enum { PICTURE = 1024, ATLAS = 4096, TREE = 200, HOUSE = 136, CORNERS = 3 * (TREE + HOUSE) };
 
 static float plot = 32.0f; /* [wu] */
@@ -31,13 +31,8 @@ static const uint8_t sky[3] = { 168, 199, 232 };
 
 /* A picture that was chosen: of a cluster, for the cells of a square. */
 typedef struct picture {
-    uint32_t cluster, first_quad, quad_count;
-    terrimp_layers layers;
-    terrimp_capture capture;
-    terrimp_depth_vertex *vertices; /* of a depth mesh, three a triangle; NULL: layers */
-    uint32_t *sheets, vertex_count; /* [vertex_count / 3] quads that the triangles are in */
-    GLint first;                    /* of its vertices in the buffer */
-    GLsizei count;
+    uint32_t cluster, square;
+    gl_layers_picture made;
 } picture;
 
 static terrimp_heightfield field;
@@ -50,26 +45,16 @@ static terrimp_place_candidate candidates[CANDIDATES];
 static terrimp_place_gain gains[GAINS];
 static uint8_t shown[GAINS], ours[WIDTH * HEIGHT * 3], full[WIDTH * HEIGHT * 3];
 static float costs[CELLS], left[CELLS], pixel_factor;
-static terrimp_layer_quad quads[QUADS];
-static uint32_t *quad_texels[QUADS], quad_count;
 static terrimp_camera camera;
-static gl_program things, flat;
-static GLuint ground_array, things_array, models, instances, atlas, flat_array, flat_vertices;
-static size_t flat_count, texels_kept;
+static gl_program things;
+static gl_layers atlas;
+static GLuint ground_array, things_array, models, instances;
 
 static float chance(void)
 {
     static uint32_t seed = 2463534242u;
     seed ^= seed << 13, seed ^= seed >> 17, seed ^= seed << 5;
     return (float)(seed >> 8) * (1.0f / 16777216.0f);
-}
-
-static void *memory(size_t bytes)
-{
-    void *p = calloc(1, bytes ? bytes : 1);
-    if (!p)
-        fprintf(stderr, "no memory\n"), exit(2);
-    return p;
 }
 
 static void need(int result)
@@ -231,24 +216,6 @@ static const char things_fragment[] = "#version 330 core\n"
     "in vec3 shade;\n"
     "out vec4 colour;\n"
     "void main() { colour = vec4(shade, 1.0); }\n";
-/* What a picture shows stands up to a layer's thickness before the layer: so for the depth test. */
-static const char flat_vertex[] = "#version 330 core\n"
-    "layout(location = 0) in vec3 position;\n"
-    "layout(location = 1) in vec2 st;\n"
-    "layout(location = 2) in vec3 front;\n"
-    "uniform mat4 matrix;\n"
-    "out vec2 uv;\n"
-    "void main() {\n"
-    "    vec4 f = matrix * vec4(front, 1.0);\n"
-    "    uv = st;\n"
-    "    gl_Position = matrix * vec4(position, 1.0);\n"
-    "    gl_Position.z = f.z / f.w * gl_Position.w;\n"
-    "}\n";
-static const char flat_fragment[] = "#version 330 core\n"
-    "uniform sampler2D atlas;\n"
-    "in vec2 uv;\n"
-    "out vec4 colour;\n"
-    "void main() { colour = texture(atlas, uv); if (colour.a < 0.5) discard; }\n";
 
 static void set_matrix(const gl_program *p, const float view[16], const float projection[16])
 {
@@ -261,21 +228,11 @@ static void set_matrix(const gl_program *p, const float view[16], const float pr
     glUniformMatrix4fv(p->matrix, 1, GL_FALSE, both);
 }
 
-static GLuint array_of(GLuint *buffer, const void *data, size_t bytes)
-{
-    GLuint array;
-    glGenVertexArrays(1, &array);
-    glBindVertexArray(array);
-    glGenBuffers(1, buffer);
-    glBindBuffer(GL_ARRAY_BUFFER, *buffer);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, GL_STATIC_DRAW);
-    return array;
-}
-
 static void open_graphics(void)
 {
-    float *out = (float *)memory((size_t)GROUND * 18 * sizeof *out), *p = out;
-    static float model[6 * CORNERS];
+    static float ground[GROUND * 18], model[6 * CORNERS];
+    float *p = ground;
+    const char *wrong;
     uint32_t x, z, k;
     GLuint buffer;
     for (z = 0; z + 1 < SIDE; z++)
@@ -290,20 +247,18 @@ static void open_graphics(void)
                 p = corner(p, wx, y, wz, 0.45f * light, 0.6f * light, 0.3f * light);
             }
     make_models(model);
-    ground_array = array_of(&buffer, out, (size_t)GROUND * 18 * sizeof *out);
+    ground_array = gl_array_make(&buffer, ground, sizeof ground);
     gl_point(0, 3, GL_FLOAT, 24, 0), gl_point(1, 3, GL_FLOAT, 24, 12);
-    things_array = array_of(&models, model, sizeof model);
+    things_array = gl_array_make(&models, model, sizeof model);
     gl_point(0, 3, GL_FLOAT, 24, 0), gl_point(1, 3, GL_FLOAT, 24, 12);
     glGenBuffers(1, &instances);
     glBindBuffer(GL_ARRAY_BUFFER, instances);
     glBufferData(GL_ARRAY_BUFFER, sizeof places, places, GL_STATIC_DRAW);
     glVertexAttribDivisor(2, 1), glVertexAttribDivisor(3, 1);
     things = gl_program_make(things_vertex, things_fragment);
-    flat = gl_program_make(flat_vertex, flat_fragment);
-    if (!things.id || !flat.id)
-        fprintf(stderr, "a shader does not compile\n"), exit(2);
-    free(out);
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    wrong = gl_layers_open(&atlas, PICTURE, 400);
+    if (wrong || !things.id)
+        fprintf(stderr, "%s\n", wrong ? wrong : "a shader does not compile"), exit(2);
 }
 
 /* Draws houses (0) or trees (1) of a plot; returns its triangles. */
@@ -347,7 +302,7 @@ static float eye_height(float x)
 }
 
 /* Layers of a cluster for a square, seen from the middle of its side. */
-static terrimp_result plan(uint32_t cluster, uint32_t s, int even, picture *out)
+static terrimp_result plan(uint32_t cluster, uint32_t s, int even, gl_layers_picture *out)
 {
     const terrimp_box *b = &boxes[cluster];
     terrimp_layers_desc d;
@@ -379,7 +334,6 @@ static terrimp_result plan(uint32_t cluster, uint32_t s, int even, picture *out)
     d.view_tan[1] = fmaxf(fabsf(c->tan_down), fabsf(c->tan_up));
     d.texel = 1.0f / pixel_factor;
     d.even = even;
-    out->cluster = cluster;
     n = (uint32_t)ceilf((c->tan_right - c->tan_left) / d.texel);
     c->tan_right = c->tan_left + (float)n * d.texel;
     i = (uint32_t)ceilf((c->tan_up - c->tan_down) / d.texel);
@@ -401,12 +355,11 @@ static uint32_t place(float budget, terrimp_place_desc *d, terrimp_placement *re
     for (cluster = 0; cluster < CLUSTERS; cluster++)
         for (s = 0; s < SQUARES; s++) {
             terrimp_place_candidate *c = &candidates[d->candidate_count];
-            picture made = { 0 };
+            gl_layers_picture made = { 0 };
             float area;
             if (plan(cluster, s, 0, &made) != TERRIMP_OK)
                 continue;
             square_of(s, &first, &count);
-            made.first = (GLint)s;
             area = (made.capture.tan_right - made.capture.tan_left) * pixel_factor
                    * (made.capture.tan_up - made.capture.tan_down) * pixel_factor;
             c->cluster = cluster;
@@ -421,256 +374,49 @@ static uint32_t place(float budget, terrimp_place_desc *d, terrimp_placement *re
                 gains[d->gain_count++].saved = saved;
             }
             c->gain_count = count;
-            pictures[d->candidate_count++] = made;
+            pictures[d->candidate_count].cluster = cluster;
+            pictures[d->candidate_count++].square = s;
         }
     d->candidates = candidates, d->gains = gains, d->parents = parents, d->costs = costs;
     d->cluster_count = CLUSTERS, d->view_count = CELLS, d->budget = budget;
     bytes = terrimp_place_scratch_bytes(d);
-    scratch = memory(bytes);
-    need(terrimp_place(d, scratch, bytes, shown, left, result));
+    scratch = malloc(bytes);
+    need(scratch ? (int)terrimp_place(d, scratch, bytes, shown, left, result)
+                 : (int)TERRIMP_E_MEMORY);
     free(scratch);
     return d->candidate_count;
 }
 
 /* ---- Making pictures ---------------------------------------------------- */
 
-static GLuint drawing;
-
-static void make_framebuffer(void)
+/* What a picture shows between two depths: of that the host makes a layer. */
+static void draw_slab(void *user, const terrimp_capture *slab)
 {
-    GLuint parts[2];
-    glGenFramebuffers(1, &drawing);
-    glBindFramebuffer(GL_FRAMEBUFFER, drawing);
-    glGenRenderbuffers(2, parts);
-    glBindRenderbuffer(GL_RENDERBUFFER, parts[0]);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, PICTURE, PICTURE);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, parts[0]);
-    glBindRenderbuffer(GL_RENDERBUFFER, parts[1]);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, PICTURE, PICTURE);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, parts[1]);
-    glEnable(GL_DEPTH_TEST);
-}
-
-typedef struct recording {
-    uint32_t width, height, words, *opaque, *visible, *texels; /* of all layers */
-} recording;
-
-/* Draws what lies between the borders of each layer, and reads it back. */
-static void record(const picture *p, recording *r)
-{
-    terrimp_capture c = p->capture;
-    uint32_t k, x, y, i, *state, *wanted;
-    r->width = (uint32_t)((c.tan_right - c.tan_left) / p->layers.texel + 0.5f);
-    r->height = (uint32_t)((c.tan_up - c.tan_down) / p->layers.texel + 0.5f);
-    r->words = TERRIMP_MASK_WORDS(r->width) * r->height;
-    r->opaque = (uint32_t *)memory((size_t)r->words * p->layers.count * 4);
-    r->visible = (uint32_t *)memory((size_t)r->words * p->layers.count * 4);
-    r->texels = (uint32_t *)memory((size_t)r->width * r->height * p->layers.count * 4);
-    state = (uint32_t *)memory((size_t)r->words * 16);
-    wanted = (uint32_t *)memory((size_t)r->words * 4);
-    glBindFramebuffer(GL_FRAMEBUFFER, drawing);
-    glViewport(0, 0, (GLsizei)r->width, (GLsizei)r->height);
-    glClearColor(0, 0, 0, 0);
-    for (k = 0; k < p->layers.count; k++) {
-        uint32_t *texels = r->texels + (size_t)r->width * r->height * k;
-        uint32_t *mask = r->opaque + (size_t)r->words * k;
-        float view[16], projection[16];
-        c.z_near = terrimp_layer_border(&p->layers, k);
-        c.z_far = terrimp_layer_border(&p->layers, k + 1);
-        need(terrimp_capture_matrices(&c, 0, view, projection));
-        set_matrix(&things, view, projection);
-        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-        for (i = 0; i < PLOTS; i++)
-            if (within(i, p->cluster) && boxes[i].min[2] < c.eye[2] + c.z_far
-                && boxes[i].max[2] > c.eye[2] + c.z_near) {
-                draw_things(i, 1);
-                draw_things(i, 0);
-                glPolygonMode(GL_FRONT_AND_BACK, GL_LINE); /* all texels that they touch */
-                draw_things(i, 0), draw_things(i, 1);
-                glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-            }
-        glReadPixels(0, 0, (GLsizei)r->width, (GLsizei)r->height, GL_RGBA, GL_UNSIGNED_BYTE,
-                     texels);
-        for (y = 0; y < r->height; y++)
-            for (x = 0; x < r->width; x++)
-                if (((uint8_t *)&texels[y * r->width + x])[3])
-                    mask[y * TERRIMP_MASK_WORDS(r->width) + x / 32] |= 1u << x % 32;
-    }
-    for (k = 0; k + 1 < p->layers.count; k++) {
-        uint32_t *front = r->texels + (size_t)r->width * r->height * k;
-        uint32_t *mask = r->opaque + (size_t)r->words * k;
-        need(terrimp_layer_repair(mask, mask + r->words, r->width, r->height, wanted));
-        for (y = 0; y < r->height; y++)
-            for (x = 0; x < r->width; x++)
-                if (wanted[y * TERRIMP_MASK_WORDS(r->width) + x / 32] >> x % 32 & 1u)
-                    front[(r->height + y) * r->width + x] = front[y * r->width + x];
-        for (i = 0; i < r->words; i++)
-            mask[r->words + i] |= wanted[i];
-    }
-    for (k = 0; k < p->layers.count; k++)
-        need(terrimp_layer_cull(r->opaque + (size_t)r->words * k, r->width, r->height, 0, state,
-                                r->visible + (size_t)r->words * k));
-    free(state), free(wanted);
-}
-
-/* A quad of a picture, with its texels: of one layer, or each of the layer that is named. */
-static void keep_quad(const recording *r, const terrimp_rect *rect, uint32_t layer,
-                      const uint16_t *layers)
-{
-    uint32_t x, y, *out = (uint32_t *)memory((size_t)rect->width * rect->height * 4);
-    if (quad_count == QUADS)
-        fprintf(stderr, "too many quads\n"), exit(2);
-    texels_kept += rect->width * rect->height;
-    quads[quad_count].texels = *rect;
-    quads[quad_count].layer = layer;
-    quad_texels[quad_count++] = out;
-    for (y = 0; y < rect->height; y++)
-        for (x = 0; x < rect->width; x++) {
-            uint32_t from = layers ? layers[y * rect->width + x] : layer;
-            if (from != TERRIMP_DEPTH_NONE)
-                out[y * rect->width + x] = r->texels[((size_t)from * r->height + rect->y + y)
-                                                         * r->width + rect->x + x];
-        }
-}
-
-static void cover(picture *p, const recording *r)
-{
-    static terrimp_rect rects[4096];
-    terrimp_cover_desc d;
-    uint32_t k, i, count;
-    size_t bytes;
-    void *scratch;
-    memset(&d, 0, sizeof d);
-    d.width = r->width, d.height = r->height, d.quad_cost = 400;
-    bytes = terrimp_cover_scratch_bytes(&d, 4096);
-    scratch = memory(bytes);
-    for (k = 0; k < p->layers.count; k++) {
-        d.mask = r->visible + (size_t)r->words * k;
-        need(terrimp_cover(&d, scratch, bytes, rects, 4096, &count));
-        for (i = 0; i < count; i++)
-            keep_quad(r, &rects[i], k, NULL);
-    }
-    free(scratch);
-}
-
-/* A mesh instead, with its sheets as quads of the atlas. */
-static void mesh(picture *p, const recording *r)
-{
-    enum { MOST = 200000 };
-    terrimp_depth_mesh_desc d;
-    terrimp_depth_mesh m;
-    uint32_t i, k;
-    size_t bytes;
-    void *scratch;
-    memset(&d, 0, sizeof d), memset(&m, 0, sizeof m);
-    d.opaque = r->opaque, d.visible = r->visible;
-    d.width = r->width, d.height = r->height, d.layers = p->layers.count;
-    m.vertex_capacity = m.index_capacity = m.sheet_capacity = MOST, m.texel_capacity = 8000000;
-    m.vertices = (terrimp_depth_vertex *)memory(MOST * sizeof *m.vertices);
-    m.indices = (uint32_t *)memory(MOST * sizeof *m.indices);
-    m.sheets = (terrimp_depth_sheet *)memory(MOST * sizeof *m.sheets);
-    m.texel_layers = (uint16_t *)memory(m.texel_capacity * sizeof *m.texel_layers);
-    bytes = terrimp_depth_mesh_scratch_bytes(&d);
-    scratch = memory(bytes);
-    need(terrimp_depth_mesh_make(&d, scratch, bytes, &m));
-    p->vertex_count = m.index_count;
-    p->vertices = (terrimp_depth_vertex *)memory(m.index_count * sizeof *p->vertices);
-    p->sheets = (uint32_t *)memory(m.index_count * sizeof *p->sheets);
-    for (i = 0; i < m.sheet_count; i++) {
-        const terrimp_depth_sheet *s = &m.sheets[i];
-        for (k = s->first_index; k < s->first_index + s->index_count; k++) {
-            p->vertices[k] = m.vertices[m.indices[k]];
-            p->sheets[k / 3] = quad_count;
-        }
-        keep_quad(r, &s->texels, 0, m.texel_layers + s->first_texel);
-    }
-    free(scratch), free(m.vertices), free(m.indices), free(m.sheets), free(m.texel_layers);
+    const picture *p = (const picture *)user;
+    float view[16], projection[16];
+    uint32_t i;
+    need(terrimp_capture_matrices(slab, 0, view, projection));
+    set_matrix(&things, view, projection);
+    for (i = 0; i < PLOTS; i++)
+        if (within(i, p->cluster) && boxes[i].min[2] < slab->eye[2] + slab->z_far
+            && boxes[i].max[2] > slab->eye[2] + slab->z_near)
+            draw_things(i, 0), draw_things(i, 1);
 }
 
 static int is_town(uint32_t cluster)
 {
-    uint32_t i, trees = 0, houses = 0;
+    uint32_t i, trees = 0;
     for (i = 0; i < PLOTS; i++)
-        if (within(i, cluster)) {
-            houses += first_of[2 * i + 1] - first_of[2 * i];
-            trees += first_of[2 * i + 2] - first_of[2 * i + 1];
-        }
-    return trees == 0 && houses > 0;
+        trees += within(i, cluster) ? first_of[2 * i + 2] - first_of[2 * i + 1] : 0;
+    return !trees;
 }
 
+/* Walls stay flat in a depth mesh; woods would tear it. */
 static void make_picture(picture *p)
 {
-    recording r;
-    if (is_town(p->cluster))
-        need(plan(p->cluster, (uint32_t)p->first, 1, p));
-    record(p, &r);
-    p->first_quad = quad_count;
-    if (is_town(p->cluster))
-        mesh(p, &r);
-    else
-        cover(p, &r);
-    p->quad_count = quad_count - p->first_quad;
-    free(r.opaque), free(r.visible), free(r.texels);
-}
-
-
-/* Packs what has been kept into one atlas, and makes the vertices of all pictures: position,
-   texture coordinates, position for the depth test. */
-static void pack_atlas(uint32_t count)
-{
-    static const uint32_t size[2] = { ATLAS, ATLAS };
-    terrimp_rect *rects = (terrimp_rect *)memory(QUADS * sizeof *rects);
-    uint32_t *order = (uint32_t *)memory(2 * QUADS * sizeof *order), i, k, q, v;
-    size_t room = 0;
-    float *vertices;
-    need(terrimp_layer_pack(size, quads, quad_count, 0, rects, order));
-    glGenTextures(1, &atlas);
-    glBindTexture(GL_TEXTURE_2D, atlas);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, ATLAS, ATLAS, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    for (i = 0; i < quad_count; i++)
-        glTexSubImage2D(GL_TEXTURE_2D, 0, (GLint)quads[i].x, (GLint)quads[i].y,
-                        (GLsizei)quads[i].texels.width, (GLsizei)quads[i].texels.height, GL_RGBA,
-                        GL_UNSIGNED_BYTE, quad_texels[i]);
-    for (i = 0; i < count; i++)
-        room += 8 * (size_t)(pictures[i].vertices ? pictures[i].vertex_count
-                                                  : 6 * pictures[i].quad_count);
-    vertices = (float *)memory(room * sizeof *vertices);
-    for (i = 0; i < count; i++) {
-        picture *p = &pictures[i];
-        p->first = (GLint)(flat_count / 8);
-        for (q = p->first_quad; !p->vertices && q < p->first_quad + p->quad_count; q++) {
-            static const int order_of[6] = { 0, 1, 2, 0, 2, 3 };
-            float xyz[12], st[8], closer;
-            need(terrimp_layer_corners(&p->layers, &p->capture, &quads[q], size, xyz, st));
-            closer = terrimp_layer_border(&p->layers, quads[q].layer)
-                     / terrimp_layer_depth(&p->layers, quads[q].layer);
-            for (v = 0; v < 6; v++) {
-                float *out = vertices + flat_count;
-                const float *at = xyz + 3 * order_of[v];
-                memcpy(out, at, 12), memcpy(out + 3, st + 2 * order_of[v], 8);
-                for (k = 0; k < 3; k++)
-                    out[5 + k] = p->capture.eye[k] + closer * (at[k] - p->capture.eye[k]);
-                flat_count += 8;
-            }
-        }
-        for (v = 0; v < p->vertex_count; v++) {
-            const terrimp_layer_quad *s = &quads[p->sheets[v / 3]];
-            float *out = vertices + flat_count;
-            need(terrimp_depth_points(&p->layers, &p->capture, &p->vertices[v], 1, out));
-            out[3] = ((float)s->x + p->vertices[v].u - (float)s->texels.x) / ATLAS;
-            out[4] = ((float)s->y + p->vertices[v].v - (float)s->texels.y) / ATLAS;
-            for (k = 0; k < 3; k++)
-                out[5 + k] = p->capture.eye[k] + 0.995f * (out[k] - p->capture.eye[k]);
-            flat_count += 8;
-        }
-        p->count = (GLsizei)(flat_count / 8) - p->first;
-    }
-    flat_array = array_of(&flat_vertices, vertices, flat_count * sizeof *vertices);
-    gl_point(0, 3, GL_FLOAT, 32, 0), gl_point(1, 2, GL_FLOAT, 32, 12);
-    gl_point(2, 3, GL_FLOAT, 32, 20);
-    free(vertices), free(rects), free(order);
+    p->made.as_mesh = is_town(p->cluster);
+    need(plan(p->cluster, p->square, p->made.as_mesh, &p->made));
+    need(gl_layers_record(&atlas, &p->made, draw_slab, p));
 }
 
 /* ---- Frames ------------------------------------------------------------- */
@@ -691,8 +437,7 @@ static uint32_t draw_frame(const context *frame, const terrimp_place_desc *d, in
     glBindVertexArray(ground_array);
     glVertexAttrib4f(2, 0, 0, 0, 1), glVertexAttrib1f(3, 0);
     glDrawArrays(GL_TRIANGLES, 0, 3 * GROUND);
-    set_matrix(&flat, view, projection);
-    glBindVertexArray(flat_array);
+    set_matrix(&atlas.program, view, projection);
     for (i = 0; with_pictures && i < d->candidate_count; i++)
         for (g = 0; g < candidates[i].gain_count; g++) {
             uint32_t k, gain = candidates[i].first_gain + g;
@@ -702,8 +447,8 @@ static uint32_t draw_frame(const context *frame, const terrimp_place_desc *d, in
                 done[k] |= (uint8_t)within(k, candidates[i].cluster);
             if (terrimp_frustum_test(&frustum, &boxes[candidates[i].cluster], 63) < 0)
                 continue;
-            glDrawArrays(GL_TRIANGLES, pictures[i].first, pictures[i].count);
-            sum += (uint32_t)pictures[i].count / 3;
+            gl_layers_draw(&atlas, &pictures[i].made);
+            sum += (uint32_t)pictures[i].made.count / 3;
         }
     set_matrix(&things, view, projection);
     for (i = 0; i < PLOTS; i++)
@@ -747,15 +492,14 @@ int main(int argc, char **argv)
            "%u of %u pictures placed in %.1f ms; of %d stretches %u over budget without, %u with\n",
            PLOTS, triangles[CLUSTERS - 1], (double)costs[0], (double)budget, placed.chosen, count,
            now() - start, CELLS, placed.problems, placed.unsolved);
-    make_framebuffer();
     start = now();
     for (i = 0; i < count; i++)
         if (memchr(shown + candidates[i].first_gain, 1, candidates[i].gain_count))
             make_picture(&pictures[i]);
-    pack_atlas(count);
+    need(gl_layers_pack(&atlas, ATLAS));
     printf("made in %.1f s: %u quads, %zu triangles, %.1f MB of texels (%.1f estimated in all)\n",
-           1e-3 * (now() - start), quad_count, flat_count / 24, (double)texels_kept * 4e-6,
-           1e-6 * (double)placed.memory);
+           1e-3 * (now() - start), atlas.part_count, (size_t)atlas.vertex_count / 3,
+           (double)atlas.texel_count * 4e-6, 1e-6 * (double)placed.memory);
     for (n = 0; n < FRAMES; n++) {
         double before, after;
         uint32_t cost, all;
@@ -787,6 +531,7 @@ int main(int argc, char **argv)
            "dB, %zu holes\n", ms, full_ms / judged, full_ms / judged / ms, most, worst, holes);
     n = image_write_beside(argv[0], "town.png", ours, WIDTH, HEIGHT)
         || image_write_beside(argv[0], "town_full.png", full, WIDTH, HEIGHT);
+    gl_layers_close(&atlas);
     context_close(&frame);
     free(samples);
     return n || holes > 10 || (float)most > budget;

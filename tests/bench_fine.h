@@ -21,18 +21,7 @@ static void fine_open(fine *f, const context *frame)
     f->frame.reading = need_memory((size_t)f->frame.width * (size_t)f->frame.height * 4);
     f->large = need_memory((size_t)f->frame.width * (size_t)f->frame.height * 3);
     f->picture = need_memory((size_t)SCENE_PIXELS * 3);
-    glGenFramebuffers(1, &f->frame.framebuffer);
-    glBindFramebuffer(GL_FRAMEBUFFER, f->frame.framebuffer);
-    glGenRenderbuffers(1, &f->frame.colour);
-    glBindRenderbuffer(GL_RENDERBUFFER, f->frame.colour);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, f->frame.width, f->frame.height);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
-                              f->frame.colour);
-    glGenRenderbuffers(1, &f->frame.depth);
-    glBindRenderbuffer(GL_RENDERBUFFER, f->frame.depth);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, f->frame.width, f->frame.height);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, f->frame.depth);
-    if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+    if (context_make_frame(&f->frame))
         bench_stop("the supersampled reference", "its framebuffer is not complete");
 }
 
@@ -60,10 +49,7 @@ static void fine_draw(fine *f, look *l, gl_terrain *gl, terrimp_view *full,
 
 static void fine_close(fine *f)
 {
-    glDeleteFramebuffers(1, &f->frame.framebuffer);
-    glDeleteRenderbuffers(1, &f->frame.colour);
-    glDeleteRenderbuffers(1, &f->frame.depth);
-    free(f->frame.reading);
+    context_close(&f->frame);
     free(f->large);
     free(f->picture);
 }

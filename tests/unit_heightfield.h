@@ -219,6 +219,12 @@ static void hf_nan_is_a_void_only_with_has_no_data(void)
     CHECK(terrimp_heightfield_read(&field, 271, 1, 1, 1, 1, &height) == TERRIMP_E_VOID);
     CHECK(terrimp_heightfield_bounds(&field, 0, 0, 300, 2, &low, &high) == TERRIMP_OK);
     CHECK(low == 0.0f && high == 0.0f);
+    x = z = 0;
+    samples[1] = 1.0f;
+    samples[571] = field.no_data = 0.5f; /* a void need not be beyond the other samples */
+    CHECK(terrimp_heightfield_validate(&field, &x, &z) == TERRIMP_E_VOID && x == 271 && z == 1);
+    CHECK(terrimp_heightfield_bounds(&field, 0, 0, 300, 2, &low, &high) == TERRIMP_OK);
+    CHECK(low == 0.0f && high == 1.0f);
     samples[571] = FLT_MAX; /* a sample may be finite and its height not */
     field.height_scale = 2.0f;
     CHECK(terrimp_heightfield_validate(&field, &x, &z) == TERRIMP_E_NOT_FINITE);
@@ -291,12 +297,12 @@ static void hf_bounds_are_exact_and_skip_voids(void)
 {
     int round;
 
-    for (round = 0; round < 300; ++round) {
+    for (round = 0; round < 600; ++round) {
         hf_field f;
         float low, high, least = FLT_MAX, most = -FLT_MAX;
         uint32_t x, z, cols = random_range(1, 30), rows = random_range(1, 30), i, j;
         hf_random(&f, random_range(2, 24), random_range(2, 24));
-        f.view.has_no_data = 1;
+        f.view.has_no_data = round % 2; /* else what stands for a void is a height */
         f.view.no_data = 253.0f;
         for (i = 0; i < 40; ++i)
             hf_set(&f, random_range(0, f.view.width - 1), random_range(0, f.view.depth - 1),
@@ -305,7 +311,7 @@ static void hf_bounds_are_exact_and_skip_voids(void)
         z = random_range(0, f.view.depth - 1);
         for (j = z; j < f.view.depth && j < z + rows; ++j)
             for (i = x; i < f.view.width && i < x + cols; ++i)
-                if (hf_get(&f, i, j) != 253.0f) {
+                if (!f.view.has_no_data || hf_get(&f, i, j) != 253.0f) {
                     least = fminf(least, hf_height(&f, i, j));
                     most = fmaxf(most, hf_height(&f, i, j));
                 }

@@ -346,16 +346,27 @@ static int cull_hidden(int k, float x, float y, float fx, float fy)
     return 0;
 }
 
-/* The same from all of 9 x 9 eyes, for 3 x 3 points of a texel. */
+/* The same from all of 9 x 9 eyes, for 3 x 3 points of a texel. Along an axis that is 27 pairs of
+   an eye's shift of e / 4 - 1 and a point at (2 p + 1) / 6 of the texel; how many texels away each
+   one looks through what is some layers closer is the same for all texels. */
 static int cull_truly_hidden(int k, int x, int y)
 {
-    int e, p;
-    for (e = 0; e < 81; e++)
-        for (p = 0; p < 9; p++)
-            if (!cull_hidden(k, (float)x + ((float)(p % 3) + 0.5f) / 3.0f,
-                             (float)y + ((float)(p / 3) + 0.5f) / 3.0f,
-                             (float)(e % 9) / 4.0f - 1.0f, (float)(e / 9) / 4.0f - 1.0f))
+    static int away[27][CULL_LAYERS];
+    int i, j, closer, pair;
+    for (pair = 0; away[26][1] == 0 && pair < 27; pair++) /* the last one looks a texel on */
+        for (closer = 0; closer < CULL_LAYERS; closer++)
+            away[pair][closer] = (120 + 4 * (pair % 3) + 2 + closer * 3 * (pair / 3 - 4)) / 12 - 10;
+    for (j = 0; j < 27; j++)
+        for (i = 0; i < 27; i++) {
+            int hidden = 0;
+            for (closer = 1; closer <= k && !hidden; closer++) {
+                int u = x + away[i][closer], v = y + away[j][closer];
+                hidden = u >= 0 && v >= 0 && u < CULL_SIDE_X && v < CULL_SIDE_Y &&
+                         mask_at(cull_opaque[k - closer], CULL_SIDE_X, u, v);
+            }
+            if (!hidden)
                 return 0;
+        }
     return 1;
 }
 

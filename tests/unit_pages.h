@@ -15,7 +15,7 @@
 
 /* A land, its pages as a file in memory, and the terrain that is opened from them. */
 typedef struct paged_land {
-    land l;
+    land l; /* its terrain in memory is built (land_build) where pages are compared with it */
     terrimp_pages_desc desc;
     terrimp_pages_info info;
     uint32_t block_count;
@@ -83,8 +83,8 @@ static terrimp_result paged_build_end(paged_land *p)
     return terrimp_pages_build_end(&p->desc, p->scratch, p->scratch_bytes);
 }
 
-/* A land in memory, and room for its pages. */
-static int paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int format,
+/* A land's samples, and room for its pages. */
+static void paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int format,
                          land_shape shape, uint32_t chunk_quads, uint32_t block_level)
 {
     terrimp_pages_desc resolved;
@@ -110,7 +110,6 @@ static int paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int form
     p->scratch_bytes = terrimp_pages_scratch_bytes(&p->desc);
     CHECK(p->scratch_bytes > 0);
     p->scratch = malloc(p->scratch_bytes);
-    return land_build(&p->l);
 }
 
 static int paged_build(paged_land *p)
@@ -120,7 +119,9 @@ static int paged_build(paged_land *p)
         CHECK(paged_build_block(p, block) == TERRIMP_OK);
     CHECK(paged_build_end(p) == TERRIMP_OK);
     CHECK(terrimp_pages_check(p->file, p->bytes, &p->info) == TERRIMP_OK);
-    CHECK(p->info.bytes == p->bytes && p->info.node_count == p->l.info.node_count);
+    CHECK(p->info.bytes == p->bytes);
+    CHECK(!p->l.terrain || p->info.node_count == p->l.info.node_count);
+    p->l.info.node_count = p->info.node_count;
     return check_bad == 0;
 }
 
@@ -247,8 +248,9 @@ static void pages_say_what_memory_does(void)
         uint32_t block_level = turn % 3u, chunk = turn % 2u ? 16u : 8u;
         if (turn % 4u == 1u)
             width = depth = 257u;
-        if (paged_prepare(&p, width, depth, formats[turn % 4u], turn % 5u ? LAND_HILLS : LAND_NOISE,
-                          chunk, block_level) && paged_build(&p)) {
+        paged_prepare(&p, width, depth, formats[turn % 4u], turn % 5u ? LAND_HILLS : LAND_NOISE,
+                      chunk, block_level);
+        if (land_build(&p.l) && paged_build(&p)) {
             if (paged_open(&p, p.l.info.node_count + 8u)) {
                 paged_fetch_all(&p);
                 check_pages_say_the_same(&p, block_level ? block_level : UINT32_MAX);
@@ -267,8 +269,9 @@ static void pages_are_built_in_any_order(void)
         paged_land p;
         unsigned char *file;
         uint32_t i, block, left;
-        if (!paged_prepare(&p, 8u * random_range(8, 22), random_range(50, 150), TERRIMP_FORMAT_S16,
-                           LAND_HILLS, 8, 2) || !paged_build(&p)) {
+        paged_prepare(&p, 8u * random_range(8, 22), random_range(50, 150), TERRIMP_FORMAT_S16,
+                      LAND_HILLS, 8, 2);
+        if (!paged_build(&p)) {
             paged_free(&p);
             continue;
         }
@@ -311,8 +314,8 @@ static void pages_are_edited(void)
         terrimp_rect edit;
         terrimp_page_info info;
         void *page;
-        if (!paged_prepare(&p, width, depth, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2) ||
-            !paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
+        paged_prepare(&p, width, depth, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2);
+        if (!land_build(&p.l) || !paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
             return;
         paged_fetch_all(&p);
         old = (unsigned char *)malloc(p.bytes);
@@ -365,10 +368,10 @@ static void pages_that_are_no_good_are_refused(void)
     uint32_t turn, node, root;
     void *page;
     terrimp_page_info info;
-    if (!paged_prepare(&p, 150, 130, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2) || !paged_build(&p) ||
-        !paged_open(&p, 40) || !paged_prepare(&other, 150, 130, TERRIMP_FORMAT_U16, LAND_NOISE, 8,
-                                              2))
+    paged_prepare(&p, 150, 130, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2);
+    if (!paged_build(&p) || !paged_open(&p, 40))
         return;
+    paged_prepare(&other, 150, 130, TERRIMP_FORMAT_U16, LAND_NOISE, 8, 2);
     other.desc.stamp = 8;
     paged_build(&other);
     root = p.l.info.node_count - 1u;
@@ -503,8 +506,8 @@ static void pages_are_closed_upwards(void)
     uint32_t turn, node, count, state[4] = {0, 0, 0, 0}, coming[64], full = 0, frame = 0, given = 0;
     paged_past *past;
     void *page;
-    if (!paged_prepare(&p, 200, 170, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
-        !paged_open(&p, 24))
+    paged_prepare(&p, 200, 170, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0);
+    if (!paged_build(&p) || !paged_open(&p, 24))
         return;
     past = (paged_past *)calloc(p.l.info.node_count, sizeof *past);
     for (turn = 0; turn < 3000u; turn++) {
@@ -529,15 +532,13 @@ static void pages_are_closed_upwards(void)
         remember_pages(&p, past);
         memset(state, 0, sizeof state);
         for (node = 0; node < p.l.info.node_count; node++) {
-            terrimp_page_info info, above;
-            CHECK(terrimp_page_get_info(p.opened, node, &info) == TERRIMP_OK);
-            state[info.state]++;
-            if (info.state == TERRIMP_PAGE_ABSENT || node + 1u == p.l.info.node_count)
+            terrimp_page_info info;
+            state[past[node].state]++;
+            if (past[node].state == TERRIMP_PAGE_ABSENT || node + 1u == p.l.info.node_count)
                 continue;
-            CHECK(terrimp_page_get_info(
-                      p.opened, terrimpi_tree_parent_number(&p.opened->tree, node), &above) ==
-                  TERRIMP_OK);
-            CHECK(above.state == TERRIMP_PAGE_HERE && info.slot < 24u);
+            CHECK(past[terrimpi_tree_parent_number(&p.opened->tree, node)].state ==
+                  TERRIMP_PAGE_HERE);
+            CHECK(terrimp_page_get_info(p.opened, node, &info) == TERRIMP_OK && info.slot < 24u);
         }
         CHECK(state[TERRIMP_PAGE_HERE] + state[TERRIMP_PAGE_COMING] <= 24u);
     }
@@ -564,8 +565,8 @@ static void pages_answer_heights_and_rays(void)
 {
     paged_land p;
     uint32_t turn, level;
-    if (!paged_prepare(&p, 201, 161, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 0) || !paged_build(&p) ||
-        !paged_open(&p, 2000))
+    paged_prepare(&p, 201, 161, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 0);
+    if (!paged_build(&p) || !paged_open(&p, 2000))
         return;
     for (turn = 0; turn < 4000u; turn++) {
         float x = random_float(0.0f, 200.0f), z = random_float(0.0f, 160.0f), h, exact;
@@ -624,8 +625,8 @@ static void bad_pages(void)
     uint16_t index;
     uint32_t level;
     size_t bytes;
-    if (!paged_prepare(&p, 60, 50, TERRIMP_FORMAT_U8, LAND_HILLS, 8, 0) || !paged_build(&p) ||
-        !paged_open(&p, 8))
+    paged_prepare(&p, 60, 50, TERRIMP_FORMAT_U8, LAND_HILLS, 8, 0);
+    if (!land_build(&p.l) || !paged_build(&p) || !paged_open(&p, 8))
         return;
     bytes = terrimp_pages_bytes(p.file, p.bytes, 8);
     REFUSES(TERRIMP_E_PAGE, box, terrimp_terrain_get_box(p.opened, 0, &box));
@@ -863,10 +864,10 @@ static terrimp_camera paged_camera(const land *l, uint32_t turn)
 static paged_land *paged_wide(void)
 {
     static paged_land p;
-    if (!p.file)
-        CHECK(paged_prepare(&p, PAGED_SIDE, PAGED_SIDE, TERRIMP_FORMAT_U16, LAND_HILLS, PAGED_CHUNK,
-                            0) &&
-              paged_build(&p));
+    if (!p.file) {
+        paged_prepare(&p, PAGED_SIDE, PAGED_SIDE, TERRIMP_FORMAT_U16, LAND_HILLS, PAGED_CHUNK, 0);
+        CHECK(land_build(&p.l) && paged_build(&p));
+    }
     check_state = CHECK_SEED;
     return &p;
 }
@@ -1017,12 +1018,11 @@ static void pages_morph_as_memory_does(void)
         terrimp_view_desc desc;
         uint32_t node, count, morphs = 0, i;
         float ratio = turn == 1u ? 2.0f : random_float(1.1f, 2.0f);
-        if (!paged_prepare(&p, turn ? random_range(120, 200) : 257u,
-                           turn ? random_range(120, 200) : 257u, TERRIMP_FORMAT_U16,
-                           turn == 1u ? LAND_NOISE : LAND_HILLS, 8, turn < 2u ? 0u : 2u))
-            return;
+        paged_prepare(&p, turn ? random_range(120, 200) : 257u,
+                      turn ? random_range(120, 200) : 257u, TERRIMP_FORMAT_U16,
+                      turn == 1u ? LAND_NOISE : LAND_HILLS, 8, turn < 2u ? 0u : 2u);
         p.desc.morph_ratio = ratio;
-        if (!paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
+        if (!land_build(&p.l) || !paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))
             return;
         CHECK(fabsf(p.info.morph_ratio - ratio) < 1e-6f);
         memset(&desc, 0, sizeof desc);

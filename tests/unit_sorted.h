@@ -33,16 +33,18 @@ static uint32_t sorted_count; /* of the squares of the frame that was made last 
 /* Hills of many sizes that repeat every 512 samples: first and last column and row are equal. */
 static void sorted_make_hills(float height)
 {
-    int x, z, k;
+    static float shape[SORTED_SIDE][SORTED_SIDE]; /* all zero: not made yet */
+    int x, z, k, made = shape[1][1] != 0.0f;
     for (z = 0; z < SORTED_SIDE; z++)
         for (x = 0; x < SORTED_SIDE; x++) {
-            float h = 0.0f;
-            for (k = 1; k <= 128; k *= 2) {
+            for (k = 1; k <= 128 && !made; k *= 2) {
                 float a = (float)(x % 512 * k) * (6.2831853f / 512.0f);
                 float b = (float)(z % 512 * (k * 2 + 1) % 512) * (6.2831853f / 512.0f);
-                h += sinf(a + 1.3f * (float)k + sinf(b)) * sinf(b + 0.7f * (float)k) / (float)k;
+                shape[z][x] +=
+                    sinf(a + 1.3f * (float)k + sinf(b)) * sinf(b + 0.7f * (float)k) / (float)k;
             }
-            sorted_heights[z * SORTED_SIDE + x] = (sorted_sample)(height * h * SORTED_STEPS);
+            sorted_heights[z * SORTED_SIDE + x] =
+                (sorted_sample)(height * shape[z][x] * SORTED_STEPS);
         }
 }
 
@@ -360,7 +362,7 @@ typedef struct order_host {
     uint8_t patterns[160][160];
     order_picture screen, capture;
     const order_picture *target; /* NULL: of a capture that is not looked at */
-    int commands_only;    /* no picture is looked at */
+    int commands_only;    /* no picture is looked at, nor what vertices are filled with */
     float xyz[3 * 129 * 129];
     terrimp_geomip_vertex morph[129 * 129];
     uint16_t indices[6 * 129 * 129], scratch[4096];
@@ -457,6 +459,13 @@ static int order_misfits(const order_host *h)
     return count;
 }
 
+static void order_fill_ground(order_host *h, uint32_t node)
+{
+    uint32_t count = h->l->info.ground_vertex_count;
+    CHECK(terrimp_terrain_fill_ground(h->l->terrain, node, h->xyz, 3u * count) == TERRIMP_OK);
+    CHECK(terrimp_terrain_fill_morph(h->l->terrain, node, h->morph, count) == TERRIMP_OK);
+}
+
 static void order_draw_ground(void *user, const terrimp_ground_command *c)
 {
     order_host *h = (order_host *)user;
@@ -473,8 +482,8 @@ static void order_draw_ground(void *user, const terrimp_ground_command *c)
     draw.morph = c->morph;
     memcpy(draw.side, c->side, sizeof draw.side);
     memcpy(draw.side_coarse, c->side_coarse, sizeof draw.side_coarse);
-    CHECK(terrimp_terrain_fill_ground(h->l->terrain, c->node, h->xyz, 3u * vertices) == TERRIMP_OK);
-    CHECK(terrimp_terrain_fill_morph(h->l->terrain, c->node, h->morph, vertices) == TERRIMP_OK);
+    if (!h->commands_only)
+        order_fill_ground(h, c->node);
     CHECK(terrimp_geomip_morph(h->l->info.chunk_quads, &draw, h->morph, h->xyz + 1, 3) ==
           TERRIMP_OK);
     eye = order_move(h, c->offset, h->xyz, vertices);
@@ -814,6 +823,8 @@ static void views_that_wrap_repeat_after_a_period(void)
             h[k].hash = 1u;
             h[k].periods = 5 * k;
             h[k].commands_only = 1;
+            for (i = 0; i < (int)one.info.node_count; i++)
+                order_fill_ground(&h[k], (uint32_t)i);
         }
         for (i = 0; i < 120; i++) {
             for (k = 0; k < 2; k++) {
@@ -912,16 +923,16 @@ static void views_keep_to_their_cost(void)
 {
     static land l;
     int mode, turn;
-    for (turn = 0; turn < 2; turn++)
+    for (turn = 0; turn < 2; turn++) {
+        land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
+        l.desc.field.height_scale = 0.125f;
+        l.desc.chunk_quads = turn ? 8 : 16;
+        if (!land_build(&l))
+            return;
         for (mode = TERRIMP_MODE_GEOMIP; mode <= TERRIMP_MODE_AUTO; mode += 2) {
             terrimp_view_desc d;
             float median, mean, most, least, limited, free_ratio, ratio;
             int rests;
-            land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
-            l.desc.field.height_scale = 0.125f;
-            l.desc.chunk_quads = turn ? 8 : 16;
-            if (!land_build(&l))
-                return;
             memset(&d, 0, sizeof d);
             d.mode = mode;
             d.ground_tolerance_px = 0.25f;
@@ -936,8 +947,9 @@ static void views_keep_to_their_cost(void)
             else
                 CHECK(ratio <= 1.2f && most <= 1.05f * d.max_cost && rests);
             CHECK(median > d.max_cost * 0.5f && least > 0.8f * d.max_cost);
-            land_free(&l);
         }
+        land_free(&l);
+    }
 }
 
 static void views_without_end_or_of_a_cost_refuse_bad_input(void)
@@ -1993,7 +2005,7 @@ static void sorted_refuses_bad_input(void)
     CHECK(terrimp_sorted_next(NULL, &square, 1) == 0);
     memset(&s, 1, sizeof s);
     untouched = s;
-    for (i = 0; i < 24; i++) {
+    for (i = 0; i < 25; i++) {
         terrimp_result wanted = TERRIMP_E_RANGE;
         bad = good;
         switch (i) {
@@ -2020,6 +2032,9 @@ static void sorted_refuses_bad_input(void)
         case 20: bad.texels_per_px = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
         case 21: bad.field.samples = NULL, wanted = TERRIMP_E_NULL; break;
         case 22: bad.field.origin_x = not_a_number(), wanted = TERRIMP_E_NOT_FINITE; break;
+        case 23: bad.field.no_data = (float)sorted_heights[1000], bad.field.has_no_data = 1;
+                 wanted = TERRIMP_E_VOID;
+                 break;
         default: bad.field.wrap = 0, bad.field.width = bad.field.depth = 2;
                  bad.field.samples = no_height, no_height[3] = not_a_number();
                  wanted = TERRIMP_E_NOT_FINITE;

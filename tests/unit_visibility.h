@@ -668,7 +668,7 @@ static void views_leave_out_what_is_hidden(void)
             visible_make(&s, 129, 129, 8);
             desc.field = s.tree.field;
             desc.chunk_quads = 8;
-            desc.triangle_budget = 40; /* no mesh is drawn */
+            desc.triangle_budget = 128; /* no mesh is drawn */
             CHECK(terrimp_terrain_create(&desc, NULL, &terrain) == TERRIMP_OK);
             CHECK(terrimp_walls_build(terrimp_terrain_tree(terrain), NULL, s.walls) == TERRIMP_OK);
         }

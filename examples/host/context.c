@@ -171,7 +171,7 @@ static GLuint attach_renderbuffer(GLenum attachment, GLenum format, int width, i
     return buffer;
 }
 
-static const char *make_framebuffer(context *c)
+const char *context_make_frame(context *c)
 {
     GLint limit = 0;
     glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &limit);
@@ -196,7 +196,7 @@ static const char *open_context(context *c, int width, int height, int old)
         return "the frame needs at least one pixel";
     trouble = system_open(&c->system, old ? width : 4, old ? height : 4, old);
     if (!trouble && !old)
-        trouble = make_framebuffer(c);
+        trouble = context_make_frame(c);
     if (!trouble)
         c->reading = malloc((size_t)width * (size_t)height * 4u);
     if (!trouble && !c->reading)
@@ -227,12 +227,13 @@ const char *context_renderer(void)
 
 void context_close(context *c)
 {
-    if (c->system) {
+    if (c->framebuffer) {
         glDeleteFramebuffers(1, &c->framebuffer);
         glDeleteRenderbuffers(1, &c->colour);
         glDeleteRenderbuffers(1, &c->depth);
-        system_close(c->system);
     }
+    if (c->system)
+        system_close(c->system);
     free(c->reading);
     memset(c, 0, sizeof *c);
 }

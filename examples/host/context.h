@@ -26,6 +26,10 @@ const char *context_open(context *c, int width, int height);
    8 bits of alpha and 24 of depth. */
 const char *context_open_old(context *c, int width, int height);
 
+/* Makes and binds the framebuffer of a frame whose width and height are set, beside that of
+   context_open and in its context. Returns null, or one line that says what is wrong. */
+const char *context_make_frame(context *c);
+
 /* Draw calls go to the frame again (after a capture); the viewport is all of it. */
 void context_bind(const context *c);
 

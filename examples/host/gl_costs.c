@@ -180,16 +180,11 @@ static void make_grid(bench *b)
         }
     for (k = 0; k < 6; k++)
         list[i][k] = (uint16_t)whole[k];
-    glGenVertexArrays(1, &b->array);
-    glBindVertexArray(b->array);
-    glGenBuffers(1, &b->vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, b->vertices);
-    glBufferData(GL_ARRAY_BUFFER, sizeof xyz, xyz, GL_STATIC_DRAW);
+    b->array = gl_array_make(&b->vertices, xyz, sizeof xyz);
     glGenBuffers(1, &b->indices);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, b->indices);
     glBufferData(GL_ELEMENT_ARRAY_BUFFER, sizeof list, list, GL_STATIC_DRAW);
-    glEnableVertexAttribArray(0);
-    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
+    gl_point(0, 3, GL_FLOAT, 0, 0);
 }
 
 static GLuint make_texture(const uint8_t *rgba, GLint smaller)

@@ -219,6 +219,17 @@ static gl_program make_shaded(const gl_terrain *g, const char *vertex_source,
     return p;
 }
 
+GLuint gl_array_make(GLuint *buffer, const void *data, size_t bytes)
+{
+    GLuint array;
+    glGenVertexArrays(1, &array);
+    glBindVertexArray(array);
+    glGenBuffers(1, buffer);
+    glBindBuffer(GL_ARRAY_BUFFER, *buffer);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, GL_STATIC_DRAW);
+    return array;
+}
+
 void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset)
 {
     glEnableVertexAttribArray(location);
@@ -262,12 +273,7 @@ static void make_buffers(gl_pool *p, size_t vertices, size_t indices)
 {
     vertices += (size_t)p->slot_count * p->node_vertices;
     indices += (size_t)p->slot_count * p->node_indices;
-    glGenVertexArrays(1, &p->array);
-    glBindVertexArray(p->array);
-    glGenBuffers(1, &p->vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(vertices * 3 * sizeof(float)), NULL,
-                 GL_STATIC_DRAW);
+    p->array = gl_array_make(&p->vertices, NULL, vertices * 3 * sizeof(float));
     glGenBuffers(1, &p->indices);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, p->indices);
     glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(indices * sizeof(uint16_t)), NULL,

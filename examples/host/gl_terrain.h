@@ -42,6 +42,9 @@ void gl_program_use(const gl_program *p, const float matrix[16], const float eye
 /* That matrix, column-major: of the view only the turn is left. */
 void gl_relative_matrix(const float view[16], const float projection[16], float out[16]);
 
+/* Makes and binds a vertex array and a buffer of vertices; NULL: only room for them. */
+GLuint gl_array_make(GLuint *buffer, const void *data, size_t bytes);
+
 /* Enables an attribute of the bound vertex array and points it into the bound buffer. */
 void gl_point(GLuint location, GLint size, GLenum type, size_t stride, size_t offset);
 

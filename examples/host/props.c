@@ -107,12 +107,7 @@ const char *props_open(props *p, const terrimp_heightfield *field, uint32_t hous
     }
     out = add_sea(out, field);
     p->program = gl_program_make(prop_vertex, prop_fragment);
-    glGenVertexArrays(1, &p->array);
-    glBindVertexArray(p->array);
-    glGenBuffers(1, &p->vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, p->vertices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((char *)out - (char *)vertices), vertices,
-                 GL_STATIC_DRAW);
+    p->array = gl_array_make(&p->vertices, vertices, (size_t)((char *)out - (char *)vertices));
     gl_point(0, 3, GL_FLOAT, FLOATS * sizeof(float), 0);
     gl_point(1, 3, GL_FLOAT, FLOATS * sizeof(float), 3 * sizeof(float));
     free(vertices);

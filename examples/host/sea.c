@@ -38,11 +38,7 @@ const char *sea_open(sea *s, const terrimp_box *box, float height)
         return "a shader does not compile";
     glUseProgram(s->program.id);
     glUniform3f(glGetUniformLocation(s->program.id, "light"), 1.0f, 1.0f, 1.0f);
-    glGenVertexArrays(1, &s->array);
-    glBindVertexArray(s->array);
-    glGenBuffers(1, &s->vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, s->vertices);
-    glBufferData(GL_ARRAY_BUFFER, sizeof xyz, xyz, GL_STATIC_DRAW);
+    s->array = gl_array_make(&s->vertices, xyz, sizeof xyz);
     gl_point(0, 3, GL_FLOAT, 0, 0);
     return NULL;
 }

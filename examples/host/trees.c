@@ -155,13 +155,8 @@ static void make_buffers(trees *t, const float *sorted)
         make_house(xyz);
     else
         make_tree(xyz);
-    glGenVertexArrays(1, &t->array);
-    glBindVertexArray(t->array);
-    glGenBuffers(1, &t->vertices);
-    glBindBuffer(GL_ARRAY_BUFFER, t->vertices);
-    glBufferData(GL_ARRAY_BUFFER, sizeof xyz, xyz, GL_STATIC_DRAW);
-    glEnableVertexAttribArray(0);
-    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
+    t->array = gl_array_make(&t->vertices, xyz, sizeof xyz);
+    gl_point(0, 3, GL_FLOAT, 0, 0);
     glGenBuffers(1, &t->instances);
     glBindBuffer(GL_ARRAY_BUFFER, t->instances);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)count * TREE_FLOATS * sizeof *sorted),
