@@ -179,8 +179,10 @@ static void build_town(uint32_t trees)
         build_plot(i, trees, &count);
     for (side = 8; side; base += side * side, side /= 2)
         for (i = 0; i < side * side; i++) {
-            uint32_t up = base + side * side + i / side / 2 * (side / 2) + i % side / 2;
-            parents[base + i] = side > 1 ? up : base;
+            /* The root is its own parent. */
+            uint32_t up = side > 1 ? base + side * side + i / side / 2 * (side / 2) + i % side / 2
+                                   : base;
+            parents[base + i] = up;
             for (k = 0; side > 1 && k < 3; k++) {
                 boxes[up].min[k] = fminf(boxes[up].min[k], boxes[base + i].min[k]);
                 boxes[up].max[k] = fmaxf(boxes[up].max[k], boxes[base + i].max[k]);
