@@ -1,7 +1,7 @@
 /* Laws of numbers: units, and eyes at the ends of the world. */
 
 typedef struct numbers_seen {
-    uint32_t hash, captures, infinite;
+    uint32_t hash, captures, impostors, infinite;
 } numbers_seen;
 
 static void numbers_mix(numbers_seen *seen, uint32_t value)
@@ -23,6 +23,7 @@ static void numbers_begin(void *user, const terrimp_capture_command *c)
     numbers_mix(seen, c->node);
     numbers_mix(seen, c->slot.x);
     numbers_mix(seen, c->slot.width);
+    numbers_mix(seen, c->slot.height);
     numbers_check(seen, c->view, 16);
     numbers_check(seen, c->projection, 16);
 }
@@ -36,8 +37,11 @@ static void numbers_impostor(void *user, const terrimp_impostor_command *c)
 {
     numbers_seen *seen = (numbers_seen *)user;
     numbers_mix(seen, c->node);
+    numbers_mix(seen, c->part);
     numbers_mix(seen, (uint32_t)(c->alpha * 65536.0f));
     numbers_check(seen, c->texture_matrix, 16);
+    numbers_check(seen, c->place_matrix, 16);
+    seen->impostors++;
 }
 
 static void numbers_ground(void *user, const terrimp_ground_command *c)
@@ -88,8 +92,9 @@ static uint16_t *numbers_samples(void)
     return samples;
 }
 
-/* A flight over a terrain whose samples are `unit` apart. */
-static uint32_t numbers_flight(const terrimp_terrain *t, int mode, float unit)
+/* A flight over a terrain whose samples are `unit` apart. Adds to what is made and drawn. */
+static uint32_t numbers_flight(const terrimp_terrain *t, int mode, float unit, uint32_t *captures,
+                               uint32_t *impostors)
 {
     terrimp_view_desc d;
     terrimp_view *view;
@@ -99,6 +104,7 @@ static uint32_t numbers_flight(const terrimp_terrain *t, int mode, float unit)
     memset(&d, 0, sizeof d);
     d.mode = mode;
     d.costs.capture = 100.0f;
+    d.exact_depth = 1;
     CHECK(terrimp_view_create(t, &d, NULL, &view) == TERRIMP_OK);
     for (frame = 0; frame < 20; frame++) {
         terrimp_camera c;
@@ -117,6 +123,8 @@ static uint32_t numbers_flight(const terrimp_terrain *t, int mode, float unit)
         CHECK(terrimp_view_render(view, &all) == TERRIMP_OK);
     }
     CHECK(seen.infinite == 0 && (mode == TERRIMP_MODE_GEOMIP || seen.captures > 0));
+    *captures += seen.captures;
+    *impostors += seen.impostors;
     terrimp_view_destroy(view);
     return seen.hash;
 }
@@ -128,13 +136,15 @@ static void decisions_do_not_depend_on_the_unit_of_length(void)
     int mode, k;
     for (k = -60; k <= 40; k += 10) { /* first in units of 1 */
         float unit = k < -50 ? 1.0f : ldexpf(1.0f, k);
+        uint32_t captures = 0, impostors = 0;
         terrimp_terrain *t = numbers_terrain(samples, unit);
         for (mode = TERRIMP_MODE_GEOMIP; mode <= (int)TERRIMP_MODE_AUTO; mode++) {
-            uint32_t hash = numbers_flight(t, mode, unit);
+            uint32_t hash = numbers_flight(t, mode, unit, &captures, &impostors);
             if (k < -50)
                 wanted[mode] = hash;
             CHECK(hash == wanted[mode]);
         }
+        CHECK(captures > 20 && impostors > 100);
         terrimp_terrain_destroy(t);
     }
     free(samples);
@@ -146,10 +156,12 @@ static void eyes_at_the_end_of_the_world_get_finite_matrices(void)
     uint16_t *samples = numbers_samples();
     terrimp_terrain *t = numbers_terrain(samples, 1.0f);
     terrimp_view_desc d;
+    uint32_t captures = 0;
     float at;
     memset(&d, 0, sizeof d);
     d.mode = TERRIMP_MODE_IMPOSTOR;
-    for (at = 1e4f; at < 1e37f; at *= 10.0f) {
+    d.exact_depth = 1;
+    for (at = 1e3f; at < 1e38f; at *= 10.0f) {
         numbers_seen seen;
         terrimp_callbacks all = numbers_callbacks(&seen);
         terrimp_view *view;
@@ -169,8 +181,10 @@ static void eyes_at_the_end_of_the_world_get_finite_matrices(void)
         if (at <= 1e18f)
             CHECK(terrimp_view_render(view, &all) == TERRIMP_OK);
         CHECK(seen.infinite == 0);
+        captures += seen.captures;
         terrimp_view_destroy(view);
     }
+    CHECK(captures > 0);
     terrimp_terrain_destroy(t);
     free(samples);
 }
