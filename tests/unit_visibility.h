@@ -297,7 +297,7 @@ static terrimp_rect visible_edit(const visible_scene *s)
    and after its cells have been built anew. */
 static void visible_sets_hide_nothing_that_shows(void)
 {
-    uint32_t round, rounds = check_rounds(20, 400), hidden[3] = {0, 0, 0}, step, eye, cell;
+    uint32_t round, rounds = check_rounds(24, 400), hidden[3] = {0, 0, 0}, step, eye, cell;
     for (round = 0; round < rounds; round++) {
         visible_scene s;
         terrimp_sets sets;
@@ -312,7 +312,7 @@ static void visible_sets_hide_nothing_that_shows(void)
             for (cell = 0; step == 2; cell++)
                 if (terrimp_sets_build_cell(&sets, s.walls, cell, &edit) != TERRIMP_OK)
                     break;
-            for (eye = 0; eye < 30; eye++) {
+            for (eye = 0; eye < 50; eye++) {
                 terrimp_camera c = visible_camera(&s);
                 hidden[step] += visible_sets_hide(&s, &sets, &c);
             }
