@@ -1384,13 +1384,14 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
 /* Finds a slot for a node's page, in the place of the one that was of no use for longest.
 
    page        out: [bytes of the info] aligned to 8 bytes, to be filled, by any thread
-   Errors      E_STATE when it is here or coming, or its parent is not here: a page comes after its
-               parent's; E_CAPACITY when the frame uses all slots */
+   Errors      E_STATE when it is here or coming, or its parent is neither; E_CAPACITY when the
+               frame uses all slots */
 TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page);
 
 /* Looks at a page that has been filled, and takes it if it is good. Else its slot is free again.
 
-   Errors      E_STATE when it has not been begun; E_BAKE when it is damaged, or another node's, or
+   Errors      E_STATE when it has not been begun; E_PAGE when its parent's page is not here: it
+               stays, to be put again after that; E_BAKE when it is damaged, or another node's, or
                another file's
    Cost        O(samples), about 10 us */
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node);
@@ -1418,15 +1419,16 @@ typedef struct terrimp_want {
 } terrimp_want;
 
 /* The pages that the updates of this frame would have liked to have, those of all views, best
-   first, and no more than there are slots for. None of them is here or coming, and the parents of
-   all are here.
+   first, and no more than there are slots for. None of them is here or coming; the parents of all
+   are, or are listed before them.
 
    wants       [capacity] out
    count       out: how many */
 TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
                                                uint32_t capacity, uint32_t *count);
 
-/* Lists the pages that have been begun and that no view wanted in this frame and the one before.
+/* Lists the pages that have been begun and that no view wanted in this frame and the one before, or
+   whose parent's has failed.
 
    nodes       [capacity] out, by slot; count: how many there are, also when they are more */
 TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
@@ -4554,12 +4556,17 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 
 /* ---- what is kept of it ---- */
 
+#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
+#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
+
 /* A place for a page, see the room Residency. */
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
-    uint8_t is_here;    /* the page has come and is good */
-    uint8_t children;   /* nodes below that have a slot */
+    const unsigned char *page; /* NULL: it has not come, or it is no good */
+    uint8_t children;   /* nodes below that have a slot, */
+    uint8_t lacking;    /* ... and those whose pages are not here */
+    float record[TERRIMPI_PAGE_RECORD / sizeof(float)]; /* the page's own: what a frame looks at */
 } terrimpi_page_slot;
 
 struct terrimp_pages {
@@ -4572,6 +4579,7 @@ struct terrimp_pages {
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
     float morph_ratio;         /* of views, at most */
+    float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
@@ -4581,13 +4589,21 @@ struct terrimp_pages {
 struct terrimpi_mip_frame;
 struct terrimpi_mip_ground;
 
+/* Why a node is to be left for its children. */
+typedef struct terrimpi_page_need {
+    const terrimp_frustum *frustum;
+    const float *eye;
+    int reason;    /* terrimp_want_reason */
+    float urgency; /* square of its error over the limit. 0: what is missing is not wanted */
+} terrimpi_page_need;
+
 /* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
     int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
-                   const terrimp_frustum *frustum, int reason, float urgency);
+                   const struct terrimpi_page_need *need);
     uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
                        const float away[3]);
@@ -4597,22 +4613,34 @@ typedef struct terrimpi_page_calls {
     float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
 } terrimpi_page_calls;
 
-#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
-#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
-
 /* The page of a node, NULL when it is not here. */
 static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint32_t node)
 {
     uint32_t slot = p->slot_of[node];
-    return slot && p->slots[slot - 1u].is_here ? p->pages + (size_t)(slot - 1u) * p->page_bytes
-                                               : NULL;
+    return slot ? p->slots[slot - 1u].page : NULL;
+}
+
+/* Notes that a page is of use in this frame, if it is here or coming. */
+static void terrimpi_page_use(const struct terrimp_pages *p, uint32_t node)
+{
+    if (p->slot_of[node])
+        p->slots[p->slot_of[node] - 1u].used = p->frame;
+}
+
+/* The record of a node whose page or whose parent's is here; else NULL. */
+static const unsigned char *terrimpi_tree_record(const terrimp_quadtree *t, uint32_t number)
+{
+    uint32_t slot = t->pages->slot_of[number];
+    return slot && t->pages->slots[slot - 1u].page
+               ? (const unsigned char *)t->pages->slots[slot - 1u].record
+               : t->pages->calls->record(t, number);
 }
 
 /* What PICTURE asks of a node for those below it: the last number of its record. */
 static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
 {
-    return *(const float *)(const void *)(t->pages->calls->record(t, number) +
-                                          TERRIMPI_PAGE_RECORD - sizeof(float));
+    return *(const float *)(const void *)(terrimpi_tree_record(t, number) + TERRIMPI_PAGE_RECORD -
+                                          sizeof(float));
 }
 
 /* Heights and errors of a node. */
@@ -4621,7 +4649,7 @@ static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtr
 {
     return t->nodes ? t->nodes + number
                     : (const struct terrimp_geomip_node *)(const void *)
-                          t->pages->calls->record(t, number);
+                          terrimpi_tree_record(t, number);
 }
 
 /* Whether there is anything to be known of a tree's nodes. */
@@ -5110,12 +5138,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, uint32_t node)
 {
     const terrimp_quadtree *t = f->tree;
-    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
-    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
+    float d;
     if (level == 0)
         return 0.0f;
     if (f->view->rule != TERRIMP_GEOMIP_PICTURE) {
         /* Rounding of heights and of the error itself, so that the bound is one. */
+        const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
         float size = terrimpi_max(terrimpi_abs(n->low), terrimpi_abs(n->high));
         d = n->error > 0.0f ? n->error + 5e-7f * size : 0.0f;
         d *= f->factor / f->view->tolerance_px;
@@ -5125,6 +5153,7 @@ static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, 
            same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
            is equal over all nodes where rms * quad / d^2 is. */
         float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
+        float rms = t->pages ? terrimpi_page_held(t, node) : t->nodes[node].rms;
         d = rms * f->factor * (quad * f->factor) /
             (f->view->tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
     }
@@ -6724,8 +6753,7 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
 {
     if (t->meshes)
         return &t->meshes[node];
-    return &((const terrimpi_record *)(const void *)t->tree.pages->calls->record(&t->tree,
-                                                                                     node))->mesh;
+    return &((const terrimpi_record *)(const void *)terrimpi_tree_record(&t->tree, node))->mesh;
 }
 
 /* The node of the built terrain that a node is, or repeats. */
@@ -8510,10 +8538,11 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 /* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
    terrain only while it is made).
 
-   The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
-   is known of a node hangs on its parent's page alone. */
+   The parent of a page that is here is here too, so whatever is missing has a stand-in, and what is
+   known of a node hangs on its parent's page alone. */
 
 #define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
+#define TERRIMPI_PAGE_SURE 4.0f  /* square of a guess of an error over its limit that is believed */
 #define TERRIMPI_PAGES_MAGIC 0x54494d51u
 #define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
 
@@ -8695,7 +8724,7 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
     info->offset = terrimpi_page_offset(terrain, terrain->tree.pages->block_level, &n);
     info->bytes = terrain->tree.pages->page_bytes;
     info->level = n.level;
-    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->is_here ? TERRIMP_PAGE_HERE
+    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->page ? TERRIMP_PAGE_HERE
                                                               : TERRIMP_PAGE_COMING;
     info->slot = slot ? (uint32_t)(slot - terrain->tree.pages->slots) : 0u;
     return TERRIMP_OK;
@@ -8705,29 +8734,32 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
    before, and no page below it. The root stays. */
 static int terrimpi_page_is_spare(const struct terrimp_pages *p, const terrimpi_page_slot *slot)
 {
-    return slot->is_here && slot->children == 0 && slot->used + 1u < p->frame &&
+    return slot->page && slot->children == 0 && slot->used + 1u < p->frame &&
            slot->node + 1u < p->node_count;
 }
 
 static void terrimpi_page_clear(const terrimp_quadtree *t, terrimpi_page_slot *slot)
 {
     terrimpi_page_slot *above = terrimpi_page_above(t, slot->node);
-    if (above)
+    if (above) {
         above->children--;
+        above->lacking = (uint8_t)(above->lacking + (slot->page != NULL));
+    }
     t->pages->slot_of[slot->node] = 0;
     slot->node = t->node_count;
-    slot->is_here = 0;
+    slot->page = NULL;
 }
 
 TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page)
 {
     struct terrimp_pages *p;
     terrimpi_page_slot *above, *found = NULL, *slot;
+    terrimp_node n, child;
+    uint32_t i;
     TERRIMPI_TRY(terrimpi_page_check(terrain, node, page));
     p = terrain->tree.pages;
     above = terrimpi_page_above(&terrain->tree, node);
-    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && (!above || !above->is_here)),
-                    TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && !above), TERRIMP_E_STATE);
     for (slot = p->slots; slot < p->slots + p->slot_count; slot++) {
         if (slot->node == p->node_count) {
             found = slot;
@@ -8744,7 +8776,14 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
         above->children++;
     found->node = node;
     found->used = p->frame;
-    found->is_here = found->children = 0;
+    found->children = found->lacking = 0;
+    n = terrimpi_tree_node(&terrain->tree, node);
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_tree_quarter(&terrain->tree, &n, i, &child)) {
+            found->lacking++;
+            if (p->slot_of[child.number]) /* it failed, and they stay */
+                found->children++;
+        }
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8756,7 +8795,7 @@ static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t nod
 {
     TERRIMPI_TRY(terrimpi_page_check(t, node, t));
     *slot = terrimpi_page_slot_of(t->tree.pages, node);
-    return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
+    return *slot && !(*slot)->page ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
 /* What a child asks of its parent's `held`: PICTURE counts rms times the length of a quad, and when
@@ -8811,16 +8850,27 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsig
 
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
-    terrimpi_page_slot *slot;
+    const terrimp_quadtree *t;
+    terrimpi_page_slot *slot, *above;
     const unsigned char *record;
+    float *mean;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
-    record = terrain->tree.pages->calls->record(&terrain->tree, node);
-    slot->is_here = 1; /* to be looked at */
-    slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node, record))
-        return TERRIMP_OK;
-    terrimpi_page_clear(&terrain->tree, slot);
-    return TERRIMP_E_BAKE;
+    t = &terrain->tree;
+    record = terrimpi_tree_record(t, node);
+    TERRIMPI_REFUSE(!record, TERRIMP_E_PAGE);
+    above = terrimpi_page_above(t, node);
+    if (above)
+        above->lacking--;
+    slot->page = t->pages->pages + (size_t)(slot - t->pages->slots) * t->pages->page_bytes;
+    slot->used = t->pages->frame;
+    memcpy(slot->record, record, sizeof slot->record);
+    if (!terrimpi_page_ok(terrain, node, record)) {
+        terrimpi_page_clear(t, slot);
+        return TERRIMP_E_BAKE;
+    }
+    mean = &t->pages->held[terrimpi_tree_node(t, node).level];
+    *mean += (terrimpi_page_held(t, node) - *mean) * (*mean > 0.0f ? 0.1f : 1.0f);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
@@ -8850,7 +8900,9 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
     *count = 0;
     for (i = 0; i < p->slot_count; i++) {
         const terrimpi_page_slot *slot = &p->slots[i];
-        if (slot->node == p->node_count || slot->is_here || slot->used + 1u >= p->frame)
+        if (slot->node == p->node_count || slot->page ||
+            (slot->used + 1u >= p->frame && (slot->node + 1u == p->node_count ||
+                                             terrimpi_page_above(&terrain->tree, slot->node))))
             continue;
         if (*count < capacity)
             nodes[*count] = slot->node;
@@ -8861,13 +8913,11 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
+/* The record of a node whose page is not here: in its parent's. NULL when that is not here. */
 static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
     terrimp_node n;
-    const unsigned char *page = terrimpi_page_of(t->pages, number);
-    if (page)
-        return page + offsetof(terrimpi_page_head, record);
+    const unsigned char *page;
     if (number + 1u == t->node_count)
         return t->pages->root;
     n = terrimpi_tree_node(t, number);
@@ -8884,41 +8934,23 @@ static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
     return a->level != b->level ? a->level > b->level : a->node < b->node;
 }
 
-/* Notes that a page is of use in this frame, and those above it. If it is missing, it is wanted at
-   an urgency above 0, or the one above it that has to come first. Returns whether it is here. */
-static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+/* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
+static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node, int reason,
                               float urgency)
 {
-    struct terrimp_pages *p = t->pages;
-    terrimp_node n = *node;
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
     terrimp_want want, *worst = p->wants;
     uint32_t i;
-    while (!slot && n.level + 1u < t->level_count) {
-        terrimp_node above = terrimpi_tree_parent(t, &n);
-        slot = terrimpi_page_slot_of(p, above.number);
-        if (slot)
-            slot->used = p->frame; /* or it might be given up for this */
-        if (slot && slot->is_here) {
-            slot = NULL;
-            break;
-        }
-        n = above;
-    }
-    if (slot)
-        slot->used = p->frame;
-    if (slot || !(urgency > 0.0f))
-        return slot && slot->is_here;
-    want.node = n.number;
-    want.level = n.level;
+    want.node = node->number;
+    want.level = node->level;
     want.bytes = p->page_bytes;
     want.reason = reason;
     want.urgency = urgency;
     for (i = 0; i < p->want_count; i++) {
-        if (p->wants[i].node == n.number) {
-            if (terrimpi_want_before(&want, &p->wants[i]))
-                p->wants[i] = want;
-            return 0;
+        if (p->wants[i].node == want.node) {
+            if (!terrimpi_want_before(&want, &p->wants[i]))
+                return 0;
+            p->wants[i] = want;
+            return 1;
         }
         if (terrimpi_want_before(worst, &p->wants[i]))
             worst = &p->wants[i];
@@ -8927,34 +8959,90 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
         p->wants[p->want_count++] = want;
     else if (terrimpi_want_before(&want, worst))
         *worst = want;
-    return 0;
+    return 1;
+}
+
+/* Notes that a page is of use in this frame. If it is missing, it is wanted at an urgency above 0,
+   and those above it up to the one that is here. Returns whether it is here itself. */
+static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+                              float urgency)
+{
+    struct terrimp_pages *p = t->pages;
+    terrimp_node n = *node;
+    for (;;) {
+        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+        if (slot)
+            slot->used = p->frame; /* or it might be given up for this */
+        if (slot && slot->page)
+            return n.number == node->number;
+        if ((!slot && urgency > 0.0f && !terrimpi_page_list(p, &n, reason, urgency)) ||
+            n.level + 1u == t->level_count)
+            return 0;
+        n = terrimpi_tree_parent(t, &n);
+    }
+}
+
+/* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
+static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node, terrimp_box *box)
+{
+    terrimp_node known = *node;
+    while (!terrimpi_tree_record(&t->tree, known.number))
+        known = terrimpi_tree_parent(&t->tree, &known);
+    terrimpi_tree_box(&t->tree, node, terrimpi_mesh_of(t, known.number)->low,
+                      terrimpi_mesh_of(t, known.number)->high, box);
+}
+
+/* The square of a node's error over that of its parent, at one distance: by the rule PICTURE, see
+   terrimpi_mip_distance, and by those of both levels that have come. */
+static float terrimpi_page_step(const struct terrimp_pages *p, uint32_t level)
+{
+    const float *held = p->held + level;
+    return held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f;
 }
 
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
    whether all are here. Then the walk that finds what is in sight comes by and uses the children,
-   unless `strays` says that it may not. */
+   unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
+   nobody knows; when it will if it is like others of its level, all is asked for in one breath: so
+   what a far jump needs comes at once, and not one level after the other. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
-                                 const terrimp_frustum *frustum, int reason, float urgency)
+                                 const terrimpi_page_need *need)
 {
     const struct terrimp_pages *p = t->tree.pages;
-    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
+    int all, uses = p->strays || need->reason != TERRIMP_WANT_GROUND;
+    float urgency;
+    terrimpi_page_need below;
     terrimp_node child;
-    terrimp_box box;
+    terrimp_box box, whole;
     uint32_t i;
-    if (!terrimpi_page_want(&t->tree, node, reason, urgency))
-        return 0;
-    for (i = 0; i < 4u; i++) {
+    if (!uses && slot && slot->page && slot->lacking == 0) {
+        slot->used = p->frame;
+        return 1;
+    }
+    below = *need;
+    urgency = TERRIMP_SQRTF(need->urgency);
+    all = terrimpi_page_want(&t->tree, node, need->reason, urgency);
+    for (i = 0; i < 4u && (all || need->urgency > 0.0f); i++) {
         if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
             (!uses && terrimpi_page_of(p, child.number)))
             continue;
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+        terrimpi_page_box(t, &child, &box);
+        if (terrimp_frustum_test(need->frustum, &box, TERRIMP_PLANES_ALL) ==
+                TERRIMP_PLANES_OUTSIDE ||
+            terrimpi_page_want(&t->tree, &child, need->reason, urgency))
             continue;
-        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
-        if (!all && !uses) { /* it does not come: once more */
+        if (all && !uses) { /* it does not come to them: once more */
             uses = 1;
             i = 0xffffffffu;
         }
+        all = 0;
+        terrimpi_page_box(t, node, &whole);
+        below.urgency = terrimpi_page_step(p, child.level) * need->urgency *
+                        (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
+                        (1e-6f + terrimpi_mip_distance2(&box, need->eye));
+        if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
+            terrimpi_page_divides(t, &child, &below);
     }
     return all;
 }
@@ -8980,6 +9068,7 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
    ground below the eye, which says whether it is over it. Returns how many are joined. */
 static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
 {
+    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
@@ -8990,9 +9079,9 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
              number = mip->view->marks[number].next) {
             terrimp_geomip_mark *mark = &mip->view->marks[number];
             terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            need.urgency = mark->measure;
             if (mark->measure < 1.0f ||
-                (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
-                                       TERRIMP_SQRTF(mark->measure)) &&
+                (terrimpi_page_divides(t, &node, &need) &&
                  (late == 0 || terrimpi_page_has_around(mip, &node))))
                 continue;
             mark->measure = 0.0f;
@@ -9006,22 +9095,23 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
                                      const float away[3])
 {
-    uint32_t i, k;
+    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f};
+    float eye[3];
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        eye[i] = mip->eye[i] + away[i];
+    need.eye = eye;
     for (i = 0; i < mip->view->draw_count; i++) {
-        const terrimp_node *node = &mip->view->draws[i].node;
-        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
+        const terrimp_geomip_draw *draw = &mip->view->draws[i];
+        float error = draw->error_px / mip->view->tolerance_px;
         terrimp_box box;
-        if (node->level == 0)
+        if (draw->node.level == 0)
             continue;
-        measure *= measure;
-        terrimpi_terrain_node_box(t, node, &box);
-        for (k = 0; k < 3u; k++)
-            eye[k] = mip->eye[k] + away[k];
-        now = terrimp_box_distance(&box, mip->eye);
-        soon = terrimp_box_distance(&box, eye);
-        if (measure * now * now >= soon * soon)
-            terrimpi_page_divides(t, node, &mip->frustum, TERRIMP_WANT_AHEAD,
-                                  0.99f * terrimpi_min(measure, 1.0f));
+        terrimpi_terrain_node_box(t, &draw->node, &box);
+        need.urgency = 0.98f * terrimpi_min(error * error, 1.0f);
+        if (error * error * terrimpi_mip_distance2(&box, mip->eye) >=
+            terrimpi_mip_distance2(&box, eye))
+            terrimpi_page_divides(t, &draw->node, &need);
     }
 }
 
@@ -9197,13 +9287,15 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
     p = terrain->tree.pages;
     TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
     for (i = 0; i < p->slot_count; i++)
-        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].is_here, TERRIMP_E_STATE);
+        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].page, TERRIMP_E_STATE);
     memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
     terrain->sample_low = t.sample_low;
     terrain->sample_high = t.sample_high;
     memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
-    for (i = 0; i < p->slot_count; i++)
+    for (i = 0; i < p->slot_count; i++) {
         p->slots[i].node = p->node_count;
+        p->slots[i].page = NULL;
+    }
     return TERRIMP_OK;
 }
 
@@ -10224,7 +10316,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
-    const struct terrimp_pages *pages;
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f};
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
@@ -10242,9 +10335,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
-    pages = f->terrain->tree.pages;
-    return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
-               ? 0 : 1 + TERRIMPI_CULL_SHORT;
+    return !pages || pages->calls->divides(f->terrain, node, &need) ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -10329,7 +10420,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
         if (pages)
-            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
+            terrimpi_page_use(pages, v.node.number);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -11642,6 +11733,19 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
+/* Asks for the pages without which the picture of a node stands for those below it: of these, and
+   of the ground that they will show. */
+static void terrimpi_view_lacks(const terrimpi_frame *f, const terrimpi_candidate *c)
+{
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
+    float rms = terrimpi_tree_kept(&f->terrain->tree, c->node.number)->rms;
+    rms *= f->pixel_factor * f->density;
+    need.urgency = terrimpi_max(2.0f, rms / (TERRIMPI_CAPTURE_SOURCE_TEXELS *
+                                             terrimpi_max(c->closest, 1e-6f)));
+    need.urgency *= need.urgency;
+    f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
+}
+
 /* Whether all pages are here that a capture draws; those that are not are wanted. */
 static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
                                    uint32_t count, float urgency)
@@ -11686,8 +11790,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     int is_known;
     memset(job, 0, sizeof *job);
     if (c->is_short) {
-        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &f->frustum,
-                                               TERRIMP_WANT_PICTURE, 2.0f);
+        terrimpi_view_lacks(f, c);
         v->late++;
         return 0;
     }
