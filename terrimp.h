@@ -1459,7 +1459,7 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
 typedef struct terrimp_ground_command {
     uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
     uint32_t level, x, z; /* its column and row on its level */
-    uint32_t first_index; /* pattern: a range of the shared index buffer */
+    uint32_t first_index; /* pattern, or a part of one: a range of the shared index buffer */
     uint32_t index_count;
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
@@ -1985,15 +1985,16 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
    order for an eye: for the draws of a view, which come in that order when its settings say
    `sorted`. Nothing but the eye's place within or beside the node counts.
 
-   first_index  of its command
+   command      its node and indices count
    eye          of the frame, for the ground of a capture that of the capture's command, less the
-                offset of its command [wu]
+                offset of the ground's [wu]
    indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
                 pattern's triangles, but none of no area
    count        out. Never more than the command's index_count
    Cost         O(quads); about 20 cycles a triangle of a processor of 2020 */
-TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
-                                                 uint32_t first_index, const float eye[3],
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
+                                                 const terrimp_ground_command *command,
+                                                 const float eye[3],
                                                  uint16_t *indices, size_t capacity,
                                                  uint32_t *count);
 
@@ -4767,6 +4768,12 @@ static uint32_t terrimpi_mip_column(uint32_t quads, uint32_t column)
     return quads * column / terrimpi_mip_columns(quads);
 }
 
+/* Triangles that fetch the first row of a column in a list. */
+static uint32_t terrimpi_mip_ahead(uint32_t quads, uint32_t column)
+{
+    return (terrimpi_mip_column(quads, column + 1u) - terrimpi_mip_column(quads, column) + 2u) / 2u;
+}
+
 static uint32_t terrimpi_mip_coarse_sides(uint32_t pattern)
 {
     return (pattern & 1u) + (pattern >> 1 & 1u) + (pattern >> 2 & 1u) + (pattern >> 3 & 1u);
@@ -4784,8 +4791,7 @@ static uint32_t terrimpi_mip_indices(uint32_t quads, int form, uint32_t pattern)
     if (form == TERRIMP_FORM_STRIP) /* each row: its zigzag and two indices to join the next */
         return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads)) - 1u;
     for (column = 0; column < terrimpi_mip_columns(quads); column++)
-        ahead += (terrimpi_mip_column(quads, column + 1u) -
-                  terrimpi_mip_column(quads, column) + 2u) / 2u;
+        ahead += terrimpi_mip_ahead(quads, column);
     return 3u * (triangles + ahead);
 }
 
@@ -7067,6 +7073,24 @@ static terrimpi_terrain_pattern terrimpi_terrain_pattern_of(uint32_t quads, uint
         p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
         p.index_count = 3u * p.triangle_count;
     }
+    return p;
+}
+
+/* Rows z0 to z1 of a column of pattern 0, which follow each other there. */
+static terrimpi_terrain_pattern terrimpi_terrain_rows(uint32_t quads, uint32_t column, uint32_t z0,
+                                                      uint32_t z1)
+{
+    terrimpi_terrain_pattern p;
+    uint32_t k;
+    p.x0 = terrimpi_mip_column(quads, column);
+    p.x1 = terrimpi_mip_column(quads, column + 1u);
+    p.z0 = z0;
+    p.z1 = z1;
+    p.first_index = 6u * (quads * p.x0 + z0 * (p.x1 - p.x0));
+    for (k = 0; k <= column; k++)
+        p.first_index += 3u * terrimpi_mip_ahead(quads, k);
+    p.triangle_count = 2u * (p.x1 - p.x0) * (z1 - z0);
+    p.index_count = 3u * p.triangle_count;
     return p;
 }
 
@@ -9691,7 +9715,7 @@ static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_c
     return count;
 }
 
-/* Triangles of a slice of a picture's draws, of all its layers. */
+/* Triangles of a picture's draws, of all its layers. */
 static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
                                            const terrimpi_capture_plan *plan,
                                            const terrimpi_capture_draw *draws, uint32_t count)
@@ -9719,8 +9743,46 @@ static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *n
                 ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
 }
 
-/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. `middle` is
-   added to the places of all. */
+/* Rows of all columns of a node: a picture can be cut after each. */
+static uint32_t terrimpi_capture_rows(const terrimp_terrain *t)
+{
+    return terrimpi_mip_columns(t->desc.chunk_quads) * t->desc.chunk_quads;
+}
+
+/* Draws some of the rows of a whole node: its columns come from both ends towards the eye's, and so
+   do the rows of each. */
+static void terrimpi_capture_draw_rows(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                                       const terrimp_node *node, uint32_t from, uint32_t to,
+                                       terrimp_ground_command *ground,
+                                       const terrimp_callbacks *callbacks)
+{
+    const terrimp_heightfield *f = &t->tree.field;
+    uint32_t quads = t->desc.chunk_quads, columns = terrimpi_mip_columns(quads), k, half, before;
+    float step = (float)(1u << node->level), side = (float)quads;
+    float x = (plan->eye[0] - f->origin_x) / (f->spacing_x * step) - (float)node->x * side;
+    float z = (plan->eye[2] - f->origin_z) / (f->spacing_z * step) - (float)node->z * side;
+    uint32_t row = (uint32_t)terrimpi_clamp(z, 0.0f, side);
+    for (before = 0; before < columns &&
+                     (float)terrimpi_mip_column(quads, before + 1u) <= x; before++)
+        ;
+    for (k = from / quads; k * quads < to; k++) {
+        uint32_t a = terrimpi_max_u32(from, k * quads) - k * quads;
+        uint32_t b = terrimpi_min_u32(to - k * quads, quads);
+        uint32_t column = k < before ? k : columns - 1u - (k - before);
+        for (half = 0; half < 2u; half++) { /* rows before the eye's, then those behind it */
+            uint32_t z0 = half ? row + quads - terrimpi_max_u32(b, row) : terrimpi_min_u32(a, row);
+            uint32_t z1 = half ? row + quads - terrimpi_max_u32(a, row) : terrimpi_min_u32(b, row);
+            terrimpi_terrain_pattern p = terrimpi_terrain_rows(quads, column, z0, z1);
+            ground->first_index = p.first_index;
+            ground->index_count = p.index_count;
+            if (z0 < z1)
+                callbacks->draw_ground(callbacks->user, ground);
+        }
+    }
+}
+
+/* Makes a slice of a layer, from the row `from` of all its draws on, up to `to`: the host's
+   commands. `middle` is added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                   const terrimpi_capture_draw *draws, uint32_t from, uint32_t to,
                                   uint32_t layer, const float middle[2],
@@ -9731,6 +9793,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
+    uint32_t rows = terrimpi_capture_rows(t), i;
     terrimp_node place = terrimpi_real_place(t, &plan->node);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
@@ -9749,18 +9812,23 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     callbacks->begin_capture(callbacks->user, command);
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
-    for (; from < to; from++) {
-        terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
+    for (i = from / rows; i * rows < to; i++) {
+        terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
+        uint32_t first = terrimpi_max_u32(from, i * rows) - i * rows;
+        uint32_t last = terrimpi_min_u32(to - i * rows, rows);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
         terrimpi_tile_offset(t, &node, middle, ground.offset);
-        node = terrimpi_real_place(t, &node);
-        ground.node = node.number;
-        ground.x = node.x;
-        ground.z = node.z;
-        ground.first_index = draws[from].first_index;
-        ground.index_count = draws[from].index_count;
-        callbacks->draw_ground(callbacks->user, &ground);
+        place = terrimpi_real_place(t, &node);
+        ground.node = place.number;
+        ground.x = place.x;
+        ground.z = place.z;
+        ground.first_index = draws[i].first_index;
+        ground.index_count = draws[i].index_count;
+        if (last - first < rows)
+            terrimpi_capture_draw_rows(t, plan, &node, first, last, &ground, callbacks);
+        else
+            callbacks->draw_ground(callbacks->user, &ground);
     }
     callbacks->end_capture(callbacks->user, command);
 }
@@ -9799,7 +9867,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          with the square of the tolerance, at least so much */
 #define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
-#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
+#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for the captures of the mean frame */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
@@ -10747,7 +10815,7 @@ typedef struct terrimpi_job {
     terrimpi_capture_plan plan;
     terrimpi_cache_picture *picture;
     terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
-    uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
+    uint32_t from, to, end;        /* in rows of the plan's draws: of this piece, and of all */
     int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
     uint32_t triangles, texels;    /* of the whole picture */
     float sharpness, cost, light[3];
@@ -11773,6 +11841,15 @@ static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], ter
     return terrimpi_cache_slots(cache, size, job->slots, job->plan.layer_count);
 }
 
+/* How many triangles of a capture are worth `room` triangles: with max_cost the share of each in
+   its other costs counts, too. */
+static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
+                                       const terrimpi_job *job)
+{
+    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
+    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
+}
+
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
    `room` triangles it may be cut, if no other one is; 0: it only asks for its pages. Returns 0 when
    it cannot be made. */
@@ -11785,7 +11862,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
     float texels = 1.5f + f->desc->tolerance_px * f->density; /* bilinear, parallax */
-    uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
+    uint32_t size[2], i, count, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
@@ -11816,20 +11893,18 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency) || room == 0)
+    count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    if (!terrimpi_view_has_pages(v, v->capture_draws, count, c->urgency) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
-    job->in_pieces = f->desc->max_capture_triangles ||
-                     ((job->triangles > room ||
-                       (f->desc->max_cost > 0.0f &&
-                        terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
-                                              (float)job->triangles) >
-                            costs->triangle * (float)room)) && !v->open);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, count);
+    job->cost = terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
+                                      (float)job->triangles);
+    room = terrimpi_spending_room(f, room, job);
+    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -11842,8 +11917,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_spread(f->terrain, plan, size, texels);
     if (plan->layer_count > 1u)
         terrimpi_capture_divide(f->terrain, plan, split);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
+    count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    job->to = job->end = count * terrimpi_capture_rows(f->terrain);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, count);
     job->sharpness = terrimpi_view_sharpness(f, distance);
     memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
@@ -11855,16 +11931,27 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     return 1;
 }
 
-/* Takes the draws of a picture that still fit into a number of triangles: one at least. */
-static void terrimpi_job_cut(const terrimpi_capture_draw *draws, uint32_t triangles,
-                             terrimpi_job *job)
+/* Takes what of a picture still fits into a number of triangles: one draw at least; with max_cost
+   one row of a whole node. Returns how many triangles that are. */
+static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terrimpi_job *job)
 {
-    uint32_t used = 0;
-    for (job->to = job->from; job->to < job->draw_count; job->to++) {
-        used += draws[job->to].triangle_count;
-        if (used > triangles && job->to > job->from)
-            break;
+    uint32_t rows = terrimpi_capture_rows(v->terrain), used = 0;
+    for (job->to = job->from; job->to < job->end;) {
+        const terrimpi_capture_draw *draw = &v->capture_draws[job->to / rows];
+        uint32_t count = rows - job->to % rows;
+        if (used + draw->triangle_count * count / rows > triangles) {
+            if (v->desc.max_cost > 0.0f && draw->first_index == 0)
+                count = (terrimpi_max_u32(triangles, used) - used) * rows / draw->triangle_count;
+            else if (used > 0)
+                break;
+            if (count == 0 && used > 0)
+                break;
+            count = terrimpi_max_u32(count, 1u);
+        }
+        job->to += count;
+        used += draw->triangle_count * count / rows;
     }
+    return used;
 }
 
 /* Whether a candidate is to be captured before another: what is missing first, then what is due,
@@ -11927,10 +12014,12 @@ typedef struct terrimpi_spending {
     uint32_t texels, triangles;
 } terrimpi_spending;
 
-/* Triangles of a whole source node: no piece of a picture is worth less. */
+/* Triangles of a whole source node, with max_cost of an eighth: no piece of a picture is worth
+   less. */
 static uint32_t terrimpi_spending_least(const terrimpi_frame *f)
 {
-    return 2u * f->terrain->desc.chunk_quads * f->terrain->desc.chunk_quads;
+    uint32_t quads = f->terrain->desc.chunk_quads;
+    return f->desc->max_cost > 0.0f ? quads * quads / 4u : 2u * quads * quads;
 }
 
 /* How many triangles the next capture may draw. What is more is left to the next frames. */
@@ -11948,26 +12037,16 @@ static uint32_t terrimpi_spending_left(const terrimpi_frame *f, const terrimpi_s
     return left;
 }
 
-/* The same for a certain one, when max_cost counts what its pixels cost, too. */
-static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
-                                       const terrimpi_job *job)
-{
-    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
-    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
-}
-
-/* Adds a job, or a piece of one, of which the draws are in draws. A picture that will be complete
-   is judged anew: it is drawn in this frame. */
-static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
-                                  const terrimpi_job *job, terrimpi_spending *s)
+/* Adds a job, or a piece of one, of so many triangles. A picture that will be complete is judged
+   anew: it is drawn in this frame. */
+static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_job *job,
+                                  uint32_t triangles, terrimpi_spending *s)
 {
     terrimpi_cache_picture *p = job->picture;
-    uint32_t triangles = terrimpi_capture_triangles(f->terrain, &job->plan, draws + job->from,
-                                                    job->to - job->from);
     s->texels += job->texels;
     s->triangles += triangles;
     s->cost += job->cost * (float)triangles / (float)terrimpi_max_u32(job->triangles, 1u);
-    if (job->to < job->draw_count)
+    if (job->to < job->end)
         return;
     p->judged = f->number;
     p->layers_now = (uint8_t)job->plan.layer_count;
@@ -11988,7 +12067,7 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
 {
     const terrimp_view_desc *d = &v->desc;
     terrimpi_job *job = &v->jobs[v->job_count];
-    uint32_t room = terrimpi_spending_left(&v->frame, s);
+    uint32_t room = terrimpi_spending_left(&v->frame, s), triangles;
     if (v->job_count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
@@ -12007,11 +12086,12 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
         return 0;
     }
     v->job_count++;
-    if (job->triangles > room && job->in_pieces) {
-        terrimpi_job_cut(v->capture_draws, room, job);
-        v->open = job->to < job->draw_count ? v->job_count : 0u;
+    triangles = job->triangles;
+    if (triangles > room && job->in_pieces) {
+        triangles = terrimpi_job_cut(v, room, job);
+        v->open = job->to < job->end ? v->job_count : 0u;
     }
-    terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
+    terrimpi_spending_add(&v->frame, job, triangles, s);
     return 1;
 }
 
@@ -12020,10 +12100,11 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
     terrimpi_job *job = &v->jobs[0];
     float angle, parallax;
+    uint32_t count, room;
     int has_pages;
-    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    count = terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
     has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
-                terrimpi_view_has_pages(v, v->capture_draws, job->draw_count, 2.0f);
+                terrimpi_view_has_pages(v, v->capture_draws, count, 2.0f);
     if (!has_pages ||
         terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
@@ -12033,10 +12114,8 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_job_cut(v->capture_draws,
-                     terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job),
-                     job);
-    terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
+    room = terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job);
+    terrimpi_spending_add(&v->frame, job, terrimpi_job_cut(v, room, job), s);
 }
 
 /* Continues the picture that is being made in pieces; then takes captures from the queue as the
@@ -12185,17 +12264,6 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
-/* What max_cost leaves for captures: those of the mean frame, up to a share of it, and the smallest
-   piece of the picture that has been begun. */
-static float terrimpi_view_reserve(const terrimp_view *v, float spread)
-{
-    float least = (float)terrimpi_spending_least(&v->frame), piece = 0.0f;
-    if (v->open)
-        piece = v->jobs[0].cost * terrimpi_min(least / (float)v->jobs[0].triangles, 1.0f);
-    return terrimpi_max(terrimpi_min(spread, TERRIMPI_VIEW_RESERVE * v->desc.max_cost),
-                        terrimpi_min(piece, 2.0f * TERRIMPI_VIEW_RESERVE * v->desc.max_cost));
-}
-
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
 static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
@@ -12215,7 +12283,7 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->region_count; i++)
             terrimpi_view_decide(v, &v->regions[i], sums);
-        v->cost = sums->drawn + terrimpi_view_reserve(v, sums->spread);
+        v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
@@ -12328,13 +12396,13 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
         command.atlas = job->slots[layer].atlas;
         command.slot = terrimpi_cache_rect(&v->cache, &job->slots[layer]);
         command.clear = job->from == 0;
-        command.complete = job->to == job->draw_count;
+        command.complete = job->to == job->end;
         terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
                               v->frame.middle, &command, v->frame.camera.depth_zero_to_one,
                               callbacks);
     }
     job->from = job->to;
-    if (job->to < job->draw_count)
+    if (job->to < job->end)
         return;
     terrimpi_view_finish(v, job);
     if (v->open && &v->jobs[v->open - 1u] == job)
@@ -13578,46 +13646,59 @@ static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtr
     }
 }
 
-/* The pattern that begins at an index of the shared buffer, and its coarse sides. */
-static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index,
+/* The pattern of a command, or the rows of one's column, and its coarse sides. */
+static int terrimpi_sorted_find(uint32_t quads, const terrimp_ground_command *command,
                                 terrimpi_terrain_pattern *part, uint32_t *coarse)
 {
-    uint32_t i, strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
+    uint32_t i, first = command->first_index;
+    uint32_t strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
     terrimp_pattern pattern;
-    *coarse = 0;
     *part = terrimpi_terrain_pattern_of(quads, 0);
     for (i = 0; i < TERRIMP_PATTERN_COUNT; i++)
         if (terrimp_pattern_find(quads, TERRIMP_FORM_LIST, i, &pattern) == TERRIMP_OK &&
-            pattern.first_index == first_index) {
+            pattern.first_index == first) {
             part->triangle_count = pattern.triangle_count;
             *coarse = i;
             return 1;
         }
+    *coarse = 0;
     for (i = 1; i <= strips; i++) {
         *part = terrimpi_terrain_pattern_of(quads, i);
-        if (part->first_index == first_index)
+        if (part->first_index == first)
             return 1;
+    }
+    for (i = 0; i < terrimpi_mip_columns(quads); i++) {
+        uint32_t row, z0, count;
+        *part = terrimpi_terrain_rows(quads, i, 0, quads);
+        row = part->index_count / quads;
+        z0 = (first - part->first_index) / row;
+        count = command->index_count / row;
+        if (first < part->first_index || z0 >= quads || count == 0 || count > quads - z0)
+            continue;
+        *part = terrimpi_terrain_rows(quads, i, z0, z0 + count);
+        return part->first_index == first && part->index_count == command->index_count;
     }
     return 0;
 }
 
-TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
-                                                 uint32_t first_index, const float eye[3],
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
+                                                 const terrimp_ground_command *command,
+                                                 const float eye[3],
                                                  uint16_t *indices, size_t capacity,
                                                  uint32_t *count)
 {
     terrimpi_sorted_block b;
     terrimp_node n;
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, indices));
-    TERRIMPI_REFUSE(!eye || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!command || !eye || !count, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, command->node, indices));
     TERRIMPI_REFUSE(!terrimpi_finite2(eye[0], eye[2]), TERRIMP_E_NOT_FINITE);
     b.out.quads = terrain->desc.chunk_quads;
     b.out.form = TERRIMP_FORM_LIST;
     b.out.start = b.out.out = indices;
-    TERRIMPI_REFUSE(!terrimpi_sorted_find(b.out.quads, first_index, &b.part, &b.out.pattern),
+    TERRIMPI_REFUSE(!terrimpi_sorted_find(b.out.quads, command, &b.part, &b.out.pattern),
                     TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(capacity / 3u < b.part.triangle_count, TERRIMP_E_CAPACITY);
-    n = terrimpi_tree_node(&terrain->tree, node);
+    n = terrimpi_tree_node(&terrain->tree, command->node);
     terrimpi_sorted_write(&b, &terrain->tree, &n, eye);
     *count = (uint32_t)(b.out.out - indices);
     return TERRIMP_OK;
