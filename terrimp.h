@@ -1384,13 +1384,14 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
 /* Finds a slot for a node's page, in the place of the one that was of no use for longest.
 
    page        out: [bytes of the info] aligned to 8 bytes, to be filled, by any thread
-   Errors      E_STATE when it is here or coming, or its parent is not here: a page comes after its
-               parent's; E_CAPACITY when the frame uses all slots */
+   Errors      E_STATE when it is here or coming, or its parent is neither; E_CAPACITY when the
+               frame uses all slots */
 TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page);
 
 /* Looks at a page that has been filled, and takes it if it is good. Else its slot is free again.
 
-   Errors      E_STATE when it has not been begun; E_BAKE when it is damaged, or another node's, or
+   Errors      E_STATE when it has not been begun; E_PAGE when its parent's page is not here: it
+               stays, to be put again after that; E_BAKE when it is damaged, or another node's, or
                another file's
    Cost        O(samples), about 10 us */
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node);
@@ -1418,15 +1419,16 @@ typedef struct terrimp_want {
 } terrimp_want;
 
 /* The pages that the updates of this frame would have liked to have, those of all views, best
-   first, and no more than there are slots for. None of them is here or coming, and the parents of
-   all are here.
+   first, and no more than there are slots for. None of them is here or coming; the parents of all
+   are, or are listed before them.
 
    wants       [capacity] out
    count       out: how many */
 TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
                                                uint32_t capacity, uint32_t *count);
 
-/* Lists the pages that have been begun and that no view wanted in this frame and the one before.
+/* Lists the pages that have been begun and that no view wanted in this frame and the one before, or
+   whose parent's has failed.
 
    nodes       [capacity] out, by slot; count: how many there are, also when they are more */
 TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
@@ -1457,7 +1459,7 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
 typedef struct terrimp_ground_command {
     uint32_t node;        /* of any level: its vertices are those of terrimp_terrain_fill_ground */
     uint32_t level, x, z; /* its column and row on its level */
-    uint32_t first_index; /* pattern: a range of the shared index buffer */
+    uint32_t first_index; /* pattern, or a part of one: a range of the shared index buffer */
     uint32_t index_count;
     float morph;          /* morph factors, as in terrimp_geomip_draw; 0 without morphing */
     float side[TERRIMP_SIDE_COUNT];
@@ -1983,15 +1985,16 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
    order for an eye: for the draws of a view, which come in that order when its settings say
    `sorted`. Nothing but the eye's place within or beside the node counts.
 
-   first_index  of its command
+   command      its node and indices count
    eye          of the frame, for the ground of a capture that of the capture's command, less the
-                offset of its command [wu]
+                offset of the ground's [wu]
    indices      [capacity] out: over the same vertices, farthest triangle first; with all of the
                 pattern's triangles, but none of no area
    count        out. Never more than the command's index_count
    Cost         O(quads); about 20 cycles a triangle of a processor of 2020 */
-TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
-                                                 uint32_t first_index, const float eye[3],
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
+                                                 const terrimp_ground_command *command,
+                                                 const float eye[3],
                                                  uint16_t *indices, size_t capacity,
                                                  uint32_t *count);
 
@@ -4554,12 +4557,17 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 
 /* ---- what is kept of it ---- */
 
+#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
+#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
+
 /* A place for a page, see the room Residency. */
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
-    uint8_t is_here;    /* the page has come and is good */
-    uint8_t children;   /* nodes below that have a slot */
+    const unsigned char *page; /* NULL: it has not come, or it is no good */
+    uint8_t children;   /* nodes below that have a slot, */
+    uint8_t lacking;    /* ... and those whose pages are not here */
+    float record[TERRIMPI_PAGE_RECORD / sizeof(float)]; /* the page's own: what a frame looks at */
 } terrimpi_page_slot;
 
 struct terrimp_pages {
@@ -4572,6 +4580,7 @@ struct terrimp_pages {
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
     float morph_ratio;         /* of views, at most */
+    float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
@@ -4581,13 +4590,21 @@ struct terrimp_pages {
 struct terrimpi_mip_frame;
 struct terrimpi_mip_ground;
 
+/* Why a node is to be left for its children. */
+typedef struct terrimpi_page_need {
+    const terrimp_frustum *frustum;
+    const float *eye;
+    int reason;    /* terrimp_want_reason */
+    float urgency; /* square of its error over the limit. 0: what is missing is not wanted */
+} terrimpi_page_need;
+
 /* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
     int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
-                   const terrimp_frustum *frustum, int reason, float urgency);
+                   const struct terrimpi_page_need *need);
     uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
                        const float away[3]);
@@ -4597,22 +4614,34 @@ typedef struct terrimpi_page_calls {
     float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
 } terrimpi_page_calls;
 
-#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
-#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
-
 /* The page of a node, NULL when it is not here. */
 static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint32_t node)
 {
     uint32_t slot = p->slot_of[node];
-    return slot && p->slots[slot - 1u].is_here ? p->pages + (size_t)(slot - 1u) * p->page_bytes
-                                               : NULL;
+    return slot ? p->slots[slot - 1u].page : NULL;
+}
+
+/* Notes that a page is of use in this frame, if it is here or coming. */
+static void terrimpi_page_use(const struct terrimp_pages *p, uint32_t node)
+{
+    if (p->slot_of[node])
+        p->slots[p->slot_of[node] - 1u].used = p->frame;
+}
+
+/* The record of a node whose page or whose parent's is here; else NULL. */
+static const unsigned char *terrimpi_tree_record(const terrimp_quadtree *t, uint32_t number)
+{
+    uint32_t slot = t->pages->slot_of[number];
+    return slot && t->pages->slots[slot - 1u].page
+               ? (const unsigned char *)t->pages->slots[slot - 1u].record
+               : t->pages->calls->record(t, number);
 }
 
 /* What PICTURE asks of a node for those below it: the last number of its record. */
 static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
 {
-    return *(const float *)(const void *)(t->pages->calls->record(t, number) +
-                                          TERRIMPI_PAGE_RECORD - sizeof(float));
+    return *(const float *)(const void *)(terrimpi_tree_record(t, number) + TERRIMPI_PAGE_RECORD -
+                                          sizeof(float));
 }
 
 /* Heights and errors of a node. */
@@ -4621,7 +4650,7 @@ static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtr
 {
     return t->nodes ? t->nodes + number
                     : (const struct terrimp_geomip_node *)(const void *)
-                          t->pages->calls->record(t, number);
+                          terrimpi_tree_record(t, number);
 }
 
 /* Whether there is anything to be known of a tree's nodes. */
@@ -4739,6 +4768,12 @@ static uint32_t terrimpi_mip_column(uint32_t quads, uint32_t column)
     return quads * column / terrimpi_mip_columns(quads);
 }
 
+/* Triangles that fetch the first row of a column in a list. */
+static uint32_t terrimpi_mip_ahead(uint32_t quads, uint32_t column)
+{
+    return (terrimpi_mip_column(quads, column + 1u) - terrimpi_mip_column(quads, column) + 2u) / 2u;
+}
+
 static uint32_t terrimpi_mip_coarse_sides(uint32_t pattern)
 {
     return (pattern & 1u) + (pattern >> 1 & 1u) + (pattern >> 2 & 1u) + (pattern >> 3 & 1u);
@@ -4756,8 +4791,7 @@ static uint32_t terrimpi_mip_indices(uint32_t quads, int form, uint32_t pattern)
     if (form == TERRIMP_FORM_STRIP) /* each row: its zigzag and two indices to join the next */
         return (quads + 1u) * (2u * quads + 4u * terrimpi_mip_columns(quads)) - 1u;
     for (column = 0; column < terrimpi_mip_columns(quads); column++)
-        ahead += (terrimpi_mip_column(quads, column + 1u) -
-                  terrimpi_mip_column(quads, column) + 2u) / 2u;
+        ahead += terrimpi_mip_ahead(quads, column);
     return 3u * (triangles + ahead);
 }
 
@@ -5110,12 +5144,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, uint32_t node)
 {
     const terrimp_quadtree *t = f->tree;
-    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
-    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
+    float d;
     if (level == 0)
         return 0.0f;
     if (f->view->rule != TERRIMP_GEOMIP_PICTURE) {
         /* Rounding of heights and of the error itself, so that the bound is one. */
+        const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
         float size = terrimpi_max(terrimpi_abs(n->low), terrimpi_abs(n->high));
         d = n->error > 0.0f ? n->error + 5e-7f * size : 0.0f;
         d *= f->factor / f->view->tolerance_px;
@@ -5125,6 +5159,7 @@ static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, 
            same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
            is equal over all nodes where rms * quad / d^2 is. */
         float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
+        float rms = t->pages ? terrimpi_page_held(t, node) : t->nodes[node].rms;
         d = rms * f->factor * (quad * f->factor) /
             (f->view->tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
     }
@@ -6724,8 +6759,7 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
 {
     if (t->meshes)
         return &t->meshes[node];
-    return &((const terrimpi_record *)(const void *)t->tree.pages->calls->record(&t->tree,
-                                                                                     node))->mesh;
+    return &((const terrimpi_record *)(const void *)terrimpi_tree_record(&t->tree, node))->mesh;
 }
 
 /* The node of the built terrain that a node is, or repeats. */
@@ -7039,6 +7073,24 @@ static terrimpi_terrain_pattern terrimpi_terrain_pattern_of(uint32_t quads, uint
         p.triangle_count = (p.x1 - p.x0) * (p.z1 - p.z0) * 2u;
         p.index_count = 3u * p.triangle_count;
     }
+    return p;
+}
+
+/* Rows z0 to z1 of a column of pattern 0, which follow each other there. */
+static terrimpi_terrain_pattern terrimpi_terrain_rows(uint32_t quads, uint32_t column, uint32_t z0,
+                                                      uint32_t z1)
+{
+    terrimpi_terrain_pattern p;
+    uint32_t k;
+    p.x0 = terrimpi_mip_column(quads, column);
+    p.x1 = terrimpi_mip_column(quads, column + 1u);
+    p.z0 = z0;
+    p.z1 = z1;
+    p.first_index = 6u * (quads * p.x0 + z0 * (p.x1 - p.x0));
+    for (k = 0; k <= column; k++)
+        p.first_index += 3u * terrimpi_mip_ahead(quads, k);
+    p.triangle_count = 2u * (p.x1 - p.x0) * (z1 - z0);
+    p.index_count = 3u * p.triangle_count;
     return p;
 }
 
@@ -8510,10 +8562,11 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 /* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
    terrain only while it is made).
 
-   The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
-   is known of a node hangs on its parent's page alone. */
+   The parent of a page that is here is here too, so whatever is missing has a stand-in, and what is
+   known of a node hangs on its parent's page alone. */
 
 #define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
+#define TERRIMPI_PAGE_SURE 4.0f  /* square of a guess of an error over its limit that is believed */
 #define TERRIMPI_PAGES_MAGIC 0x54494d51u
 #define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
 
@@ -8695,7 +8748,7 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
     info->offset = terrimpi_page_offset(terrain, terrain->tree.pages->block_level, &n);
     info->bytes = terrain->tree.pages->page_bytes;
     info->level = n.level;
-    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->is_here ? TERRIMP_PAGE_HERE
+    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->page ? TERRIMP_PAGE_HERE
                                                               : TERRIMP_PAGE_COMING;
     info->slot = slot ? (uint32_t)(slot - terrain->tree.pages->slots) : 0u;
     return TERRIMP_OK;
@@ -8705,29 +8758,32 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
    before, and no page below it. The root stays. */
 static int terrimpi_page_is_spare(const struct terrimp_pages *p, const terrimpi_page_slot *slot)
 {
-    return slot->is_here && slot->children == 0 && slot->used + 1u < p->frame &&
+    return slot->page && slot->children == 0 && slot->used + 1u < p->frame &&
            slot->node + 1u < p->node_count;
 }
 
 static void terrimpi_page_clear(const terrimp_quadtree *t, terrimpi_page_slot *slot)
 {
     terrimpi_page_slot *above = terrimpi_page_above(t, slot->node);
-    if (above)
+    if (above) {
         above->children--;
+        above->lacking = (uint8_t)(above->lacking + (slot->page != NULL));
+    }
     t->pages->slot_of[slot->node] = 0;
     slot->node = t->node_count;
-    slot->is_here = 0;
+    slot->page = NULL;
 }
 
 TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page)
 {
     struct terrimp_pages *p;
     terrimpi_page_slot *above, *found = NULL, *slot;
+    terrimp_node n, child;
+    uint32_t i;
     TERRIMPI_TRY(terrimpi_page_check(terrain, node, page));
     p = terrain->tree.pages;
     above = terrimpi_page_above(&terrain->tree, node);
-    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && (!above || !above->is_here)),
-                    TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && !above), TERRIMP_E_STATE);
     for (slot = p->slots; slot < p->slots + p->slot_count; slot++) {
         if (slot->node == p->node_count) {
             found = slot;
@@ -8744,7 +8800,14 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
         above->children++;
     found->node = node;
     found->used = p->frame;
-    found->is_here = found->children = 0;
+    found->children = found->lacking = 0;
+    n = terrimpi_tree_node(&terrain->tree, node);
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_tree_quarter(&terrain->tree, &n, i, &child)) {
+            found->lacking++;
+            if (p->slot_of[child.number]) /* it failed, and they stay */
+                found->children++;
+        }
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8756,7 +8819,7 @@ static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t nod
 {
     TERRIMPI_TRY(terrimpi_page_check(t, node, t));
     *slot = terrimpi_page_slot_of(t->tree.pages, node);
-    return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
+    return *slot && !(*slot)->page ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
 /* What a child asks of its parent's `held`: PICTURE counts rms times the length of a quad, and when
@@ -8811,16 +8874,27 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsig
 
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
-    terrimpi_page_slot *slot;
+    const terrimp_quadtree *t;
+    terrimpi_page_slot *slot, *above;
     const unsigned char *record;
+    float *mean;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
-    record = terrain->tree.pages->calls->record(&terrain->tree, node);
-    slot->is_here = 1; /* to be looked at */
-    slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node, record))
-        return TERRIMP_OK;
-    terrimpi_page_clear(&terrain->tree, slot);
-    return TERRIMP_E_BAKE;
+    t = &terrain->tree;
+    record = terrimpi_tree_record(t, node);
+    TERRIMPI_REFUSE(!record, TERRIMP_E_PAGE);
+    above = terrimpi_page_above(t, node);
+    if (above)
+        above->lacking--;
+    slot->page = t->pages->pages + (size_t)(slot - t->pages->slots) * t->pages->page_bytes;
+    slot->used = t->pages->frame;
+    memcpy(slot->record, record, sizeof slot->record);
+    if (!terrimpi_page_ok(terrain, node, record)) {
+        terrimpi_page_clear(t, slot);
+        return TERRIMP_E_BAKE;
+    }
+    mean = &t->pages->held[terrimpi_tree_node(t, node).level];
+    *mean += (terrimpi_page_held(t, node) - *mean) * (*mean > 0.0f ? 0.1f : 1.0f);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
@@ -8850,7 +8924,9 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
     *count = 0;
     for (i = 0; i < p->slot_count; i++) {
         const terrimpi_page_slot *slot = &p->slots[i];
-        if (slot->node == p->node_count || slot->is_here || slot->used + 1u >= p->frame)
+        if (slot->node == p->node_count || slot->page ||
+            (slot->used + 1u >= p->frame && (slot->node + 1u == p->node_count ||
+                                             terrimpi_page_above(&terrain->tree, slot->node))))
             continue;
         if (*count < capacity)
             nodes[*count] = slot->node;
@@ -8861,13 +8937,11 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
+/* The record of a node whose page is not here: in its parent's. NULL when that is not here. */
 static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
     terrimp_node n;
-    const unsigned char *page = terrimpi_page_of(t->pages, number);
-    if (page)
-        return page + offsetof(terrimpi_page_head, record);
+    const unsigned char *page;
     if (number + 1u == t->node_count)
         return t->pages->root;
     n = terrimpi_tree_node(t, number);
@@ -8884,41 +8958,23 @@ static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
     return a->level != b->level ? a->level > b->level : a->node < b->node;
 }
 
-/* Notes that a page is of use in this frame, and those above it. If it is missing, it is wanted at
-   an urgency above 0, or the one above it that has to come first. Returns whether it is here. */
-static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+/* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
+static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node, int reason,
                               float urgency)
 {
-    struct terrimp_pages *p = t->pages;
-    terrimp_node n = *node;
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
     terrimp_want want, *worst = p->wants;
     uint32_t i;
-    while (!slot && n.level + 1u < t->level_count) {
-        terrimp_node above = terrimpi_tree_parent(t, &n);
-        slot = terrimpi_page_slot_of(p, above.number);
-        if (slot)
-            slot->used = p->frame; /* or it might be given up for this */
-        if (slot && slot->is_here) {
-            slot = NULL;
-            break;
-        }
-        n = above;
-    }
-    if (slot)
-        slot->used = p->frame;
-    if (slot || !(urgency > 0.0f))
-        return slot && slot->is_here;
-    want.node = n.number;
-    want.level = n.level;
+    want.node = node->number;
+    want.level = node->level;
     want.bytes = p->page_bytes;
     want.reason = reason;
     want.urgency = urgency;
     for (i = 0; i < p->want_count; i++) {
-        if (p->wants[i].node == n.number) {
-            if (terrimpi_want_before(&want, &p->wants[i]))
-                p->wants[i] = want;
-            return 0;
+        if (p->wants[i].node == want.node) {
+            if (!terrimpi_want_before(&want, &p->wants[i]))
+                return 0;
+            p->wants[i] = want;
+            return 1;
         }
         if (terrimpi_want_before(worst, &p->wants[i]))
             worst = &p->wants[i];
@@ -8927,34 +8983,90 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
         p->wants[p->want_count++] = want;
     else if (terrimpi_want_before(&want, worst))
         *worst = want;
-    return 0;
+    return 1;
+}
+
+/* Notes that a page is of use in this frame. If it is missing, it is wanted at an urgency above 0,
+   and those above it up to the one that is here. Returns whether it is here itself. */
+static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+                              float urgency)
+{
+    struct terrimp_pages *p = t->pages;
+    terrimp_node n = *node;
+    for (;;) {
+        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+        if (slot)
+            slot->used = p->frame; /* or it might be given up for this */
+        if (slot && slot->page)
+            return n.number == node->number;
+        if ((!slot && urgency > 0.0f && !terrimpi_page_list(p, &n, reason, urgency)) ||
+            n.level + 1u == t->level_count)
+            return 0;
+        n = terrimpi_tree_parent(t, &n);
+    }
+}
+
+/* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
+static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node, terrimp_box *box)
+{
+    terrimp_node known = *node;
+    while (!terrimpi_tree_record(&t->tree, known.number))
+        known = terrimpi_tree_parent(&t->tree, &known);
+    terrimpi_tree_box(&t->tree, node, terrimpi_mesh_of(t, known.number)->low,
+                      terrimpi_mesh_of(t, known.number)->high, box);
+}
+
+/* The square of a node's error over that of its parent, at one distance: by the rule PICTURE, see
+   terrimpi_mip_distance, and by those of both levels that have come. */
+static float terrimpi_page_step(const struct terrimp_pages *p, uint32_t level)
+{
+    const float *held = p->held + level;
+    return held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f;
 }
 
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
    whether all are here. Then the walk that finds what is in sight comes by and uses the children,
-   unless `strays` says that it may not. */
+   unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
+   nobody knows; when it will if it is like others of its level, all is asked for in one breath: so
+   what a far jump needs comes at once, and not one level after the other. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
-                                 const terrimp_frustum *frustum, int reason, float urgency)
+                                 const terrimpi_page_need *need)
 {
     const struct terrimp_pages *p = t->tree.pages;
-    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
+    int all, uses = p->strays || need->reason != TERRIMP_WANT_GROUND;
+    float urgency;
+    terrimpi_page_need below;
     terrimp_node child;
-    terrimp_box box;
+    terrimp_box box, whole;
     uint32_t i;
-    if (!terrimpi_page_want(&t->tree, node, reason, urgency))
-        return 0;
-    for (i = 0; i < 4u; i++) {
+    if (!uses && slot && slot->page && slot->lacking == 0) {
+        slot->used = p->frame;
+        return 1;
+    }
+    below = *need;
+    urgency = TERRIMP_SQRTF(need->urgency);
+    all = terrimpi_page_want(&t->tree, node, need->reason, urgency);
+    for (i = 0; i < 4u && (all || need->urgency > 0.0f); i++) {
         if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
             (!uses && terrimpi_page_of(p, child.number)))
             continue;
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+        terrimpi_page_box(t, &child, &box);
+        if (terrimp_frustum_test(need->frustum, &box, TERRIMP_PLANES_ALL) ==
+                TERRIMP_PLANES_OUTSIDE ||
+            terrimpi_page_want(&t->tree, &child, need->reason, urgency))
             continue;
-        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
-        if (!all && !uses) { /* it does not come: once more */
+        if (all && !uses) { /* it does not come to them: once more */
             uses = 1;
             i = 0xffffffffu;
         }
+        all = 0;
+        terrimpi_page_box(t, node, &whole);
+        below.urgency = terrimpi_page_step(p, child.level) * need->urgency *
+                        (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
+                        (1e-6f + terrimpi_mip_distance2(&box, need->eye));
+        if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
+            terrimpi_page_divides(t, &child, &below);
     }
     return all;
 }
@@ -8980,6 +9092,7 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
    ground below the eye, which says whether it is over it. Returns how many are joined. */
 static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
 {
+    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
@@ -8990,9 +9103,9 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
              number = mip->view->marks[number].next) {
             terrimp_geomip_mark *mark = &mip->view->marks[number];
             terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            need.urgency = mark->measure;
             if (mark->measure < 1.0f ||
-                (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
-                                       TERRIMP_SQRTF(mark->measure)) &&
+                (terrimpi_page_divides(t, &node, &need) &&
                  (late == 0 || terrimpi_page_has_around(mip, &node))))
                 continue;
             mark->measure = 0.0f;
@@ -9006,22 +9119,23 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
                                      const float away[3])
 {
-    uint32_t i, k;
+    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f};
+    float eye[3];
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        eye[i] = mip->eye[i] + away[i];
+    need.eye = eye;
     for (i = 0; i < mip->view->draw_count; i++) {
-        const terrimp_node *node = &mip->view->draws[i].node;
-        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
+        const terrimp_geomip_draw *draw = &mip->view->draws[i];
+        float error = draw->error_px / mip->view->tolerance_px;
         terrimp_box box;
-        if (node->level == 0)
+        if (draw->node.level == 0)
             continue;
-        measure *= measure;
-        terrimpi_terrain_node_box(t, node, &box);
-        for (k = 0; k < 3u; k++)
-            eye[k] = mip->eye[k] + away[k];
-        now = terrimp_box_distance(&box, mip->eye);
-        soon = terrimp_box_distance(&box, eye);
-        if (measure * now * now >= soon * soon)
-            terrimpi_page_divides(t, node, &mip->frustum, TERRIMP_WANT_AHEAD,
-                                  0.99f * terrimpi_min(measure, 1.0f));
+        terrimpi_terrain_node_box(t, &draw->node, &box);
+        need.urgency = 0.98f * terrimpi_min(error * error, 1.0f);
+        if (error * error * terrimpi_mip_distance2(&box, mip->eye) >=
+            terrimpi_mip_distance2(&box, eye))
+            terrimpi_page_divides(t, &draw->node, &need);
     }
 }
 
@@ -9197,13 +9311,15 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
     p = terrain->tree.pages;
     TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
     for (i = 0; i < p->slot_count; i++)
-        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].is_here, TERRIMP_E_STATE);
+        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].page, TERRIMP_E_STATE);
     memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
     terrain->sample_low = t.sample_low;
     terrain->sample_high = t.sample_high;
     memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
-    for (i = 0; i < p->slot_count; i++)
+    for (i = 0; i < p->slot_count; i++) {
         p->slots[i].node = p->node_count;
+        p->slots[i].page = NULL;
+    }
     return TERRIMP_OK;
 }
 
@@ -9599,7 +9715,7 @@ static uint32_t terrimpi_capture_list(const terrimp_terrain *t, const terrimpi_c
     return count;
 }
 
-/* Triangles of a slice of a picture's draws, of all its layers. */
+/* Triangles of a picture's draws, of all its layers. */
 static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
                                            const terrimpi_capture_plan *plan,
                                            const terrimpi_capture_draw *draws, uint32_t count)
@@ -9627,8 +9743,46 @@ static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *n
                 ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
 }
 
-/* Makes a slice of a layer: from the draw `from` on, up to `to`; the host's commands. `middle` is
-   added to the places of all. */
+/* Rows of all columns of a node: a picture can be cut after each. */
+static uint32_t terrimpi_capture_rows(const terrimp_terrain *t)
+{
+    return terrimpi_mip_columns(t->desc.chunk_quads) * t->desc.chunk_quads;
+}
+
+/* Draws some of the rows of a whole node: its columns come from both ends towards the eye's, and so
+   do the rows of each. */
+static void terrimpi_capture_draw_rows(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                                       const terrimp_node *node, uint32_t from, uint32_t to,
+                                       terrimp_ground_command *ground,
+                                       const terrimp_callbacks *callbacks)
+{
+    const terrimp_heightfield *f = &t->tree.field;
+    uint32_t quads = t->desc.chunk_quads, columns = terrimpi_mip_columns(quads), k, half, before;
+    float step = (float)(1u << node->level), side = (float)quads;
+    float x = (plan->eye[0] - f->origin_x) / (f->spacing_x * step) - (float)node->x * side;
+    float z = (plan->eye[2] - f->origin_z) / (f->spacing_z * step) - (float)node->z * side;
+    uint32_t row = (uint32_t)terrimpi_clamp(z, 0.0f, side);
+    for (before = 0; before < columns &&
+                     (float)terrimpi_mip_column(quads, before + 1u) <= x; before++)
+        ;
+    for (k = from / quads; k * quads < to; k++) {
+        uint32_t a = terrimpi_max_u32(from, k * quads) - k * quads;
+        uint32_t b = terrimpi_min_u32(to - k * quads, quads);
+        uint32_t column = k < before ? k : columns - 1u - (k - before);
+        for (half = 0; half < 2u; half++) { /* rows before the eye's, then those behind it */
+            uint32_t z0 = half ? row + quads - terrimpi_max_u32(b, row) : terrimpi_min_u32(a, row);
+            uint32_t z1 = half ? row + quads - terrimpi_max_u32(a, row) : terrimpi_min_u32(b, row);
+            terrimpi_terrain_pattern p = terrimpi_terrain_rows(quads, column, z0, z1);
+            ground->first_index = p.first_index;
+            ground->index_count = p.index_count;
+            if (z0 < z1)
+                callbacks->draw_ground(callbacks->user, ground);
+        }
+    }
+}
+
+/* Makes a slice of a layer, from the row `from` of all its draws on, up to `to`: the host's
+   commands. `middle` is added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
                                   const terrimpi_capture_draw *draws, uint32_t from, uint32_t to,
                                   uint32_t layer, const float middle[2],
@@ -9639,6 +9793,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_capture camera = terrimpi_capture_layer(plan, layer);
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
+    uint32_t rows = terrimpi_capture_rows(t), i;
     terrimp_node place = terrimpi_real_place(t, &plan->node);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
@@ -9657,18 +9812,23 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     callbacks->begin_capture(callbacks->user, command);
     memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
-    for (; from < to; from++) {
-        terrimp_node node = terrimpi_tree_node(&t->tree, draws[from].node);
+    for (i = from / rows; i * rows < to; i++) {
+        terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
+        uint32_t first = terrimpi_max_u32(from, i * rows) - i * rows;
+        uint32_t last = terrimpi_min_u32(to - i * rows, rows);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
         terrimpi_tile_offset(t, &node, middle, ground.offset);
-        node = terrimpi_real_place(t, &node);
-        ground.node = node.number;
-        ground.x = node.x;
-        ground.z = node.z;
-        ground.first_index = draws[from].first_index;
-        ground.index_count = draws[from].index_count;
-        callbacks->draw_ground(callbacks->user, &ground);
+        place = terrimpi_real_place(t, &node);
+        ground.node = place.number;
+        ground.x = place.x;
+        ground.z = place.z;
+        ground.first_index = draws[i].first_index;
+        ground.index_count = draws[i].index_count;
+        if (last - first < rows)
+            terrimpi_capture_draw_rows(t, plan, &node, first, last, &ground, callbacks);
+        else
+            callbacks->draw_ground(callbacks->user, &ground);
     }
     callbacks->end_capture(callbacks->user, command);
 }
@@ -9707,7 +9867,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          with the square of the tolerance, at least so much */
 #define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
 #define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
-#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for captures at most */
+#define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for the captures of the mean frame */
 #define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
@@ -10224,7 +10384,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
-    const struct terrimp_pages *pages;
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f};
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
@@ -10242,9 +10403,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
-    pages = f->terrain->tree.pages;
-    return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
-               ? 0 : 1 + TERRIMPI_CULL_SHORT;
+    return !pages || pages->calls->divides(f->terrain, node, &need) ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -10329,7 +10488,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
         if (pages)
-            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
+            terrimpi_page_use(pages, v.node.number);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -10656,7 +10815,7 @@ typedef struct terrimpi_job {
     terrimpi_capture_plan plan;
     terrimpi_cache_picture *picture;
     terrimpi_cache_slot_place slots[TERRIMPI_CAPTURE_LAYERS];
-    uint32_t from, to, draw_count; /* of the plan's draws; from and to: of this piece */
+    uint32_t from, to, end;        /* in rows of the plan's draws: of this piece, and of all */
     int in_pieces;                 /* it may be cut: its slot is not that of a picture in use */
     uint32_t triangles, texels;    /* of the whole picture */
     float sharpness, cost, light[3];
@@ -11642,6 +11801,19 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
+/* Asks for the pages without which the picture of a node stands for those below it: of these, and
+   of the ground that they will show. */
+static void terrimpi_view_lacks(const terrimpi_frame *f, const terrimpi_candidate *c)
+{
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
+    float rms = terrimpi_tree_kept(&f->terrain->tree, c->node.number)->rms;
+    rms *= f->pixel_factor * f->density;
+    need.urgency = terrimpi_max(2.0f, rms / (TERRIMPI_CAPTURE_SOURCE_TEXELS *
+                                             terrimpi_max(c->closest, 1e-6f)));
+    need.urgency *= need.urgency;
+    f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
+}
+
 /* Whether all pages are here that a capture draws; those that are not are wanted. */
 static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
                                    uint32_t count, float urgency)
@@ -11669,6 +11841,15 @@ static int terrimpi_job_slots(terrimpi_cache *cache, const uint32_t size[2], ter
     return terrimpi_cache_slots(cache, size, job->slots, job->plan.layer_count);
 }
 
+/* How many triangles of a capture are worth `room` triangles: with max_cost the share of each in
+   its other costs counts, too. */
+static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
+                                       const terrimpi_job *job)
+{
+    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
+    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
+}
+
 /* Puts a capture together: camera, source, border; then finds it slots. When it needs more than
    `room` triangles it may be cut, if no other one is; 0: it only asks for its pages. Returns 0 when
    it cannot be made. */
@@ -11681,13 +11862,12 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
     float texels = 1.5f + f->desc->tolerance_px * f->density; /* bilinear, parallax */
-    uint32_t size[2], i, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
+    uint32_t size[2], i, count, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
     if (c->is_short) {
-        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &f->frustum,
-                                               TERRIMP_WANT_PICTURE, 2.0f);
+        terrimpi_view_lacks(f, c);
         v->late++;
         return 0;
     }
@@ -11713,20 +11893,18 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, job->to, c->urgency) || room == 0)
+    count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    if (!terrimpi_view_has_pages(v, v->capture_draws, count, c->urgency) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
-    job->in_pieces = f->desc->max_capture_triangles ||
-                     ((job->triangles > room ||
-                       (f->desc->max_cost > 0.0f &&
-                        terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
-                                              (float)job->triangles) >
-                            costs->triangle * (float)room)) && !v->open);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, count);
+    job->cost = terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
+                                      (float)job->triangles);
+    room = terrimpi_spending_room(f, room, job);
+    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -11739,8 +11917,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_spread(f->terrain, plan, size, texels);
     if (plan->layer_count > 1u)
         terrimpi_capture_divide(f->terrain, plan, split);
-    job->to = job->draw_count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, job->to);
+    count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    job->to = job->end = count * terrimpi_capture_rows(f->terrain);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, count);
     job->sharpness = terrimpi_view_sharpness(f, distance);
     memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
@@ -11752,16 +11931,27 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     return 1;
 }
 
-/* Takes the draws of a picture that still fit into a number of triangles: one at least. */
-static void terrimpi_job_cut(const terrimpi_capture_draw *draws, uint32_t triangles,
-                             terrimpi_job *job)
+/* Takes what of a picture still fits into a number of triangles: one draw at least; with max_cost
+   one row of a whole node. Returns how many triangles that are. */
+static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terrimpi_job *job)
 {
-    uint32_t used = 0;
-    for (job->to = job->from; job->to < job->draw_count; job->to++) {
-        used += draws[job->to].triangle_count;
-        if (used > triangles && job->to > job->from)
-            break;
+    uint32_t rows = terrimpi_capture_rows(v->terrain), used = 0;
+    for (job->to = job->from; job->to < job->end;) {
+        const terrimpi_capture_draw *draw = &v->capture_draws[job->to / rows];
+        uint32_t count = rows - job->to % rows;
+        if (used + draw->triangle_count * count / rows > triangles) {
+            if (v->desc.max_cost > 0.0f && draw->first_index == 0)
+                count = (terrimpi_max_u32(triangles, used) - used) * rows / draw->triangle_count;
+            else if (used > 0)
+                break;
+            if (count == 0 && used > 0)
+                break;
+            count = terrimpi_max_u32(count, 1u);
+        }
+        job->to += count;
+        used += draw->triangle_count * count / rows;
     }
+    return used;
 }
 
 /* Whether a candidate is to be captured before another: what is missing first, then what is due,
@@ -11824,10 +12014,12 @@ typedef struct terrimpi_spending {
     uint32_t texels, triangles;
 } terrimpi_spending;
 
-/* Triangles of a whole source node: no piece of a picture is worth less. */
+/* Triangles of a whole source node, with max_cost of an eighth: no piece of a picture is worth
+   less. */
 static uint32_t terrimpi_spending_least(const terrimpi_frame *f)
 {
-    return 2u * f->terrain->desc.chunk_quads * f->terrain->desc.chunk_quads;
+    uint32_t quads = f->terrain->desc.chunk_quads;
+    return f->desc->max_cost > 0.0f ? quads * quads / 4u : 2u * quads * quads;
 }
 
 /* How many triangles the next capture may draw. What is more is left to the next frames. */
@@ -11845,26 +12037,16 @@ static uint32_t terrimpi_spending_left(const terrimpi_frame *f, const terrimpi_s
     return left;
 }
 
-/* The same for a certain one, when max_cost counts what its pixels cost, too. */
-static uint32_t terrimpi_spending_room(const terrimpi_frame *f, uint32_t room,
-                                       const terrimpi_job *job)
-{
-    float share = f->desc->costs.triangle * (float)job->triangles / job->cost;
-    return f->desc->max_cost > 0.0f && share < 1.0f ? (uint32_t)((float)room * share) : room;
-}
-
-/* Adds a job, or a piece of one, of which the draws are in draws. A picture that will be complete
-   is judged anew: it is drawn in this frame. */
-static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_capture_draw *draws,
-                                  const terrimpi_job *job, terrimpi_spending *s)
+/* Adds a job, or a piece of one, of so many triangles. A picture that will be complete is judged
+   anew: it is drawn in this frame. */
+static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_job *job,
+                                  uint32_t triangles, terrimpi_spending *s)
 {
     terrimpi_cache_picture *p = job->picture;
-    uint32_t triangles = terrimpi_capture_triangles(f->terrain, &job->plan, draws + job->from,
-                                                    job->to - job->from);
     s->texels += job->texels;
     s->triangles += triangles;
     s->cost += job->cost * (float)triangles / (float)terrimpi_max_u32(job->triangles, 1u);
-    if (job->to < job->draw_count)
+    if (job->to < job->end)
         return;
     p->judged = f->number;
     p->layers_now = (uint8_t)job->plan.layer_count;
@@ -11885,7 +12067,7 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
 {
     const terrimp_view_desc *d = &v->desc;
     terrimpi_job *job = &v->jobs[v->job_count];
-    uint32_t room = terrimpi_spending_left(&v->frame, s);
+    uint32_t room = terrimpi_spending_left(&v->frame, s), triangles;
     if (v->job_count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
@@ -11904,11 +12086,12 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
         return 0;
     }
     v->job_count++;
-    if (job->triangles > room && job->in_pieces) {
-        terrimpi_job_cut(v->capture_draws, room, job);
-        v->open = job->to < job->draw_count ? v->job_count : 0u;
+    triangles = job->triangles;
+    if (triangles > room && job->in_pieces) {
+        triangles = terrimpi_job_cut(v, room, job);
+        v->open = job->to < job->end ? v->job_count : 0u;
     }
-    terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
+    terrimpi_spending_add(&v->frame, job, triangles, s);
     return 1;
 }
 
@@ -11917,10 +12100,11 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
     terrimpi_job *job = &v->jobs[0];
     float angle, parallax;
+    uint32_t count, room;
     int has_pages;
-    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    count = terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
     has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
-                terrimpi_view_has_pages(v, v->capture_draws, job->draw_count, 2.0f);
+                terrimpi_view_has_pages(v, v->capture_draws, count, 2.0f);
     if (!has_pages ||
         terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
@@ -11930,10 +12114,8 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     }
     v->job_count = 1;
     job->picture->seen = v->frame.number;
-    terrimpi_job_cut(v->capture_draws,
-                     terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job),
-                     job);
-    terrimpi_spending_add(&v->frame, v->capture_draws, job, s);
+    room = terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job);
+    terrimpi_spending_add(&v->frame, job, terrimpi_job_cut(v, room, job), s);
 }
 
 /* Continues the picture that is being made in pieces; then takes captures from the queue as the
@@ -12082,17 +12264,6 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
     return f;
 }
 
-/* What max_cost leaves for captures: those of the mean frame, up to a share of it, and the smallest
-   piece of the picture that has been begun. */
-static float terrimpi_view_reserve(const terrimp_view *v, float spread)
-{
-    float least = (float)terrimpi_spending_least(&v->frame), piece = 0.0f;
-    if (v->open)
-        piece = v->jobs[0].cost * terrimpi_min(least / (float)v->jobs[0].triangles, 1.0f);
-    return terrimpi_max(terrimpi_min(spread, TERRIMPI_VIEW_RESERVE * v->desc.max_cost),
-                        terrimpi_min(piece, 2.0f * TERRIMPI_VIEW_RESERVE * v->desc.max_cost));
-}
-
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
    that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
 static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
@@ -12112,7 +12283,7 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->region_count; i++)
             terrimpi_view_decide(v, &v->regions[i], sums);
-        v->cost = sums->drawn + terrimpi_view_reserve(v, sums->spread);
+        v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
@@ -12225,13 +12396,13 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
         command.atlas = job->slots[layer].atlas;
         command.slot = terrimpi_cache_rect(&v->cache, &job->slots[layer]);
         command.clear = job->from == 0;
-        command.complete = job->to == job->draw_count;
+        command.complete = job->to == job->end;
         terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
                               v->frame.middle, &command, v->frame.camera.depth_zero_to_one,
                               callbacks);
     }
     job->from = job->to;
-    if (job->to < job->draw_count)
+    if (job->to < job->end)
         return;
     terrimpi_view_finish(v, job);
     if (v->open && &v->jobs[v->open - 1u] == job)
@@ -13475,46 +13646,59 @@ static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtr
     }
 }
 
-/* The pattern that begins at an index of the shared buffer, and its coarse sides. */
-static int terrimpi_sorted_find(uint32_t quads, uint32_t first_index,
+/* The pattern of a command, or the rows of one's column, and its coarse sides. */
+static int terrimpi_sorted_find(uint32_t quads, const terrimp_ground_command *command,
                                 terrimpi_terrain_pattern *part, uint32_t *coarse)
 {
-    uint32_t i, strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
+    uint32_t i, first = command->first_index;
+    uint32_t strips = terrimpi_terrain_apron_count(quads) * TERRIMPI_TERRAIN_DIRECTIONS;
     terrimp_pattern pattern;
-    *coarse = 0;
     *part = terrimpi_terrain_pattern_of(quads, 0);
     for (i = 0; i < TERRIMP_PATTERN_COUNT; i++)
         if (terrimp_pattern_find(quads, TERRIMP_FORM_LIST, i, &pattern) == TERRIMP_OK &&
-            pattern.first_index == first_index) {
+            pattern.first_index == first) {
             part->triangle_count = pattern.triangle_count;
             *coarse = i;
             return 1;
         }
+    *coarse = 0;
     for (i = 1; i <= strips; i++) {
         *part = terrimpi_terrain_pattern_of(quads, i);
-        if (part->first_index == first_index)
+        if (part->first_index == first)
             return 1;
+    }
+    for (i = 0; i < terrimpi_mip_columns(quads); i++) {
+        uint32_t row, z0, count;
+        *part = terrimpi_terrain_rows(quads, i, 0, quads);
+        row = part->index_count / quads;
+        z0 = (first - part->first_index) / row;
+        count = command->index_count / row;
+        if (first < part->first_index || z0 >= quads || count == 0 || count > quads - z0)
+            continue;
+        *part = terrimpi_terrain_rows(quads, i, z0, z0 + count);
+        return part->first_index == first && part->index_count == command->index_count;
     }
     return 0;
 }
 
-TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain, uint32_t node,
-                                                 uint32_t first_index, const float eye[3],
+TERRIMP_API terrimp_result terrimp_sorted_ground(const terrimp_terrain *terrain,
+                                                 const terrimp_ground_command *command,
+                                                 const float eye[3],
                                                  uint16_t *indices, size_t capacity,
                                                  uint32_t *count)
 {
     terrimpi_sorted_block b;
     terrimp_node n;
-    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, node, indices));
-    TERRIMPI_REFUSE(!eye || !count, TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!command || !eye || !count, TERRIMP_E_NULL);
+    TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, command->node, indices));
     TERRIMPI_REFUSE(!terrimpi_finite2(eye[0], eye[2]), TERRIMP_E_NOT_FINITE);
     b.out.quads = terrain->desc.chunk_quads;
     b.out.form = TERRIMP_FORM_LIST;
     b.out.start = b.out.out = indices;
-    TERRIMPI_REFUSE(!terrimpi_sorted_find(b.out.quads, first_index, &b.part, &b.out.pattern),
+    TERRIMPI_REFUSE(!terrimpi_sorted_find(b.out.quads, command, &b.part, &b.out.pattern),
                     TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(capacity / 3u < b.part.triangle_count, TERRIMP_E_CAPACITY);
-    n = terrimpi_tree_node(&terrain->tree, node);
+    n = terrimpi_tree_node(&terrain->tree, command->node);
     terrimpi_sorted_write(&b, &terrain->tree, &n, eye);
     *count = (uint32_t)(b.out.out - indices);
     return TERRIMP_OK;

@@ -39,6 +39,8 @@ typedef struct flyover {
     options options;
     tour tour;                    /* samples and flight */
     terrimp_terrain *terrain;
+    void *walls;                  /* with --hide only, like the next */
+    terrimp_horizon horizon;
     terrimp_terrain_info info;
     context context;
     gl_terrain gl;
@@ -96,6 +98,7 @@ static void load_samples(flyover *f)
     desc.path = o->path;
     desc.frames = o->frames;
     desc.speed = o->speed;
+    desc.above = o->above;
     desc.fps = o->fps;
     desc.fov_y_rad = o->fov_degrees * DEGREE;
     desc.width = o->width;
@@ -124,6 +127,14 @@ static void build_terrain(flyover *f)
     need(terrimp_terrain_get_info(f->terrain, &f->info));
     printf("samples %ux%u\nchunks %u\nbuild_ms %.1f\n", f->tour.field.width,
            f->tour.field.depth, f->info.chunks_x * f->info.chunks_z, clock_ms() - start);
+}
+
+static void open_horizon(flyover *f)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(f->terrain);
+    f->walls = allocate(terrimp_walls_bytes(tree));
+    need(terrimp_walls_build(tree, NULL, f->walls));
+    need(terrimp_horizon_init(&f->horizon, tree, f->walls));
 }
 
 static void open_graphics(flyover *f)
@@ -177,6 +188,7 @@ static void open_contender(flyover *f, contender *c, const char *name, int mode)
     desc.no_splits = o->no_splits;
     desc.no_spreading = o->no_spreading;
     desc.exact_depth = o->exact_depth;
+    desc.hider = f->walls && c == &f->chosen ? &f->horizon.hider : NULL;
     c->name = name;
     c->picture = allocate((size_t)o->width * o->height * 3);
     need(terrimp_view_desc_resolve(f->terrain, &desc, &c->desc));
@@ -380,6 +392,7 @@ static void close_all(flyover *f)
     stats_free(&f->psnr_terrain);
     gl_terrain_close(&f->gl);
     context_close(&f->context);
+    free(f->walls);
     terrimp_terrain_destroy(f->terrain);
     tour_close(&f->tour);
 }
@@ -396,6 +409,8 @@ int main(int argc, char **argv)
     build_terrain(&f);
     if (!tour_plan(&f.tour))
         stop(f.tour.error);
+    if (f.options.hide)
+        open_horizon(&f);
     open_contender(&f, &f.chosen, f.options.mode, f.options.terrimp_mode);
     if (f.options.compare)
         open_contender(&f, &f.full, "full", TERRIMP_MODE_FULL);

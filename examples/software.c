@@ -125,8 +125,7 @@ static void draw_ground(void *user, const terrimp_ground_command *c)
         turn_to_screen(h);
     if (h->scratch) {
         indices = h->scratch;
-        if (terrimp_sorted_ground(h->terrain, c->node, c->first_index, h->r.eye, h->scratch,
-                                  count, &count) != TERRIMP_OK)
+        if (terrimp_sorted_ground(h->terrain, c, h->r.eye, h->scratch, count, &count) != TERRIMP_OK)
             return;
     }
     style.texture = &h->lightmap;

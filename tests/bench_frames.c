@@ -47,6 +47,15 @@
 #define MORPHING(tolerance_)                                                              \
     { .name = "geomip " #tolerance_ " px, morphing", .family = "geomip morphing",         \
       .mode = TERRIMP_MODE_GEOMIP, .tolerance_px = (float)tolerance_, .morph_ratio = 1.5f }
+/* Without what ridges hide. */
+#define FULL_HIDING                                                                       \
+    { .name = "full, hiding", .family = "full", .mode = TERRIMP_MODE_FULL, .hiding = 1 }
+#define AUTO_HIDING(tolerance_)                                                           \
+    { .name = "auto " #tolerance_ " px, hiding", .family = "auto", .hiding = 1,           \
+      .mode = TERRIMP_MODE_AUTO, .tolerance_px = (float)tolerance_ }
+#define GEOMIP_HIDING(tolerance_)                                                         \
+    { .name = "geomip " #tolerance_ " px, hiding", .family = "geomip", .hiding = 1,       \
+      .mode = TERRIMP_MODE_GEOMIP, .tolerance_px = (float)tolerance_ }
 /* As in the thesis; foreground and chunk width as in its tables: "200, 64". */
 #define HESS(foreground_, chunk_)                                                         \
     { .name = "Hess " #foreground_ ", " #chunk_, .family = "Hess " #chunk_,               \
@@ -75,6 +84,12 @@ static const way tile_ways[] = {
     GEOMIP(0.5), GEOMIP(1), GEOMIP(2), GEOMIP(4), BOUND(2)
 };
 
+static const way low_ways[] = {
+    FULL, FULL_HIDING, AUTO(1), GEOMIP(1),
+    AUTO_HIDING(0.5), AUTO_HIDING(1), AUTO_HIDING(2), AUTO_HIDING(4), AUTO_HIDING(8),
+    GEOMIP_HIDING(0.5), GEOMIP_HIDING(1), GEOMIP_HIDING(2), GEOMIP_HIDING(4), GEOMIP_HIDING(8)
+};
+
 static const way thesis_ways[] = {
     FULL, AUTO(1), GEOMIP(1), HESS(400, 64), HESS(400, 128),
     /* only with BENCH_ALL, or on the terrain of 2049: */
@@ -101,8 +116,12 @@ typedef struct run {
 
 #define PYRENEES .file = "N42E001.hgt", .crop = 1025, .spacing = 79.6f,        \
                  .path = "paths/pyrenees.path"
-#define ROUGH .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f, \
-              .path = "paths/rough.path"
+#define ROUGH_FIELD .file = "build/bench/rough.hgt", .spacing = 1.0f, .height_scale = 0.05f
+#define ROUGH ROUGH_FIELD, .path = "paths/rough.path"
+/* Where people are: a circle so far above the ground. */
+#define LOW(name_, key_, file_, above_)                                                  \
+    { { .name = name_, .key = key_, file_, .above = above_ }, LOOK_LIGHTMAP, WAYS(low_ways), \
+      60, 8, 1, 0 }
 
 /* Under dear shading, and with trees, the whole path is flown: the first pictures of all nodes take
    16 to 20 frames, and a flight of 30 would be one third start, though its figures say they leave
@@ -118,6 +137,15 @@ static const run runs[] = {
       LOOK_MATERIALS, WAYS(look_ways), LOOK_FRAMES, LOOK_STRIDE, 1, 0 },
     { { .name = "rough, with trees", .key = "trees", ROUGH },
       LOOK_TREES, WAYS(look_ways), LOOK_FRAMES, LOOK_STRIDE, 1, 0 },
+    LOW("N42E001 (Pyrenees), a walk", "walk_n42e001", .file = "N42E001.hgt", 2.0f),
+    LOW("N42E001 (Pyrenees), through valleys", "valley_n42e001", .file = "N42E001.hgt", 100.0f),
+    LOW("N42E001 (Pyrenees), over passes", "pass_n42e001", .file = "N42E001.hgt", 400.0f),
+    LOW("N49E011 (hills), a walk", "walk_n49e011", .file = "N49E011.hgt", 2.0f),
+    LOW("N49E011 (hills), through valleys", "valley_n49e011", .file = "N49E011.hgt", 100.0f),
+    LOW("N49E011 (hills), over passes", "pass_n49e011", .file = "N49E011.hgt", 400.0f),
+    LOW("rough 2049 x 2049, a walk", "walk_rough", ROUGH_FIELD, 2.0f),
+    LOW("rough 2049 x 2049, through valleys", "valley_rough", ROUGH_FIELD, 20.0f),
+    LOW("rough 2049 x 2049, over passes", "pass_rough", ROUGH_FIELD, 60.0f),
     { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
       LOOK_LIGHTMAP, WAYS(tile_ways), 45, 6, 1, 0 },
     { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },

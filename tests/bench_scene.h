@@ -26,7 +26,8 @@ typedef struct scene_desc {
     const char *file;      /* in the directory of the data, or where it says */
     uint32_t crop;         /* samples along a side that are kept; 0: all */
     float spacing, height_scale; /* 0: as the file has it */
-    const char *path;      /* in the directory of the data; null: the thesis' circle */
+    const char *path;      /* in the directory of the data; null: the thesis' circle, */
+    float above;           /* [wu] ... or one that far above the ground */
 } scene_desc;
 
 enum { SCENE_CHUNKS = 2 };
@@ -43,6 +44,7 @@ typedef struct scene {
     const context *context;
     terrimp_terrain *terrain[SCENE_CHUNKS]; /* by chunk size; null until it is used */
     void *bake[SCENE_CHUNKS];               /* that it lies in, when it was read from a file */
+    void *walls[SCENE_CHUNKS];              /* for horizons over it; null until one is opened */
     double build_s[SCENE_CHUNKS];           /* what building it took; 0: it was read */
     size_t vertex_bytes;                    /* of gl_terrain_desc */
     gl_terrain gl[SCENE_CHUNKS];            /* of ways that keep no pictures, or of all */
@@ -107,6 +109,7 @@ static void scene_open(scene *s, const scene_desc *desc, const context *frame, s
     what.spacing[0] = what.spacing[1] = desc->spacing;
     what.height_scale = desc->height_scale;
     what.frames = frames;
+    what.above = desc->above;
     what.fov_y_rad = SCENE_FOV_RAD;
     what.width = SCENE_WIDTH;
     what.height = SCENE_HEIGHT;
@@ -196,6 +199,17 @@ static int scene_terrain(scene *s, uint32_t chunk_quads)
     return i;
 }
 
+/* A horizon over a terrain, for one view. */
+static void scene_open_horizon(scene *s, int i, terrimp_horizon *horizon)
+{
+    const terrimp_quadtree *tree = terrimp_terrain_tree(s->terrain[i]);
+    if (!s->walls[i]) {
+        s->walls[i] = need_memory(terrimp_walls_bytes(tree));
+        need(terrimp_walls_build(tree, NULL, s->walls[i]));
+    }
+    need(terrimp_horizon_init(horizon, tree, s->walls[i]));
+}
+
 static void scene_open_gl(scene *s, int terrain, uint32_t atlas_size, gl_terrain *gl)
 {
     gl_terrain_desc desc;
@@ -229,6 +243,7 @@ static void scene_close(scene *s)
     for (i = 0; i < SCENE_CHUNKS; i++) {
         if (s->is_open[i])
             gl_terrain_close(&s->gl[i]);
+        free(s->walls[i]);
         if (s->bake[i])
             free(s->bake[i]);
         else

@@ -198,7 +198,7 @@ static void view_ground(void *user, const terrimp_ground_command *c)
         return;
     memcpy(eye, h->eye, sizeof eye);
     eye[0] -= c->offset[0], eye[2] -= c->offset[1];
-    need(terrimp_sorted_ground(h->terrain, c->node, c->first_index, eye, h->indices, GRID, &count));
+    need(terrimp_sorted_ground(h->terrain, c, eye, h->indices, GRID, &count));
     h->ground_seconds += seconds() - start;
     h->ground_triangles += count / 3;
     h->draws++;

@@ -26,29 +26,31 @@ typedef struct place {
     void *walls;
     terrimp_horizon horizon;
     terrimp_sets sets;
+    flight way; /* so far over the ground: */
+    float up;
 } place;
 
-/* Of a frame on a circle, looking ahead. */
-static terrimp_camera camera_at(const place *p, size_t frame, size_t frames, float up)
+/* Flies once round in so many frames, `up` over the ground. */
+static void fly(place *p, size_t frames, float up)
 {
     const terrimp_heightfield *f = &p->tree->field;
-    float t = 6.2831853f * (float)frame / (float)frames, ground = 0.0f;
     float wide = (float)(f->width - 1u) * f->spacing_x;
     float deep = (float)(f->depth - 1u) * f->spacing_z;
-    terrimp_camera c;
-    memset(&c, 0, sizeof c);
-    c.eye[0] = f->origin_x + wide * (0.5f + 0.35f * cosf(t));
-    c.eye[2] = f->origin_z + deep * (0.5f + 0.35f * sinf(t));
-    need(terrimp_heightfield_height(f, c.eye[0], c.eye[2], &ground));
-    c.eye[1] = ground + up;
-    c.forward[0] = -sinf(t);
-    c.forward[2] = cosf(t);
-    c.width_px = 1280;
-    c.height_px = 1024;
-    c.fov_y_rad = 1.0472f;
-    c.z_near = 0.2f * up;
-    c.z_far = 2.0f * (wide + deep);
-    return c;
+    float round = 6.2831853f * 0.35f * (wide < deep ? wide : deep);
+    flight_free(&p->way);
+    p->up = up;
+    if (!flight_circle(&p->way, f, frames, round / (float)frames, up))
+        bench_stop("a flight", p->way.error);
+}
+
+static terrimp_camera camera_at(const place *p, size_t frame)
+{
+    terrimp_box box;
+    terrimp_camera camera;
+    need(terrimp_terrain_get_box(p->terrain, terrimpi_tree_root(p->tree).number, &box));
+    camera = tour_camera_at(&p->way.poses[frame], &box, 1.0472f, 1280, 1024);
+    camera.z_near = 0.2f * p->up; /* what is cut off hides nothing */
+    return camera;
 }
 
 /* Makes what `way` says of it the hider of a view. */
@@ -94,8 +96,9 @@ static void bench_found(place *p, float up, size_t frames)
 {
     size_t frame;
     uint32_t n, hidden = 0, all = 0, found[WAYS] = {0};
+    fly(p, frames, up);
     for (frame = 0; frame < frames; frame += 4) {
-        terrimp_camera c = camera_at(p, frame, frames, up);
+        terrimp_camera c = camera_at(p, frame);
         terrimp_frustum frustum;
         need(terrimp_camera_resolve(&c, &c));
         need(terrimp_camera_frustum(&c, &frustum));
@@ -154,9 +157,10 @@ static void bench_mode(place *p, const char *name, int mode, float up, size_t fr
         need(terrimp_view_create(p->terrain, &desc, NULL, &views[way]));
         memset(&ms[way], 0, sizeof ms[way]);
     }
+    fly(p, 20u * frames, up);
     for (frame = 0; frame < frames; frame++)
         for (i = 0; i < WAYS; i++) { /* in turns, each first as often */
-            terrimp_camera c = camera_at(p, frame, 20u * frames, up);
+            terrimp_camera c = camera_at(p, frame);
             terrimp_stats s;
             double start;
             way = (int)((frame + i) % WAYS);
@@ -223,6 +227,7 @@ static void bench_file(const char *path)
         bench_mode(&p, name, TERRIMP_MODE_GEOMIP, (rough ? low : heights)[i], frames);
         bench_mode(&p, name, TERRIMP_MODE_AUTO, (rough ? low : heights)[i], frames);
     }
+    flight_free(&p.way);
     free(p.sets.codes);
     free(p.walls);
     terrimp_terrain_destroy(p.terrain);

@@ -19,6 +19,7 @@ typedef struct way {
     uint32_t chunk_quads;       /* 64 or 128; 0: 64 */
     float foreground;           /* [wu] where ground has ended; it fades over the last quarter */
     float texels_per_px;
+    int hiding;                 /* what ridges hide is left out */
     int hess;                   /* as in the thesis: by bench_hess.h, not by a view */
 } way;
 
@@ -28,6 +29,7 @@ typedef struct contender {
     look *look;                 /* not its own */
     terrimp_view *view;
     hess *hess;                 /* instead of the view */
+    terrimp_horizon horizon;    /* of a way that hides */
     gl_terrain *gl, own_gl;     /* own: when the way keeps pictures */
     terrimp_stats now;          /* of the newest frame */
     stats start_ms;             /* of the start of the flight, when its pictures are new */
@@ -80,6 +82,10 @@ static void contender_open(contender *c, const way *w, scene *s, look *l)
     c->before = need_memory((size_t)SCENE_PIXELS * 3);
     c->picture_frame = c->worst_frame = c->pop_frame = SIZE_MAX;
     c->pop.block = -255.0;
+    if (w->hiding) {
+        scene_open_horizon(s, terrain, &c->horizon);
+        desc.hider = &c->horizon.hider;
+    }
     need(terrimp_view_desc_resolve(s->terrain[terrain], &desc, &desc));
     if (w->hess) {
         c->hess = need_memory(sizeof *c->hess);

@@ -169,7 +169,7 @@ static void step(terrimp_terrain *terrain, terrimp_view *view, uint32_t *node)
             if (terrimp_page_get_info(terrain, *node, &info) != TERRIMP_OK ||
                 info.offset + info.bytes > file_bytes || /* of a header that was changed */
                 terrimp_page_begin(terrain, *node, &page) != TERRIMP_OK)
-                continue;
+                continue; /* parents are listed before their children */
             memcpy(page, file + info.offset, info.bytes);
             if (fuzz_u8() % 4u == 0)
                 damage((unsigned char *)page, info.bytes, 0, 1);
@@ -180,7 +180,7 @@ static void step(terrimp_terrain *terrain, terrimp_view *view, uint32_t *node)
     }
     for (i = 0; i + 1u < nodes; i++) {
         FUZZ_CHECK(terrimp_page_get_info(terrain, i, &info) == TERRIMP_OK);
-        if (info.state == TERRIMP_PAGE_ABSENT)
+        if (info.state != TERRIMP_PAGE_HERE)
             continue;
         terrimp_page_get_info(terrain, terrimpi_tree_parent_number(&terrain->tree, i), &above);
         FUZZ_CHECK(above.state == TERRIMP_PAGE_HERE);

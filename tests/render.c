@@ -787,7 +787,7 @@ static double flight_likeness(scene *s, const manner *m, float step, size_t fram
     flight f;
     double worst;
     char what[64];
-    if (!flight_circle(&f, &s->field, frames, step))
+    if (!flight_circle(&f, &s->field, frames, step, 0.0f))
         need(f.error);
     snprintf(what, sizeof what, "flight_%s", m->name);
     worst = worst_likeness(s, what, &m->settings, f.poses, f.count, 0, floor_db);
@@ -1195,7 +1195,8 @@ static void check_long_flight(scene *s, float morph_ratio)
     terrimp_view *full = open_full_view(s);
     gl_geomip g;
     size_t i, all = 0, edges = 0;
-    need(flight_circle(&way, &s->field, 600, 2.0f * s->field.spacing_x) ? NULL : way.error);
+    need(flight_circle(&way, &s->field, 600, 2.0f * s->field.spacing_x, 0.0f) ? NULL
+                                                                             : way.error);
     need(gl_geomip_open(&g, &s->gl, &s->field, 32, &settings));
     for (i = 0; i < way.count; i++) {
         size_t holes;

@@ -378,7 +378,7 @@ static void a_wrong_path_is_refused_with_its_line(void)
     CHECK(!flight_load(&f, scratch_file) && strstr(f.error, ":2:"));
 }
 
-static void a_circle_keeps_its_speed_and_stays_above_ground(void)
+static void circle_keeps_its_speed_and_stays_above_ground(float above)
 {
     uint16_t *samples = procedural_terrain(257, 129, 3);
     terrimp_heightfield field;
@@ -390,16 +390,22 @@ static void a_circle_keeps_its_speed_and_stays_above_ground(void)
     field.depth = 129;
     field.format = TERRIMP_FORMAT_U16;
     field.height_scale = PROCEDURAL_HEIGHT_SCALE;
-    CHECK(flight_circle(&f, &field, 500, 1.25f));
+    CHECK(flight_circle(&f, &field, 500, 1.25f, above));
     for (i = 0; i + 1 < f.count; i++) {
         const float *a = f.poses[i].eye, *b = f.poses[i + 1].eye;
         float dx = b[0] - a[0], dz = b[2] - a[2], step = sqrtf(dx * dx + dz * dz), ground = 0.0f;
         CHECK(fabsf(step - 1.25f) < 0.01f);
         CHECK(terrimp_heightfield_height(&field, a[0], a[2], &ground) == TERRIMP_OK);
-        CHECK(a[1] > ground);
+        CHECK(above > 0.0f ? fabsf(a[1] - ground - above) < 1e-3f : a[1] > ground);
     }
     flight_free(&f);
     free(samples);
+}
+
+static void circles_keep_their_speed_and_stay_above_ground(void)
+{
+    circle_keeps_its_speed_and_stays_above_ground(0.0f);
+    circle_keeps_its_speed_and_stays_above_ground(2.0f);
 }
 
 /* Splits a line at its blanks and parses it. */
@@ -861,7 +867,7 @@ int main(void)
     run_file_tests();
     RUN(a_path_reads_as_written);
     RUN(a_wrong_path_is_refused_with_its_line);
-    RUN(a_circle_keeps_its_speed_and_stays_above_ground);
+    RUN(circles_keep_their_speed_and_stay_above_ground);
     RUN(options_reach_their_fields);
     RUN(wrong_options_are_refused);
     RUN(options_without_their_file_are_said_to_be_ignored);

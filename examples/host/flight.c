@@ -112,9 +112,8 @@ static float highest_ground(const terrimp_heightfield *field, const circle *c)
     return highest;
 }
 
-static int place_circle(circle *c, const terrimp_heightfield *field)
+static int place_circle(circle *c, const terrimp_heightfield *field, float covered)
 {
-    const float covered = 0.42f;   /* radius, as a part of the terrain's shorter side */
     const float clearance = 0.12f; /* over the ground, as a part of the terrain's height */
     float width = (float)(field->width - 1) * field->spacing_x, low, high, over;
     float depth = (float)(field->depth - 1) * field->spacing_z;
@@ -142,15 +141,29 @@ static void look_at_ground(const terrimp_heightfield *field, const circle *c, fl
         target[1] = height;
 }
 
-int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, float step)
+/* A pose close to the ground, looking along the circle. */
+static void fly_above(const terrimp_heightfield *field, const circle *c, float angle, float above,
+                      flight_pose *pose)
+{
+    on_circle(c, angle, 0.0f, pose->eye);
+    (void)terrimp_heightfield_height(field, pose->eye[0], pose->eye[2], &pose->eye[1]);
+    pose->eye[1] += above;
+    pose->target[0] = pose->eye[0] - c->radius * sinf(angle);
+    pose->target[1] = pose->eye[1];
+    pose->target[2] = pose->eye[2] + c->radius * cosf(angle);
+}
+
+int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, float step,
+                  float above)
 {
     const float ahead = 0.14f * TURN; /* the target is that far round the circle */
+    const float covered = above > 0.0f ? 0.35f : 0.42f; /* radius, of the shorter side */
     terrimp_heightfield resolved;
     circle c = { 0.0f, 0.0f, 0.0f, 0.0f };
     size_t i;
     memset(f, 0, sizeof *f);
     if (terrimp_heightfield_resolve(field, &resolved) == TERRIMP_OK
-        && place_circle(&c, &resolved))
+        && place_circle(&c, &resolved, covered))
         f->poses = malloc(count * sizeof *f->poses);
     if (!f->poses) {
         snprintf(f->error, sizeof f->error, "no memory for the flight");
@@ -159,6 +172,10 @@ int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, flo
     f->count = count;
     for (i = 0; i < count; i++) {
         float angle = fmodf((float)i * (step / c.radius), TURN);
+        if (above > 0.0f) {
+            fly_above(&resolved, &c, angle, above, &f->poses[i]);
+            continue;
+        }
         on_circle(&c, angle, 0.0f, f->poses[i].eye);
         on_circle(&c, angle + ahead, 0.2f * c.radius, f->poses[i].target);
         look_at_ground(&resolved, &c, f->poses[i].target);

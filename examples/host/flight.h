@@ -21,9 +21,11 @@ typedef struct flight {
 int flight_load(flight *f, const char *path);
 
 /* The thesis' flight: a circle over nearly the whole width of the terrain, at a fixed height over
-   the highest ground below it, at `step` world units a frame, looking ahead and somewhat down.
+   the highest ground below it, at `step` world units a frame, looking ahead and somewhat down. With
+   `above` it is a smaller one, always so many world units above the ground, looking level ahead.
    Returns 1, or 0 with f->error and nothing to free. */
-int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, float step);
+int flight_circle(flight *f, const terrimp_heightfield *field, size_t count, float step,
+                  float above);
 
 void flight_free(flight *f);
 

@@ -161,9 +161,9 @@ static int take_colour(const char *text, uint8_t colour[3])
 typedef enum option_id {
     DEM, FORMAT, RAW_SIZE, BIG_ENDIAN, SKIP, STRIDE, NO_DATA, CROP, TERRAIN_SIZE, SEED, SPACING,
     HEIGHT_SCALE, ORIGIN, MODE, SIZE, FOV, SKY,
-    FRAMES, SPEED, FPS, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
+    FRAMES, SPEED, FPS, ABOVE, PATH, CHUNK, FADE, MAX_ANGLE, TOLERANCE, GROUND_TOLERANCE, TEXELS,
     IMPOSTOR_PX, ATLAS, ATLAS_COUNT, MAX_CAPTURES, MAX_CAPTURE_TEXELS, MAX_CAPTURE_TRIANGLES,
-    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, EXACT_DEPTH, RULE, MORPH, OUT, SAVE_EVERY,
+    NO_LOOKAHEAD, NO_SPLITS, NO_SPREADING, EXACT_DEPTH, HIDE, RULE, MORPH, OUT, SAVE_EVERY,
     SAVE_FRAMES, STATS,
     WIREFRAME, SHOW_ATLAS, COMPARE, HELP, OPTION_COUNT
 } option_id;
@@ -194,6 +194,7 @@ static const option table[OPTION_COUNT] = {
     { FRAMES, "--frames", "N", "how many [600, or all of --path]" },
     { SPEED, "--speed", "UNITS_PER_S", "of the eye [80 spacings a second]" },
     { FPS, "--fps", "N", "simulated frames a second [60]" },
+    { ABOVE, "--above", "UNITS", "over the ground below; a smaller circle [the highest ground]" },
     { PATH, "--path", "FILE", "lines of eye_x eye_y eye_z target_x target_y target_z [a circle]" },
     { CHUNK, "--chunk", "QUADS", "along the side of a chunk [64]" },
     { FADE, "--fade", "START,END", "distances between which ground gives way to impostors" },
@@ -211,6 +212,7 @@ static const option table[OPTION_COUNT] = {
     { NO_SPLITS, "--no-splits", NULL, "no picture in two parts" },
     { NO_SPREADING, "--no-spreading", NULL, "pictures are renewed when they are due" },
     { EXACT_DEPTH, "--exact-depth", NULL, "impostors have the depth of the terrain" },
+    { HIDE, "--hide", NULL, "leave out what ridges hide" },
     { RULE, "--rule", "picture|bound|distance", "of ground: what is tolerated [picture]" },
     { MORPH, "--morph", "RATIO", "of ground: of the distances where nodes morph [1: not]" },
     { OUT, "--out", "DIR", "directory for the pictures; made if it is missing" },
@@ -269,6 +271,7 @@ static int take(options *o, option_id id, const char *text)
     case FRAMES: return take_unsigned(text, &o->frames) && o->frames > 0;
     case SPEED: return take_positive(text, &o->speed);
     case FPS: return take_positive(text, &o->fps);
+    case ABOVE: return take_positive(text, &o->above);
     case PATH: return take_text(text, &o->path);
     case CHUNK: return take_unsigned(text, &o->chunk) && o->chunk >= 4 && o->chunk <= 128
                        && o->chunk % 2 == 0;
@@ -287,6 +290,7 @@ static int take(options *o, option_id id, const char *text)
     case NO_SPLITS: return take_flag(&o->no_splits);
     case NO_SPREADING: return take_flag(&o->no_spreading);
     case EXACT_DEPTH: return take_flag(&o->exact_depth);
+    case HIDE: return take_flag(&o->hide);
     case RULE: return take_rule(text, &o->rule);
     case MORPH: return take_number(text, 1.0f, 4.0f, &o->morph);
     case OUT: return take_text(text, &o->out);
@@ -373,6 +377,7 @@ void options_print_ignored(const options *o, int raw, FILE *file)
     if (o->path) {
         print_ignored(o, SPEED, "--path says where the eye is", file);
         print_ignored(o, FPS, "--path says where the eye is", file);
+        print_ignored(o, ABOVE, "--path says where the eye is", file);
     }
 }
 

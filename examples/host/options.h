@@ -19,13 +19,13 @@ typedef struct options {
     uint32_t width, height;            /* of the picture, pixels */
     float fov_degrees;
     uint32_t frames;
-    float speed, fps;
+    float speed, fps, above;
     float spacing[2], height_scale;
     float origin[2];                   /* x, z of the first sample */
     uint32_t chunk, atlas, atlas_count;
     uint32_t max_captures, max_capture_texels, max_capture_triangles;
     float fade[2], max_angle_degrees, tolerance, ground_tolerance, texels, impostor_px;
-    int no_lookahead, no_splits, no_spreading, exact_depth;
+    int no_lookahead, no_splits, no_spreading, exact_depth, hide;
     int rule;                          /* terrimp_geomip_rule */
     float morph;
     uint32_t save_every;

@@ -82,7 +82,8 @@ int tour_plan(tour *t)
     if (d->path)
         ok = flight_load(&t->flight, d->path);
     else
-        ok = flight_circle(&t->flight, &field, d->frames ? d->frames : 600, speed / fps);
+        ok = flight_circle(&t->flight, &field, d->frames ? d->frames : 600, speed / fps,
+                           d->above);
     if (!ok)
         return fail(t, t->flight.error);
     if (d->frames && d->frames < t->flight.count)
@@ -110,8 +111,11 @@ terrimp_camera tour_camera_at(const flight_pose *pose, const terrimp_box *box, f
 
 terrimp_camera tour_camera(const tour *t, const terrimp_box *box, size_t frame)
 {
-    return tour_camera_at(&t->flight.poses[frame], box, t->desc.fov_y_rad, t->desc.width,
-                          t->desc.height);
+    terrimp_camera camera = tour_camera_at(&t->flight.poses[frame], box, t->desc.fov_y_rad,
+                                           t->desc.width, t->desc.height);
+    if (t->desc.above > 0.0f && camera.z_near > 0.2f * t->desc.above)
+        camera.z_near = 0.2f * t->desc.above; /* no ground is cut off, which then hides nothing */
+    return camera;
 }
 
 void tour_tighten(terrimp_camera *camera, const terrimp_stats *now)

@@ -17,6 +17,8 @@ typedef struct tour_desc {
     float origin[2];          /* [wu] x, z of the first sample */
     const char *path;         /* a line a frame; null: the circle */
     size_t frames;            /* [Default 0 -> all of the path, 600 of the circle] */
+    float above;              /* [wu] the circle is a lower one, that far above the ground
+                                 [Default 0 -> the thesis'] */
     float speed;              /* round the circle [wu/s] [Default 0 -> 80 spacings a second] */
     float fps;                /* [Default 0 -> 60] */
     float fov_y_rad;          /* [Default 0 -> 60 degrees] */
