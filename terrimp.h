@@ -1319,7 +1319,7 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    those of the same terrain in memory. A view's morph_ratio is the file's at most, with the rule
    PICTURE. */
 
-#define TERRIMP_PAGES_VERSION 2u
+#define TERRIMP_PAGES_VERSION 3u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
 
 /* What a header says. */
@@ -7185,12 +7185,6 @@ static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node
     return terrimpi_corners_of(t, node) + t->index_limit / 4u;
 }
 
-/* Bytes of a sample in a page: as the field's, but two at least. */
-static uint32_t terrimpi_page_sample_bytes(const terrimp_heightfield *field)
-{
-    return field->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
-}
-
 /* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
    is taken for a whole one. */
 static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_t node)
@@ -7198,8 +7192,7 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     terrimp_heightfield f = t->desc.field;
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     f.samples = terrimpi_page_samples(t, node);
-    f.row_bytes = terrimpi_page_sample_bytes(&f) * (t->desc.chunk_quads + 1u);
-    f.format = f.format == TERRIMP_FORMAT_U8 ? TERRIMP_FORMAT_U16 : f.format;
+    f.row_bytes = terrimpi_field_sample_bytes(f.format) * (t->desc.chunk_quads + 1u);
     f.origin_x = terrimpi_terrain_x(t, p.x);
     f.origin_z = terrimpi_terrain_z(t, p.z);
     f.spacing_x *= (float)(1u << p.level);
@@ -8589,8 +8582,9 @@ typedef struct terrimpi_pages_head {
 static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 {
     uint32_t side = t->desc.chunk_quads + 1u;
+    uint32_t size = (uint32_t)terrimpi_field_sample_bytes(t->desc.field.format);
     uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
-                     t->index_limit + terrimpi_page_sample_bytes(&t->desc.field) * side * side;
+                     t->index_limit + size * side * side;
     return (bytes + 15u) / 16u * 16u;
 }
 
@@ -8958,6 +8952,12 @@ static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
     return a->level != b->level ? a->level > b->level : a->node < b->node;
 }
 
+static int terrimpi_want_after(const void *wants, uint32_t a, uint32_t b)
+{
+    const terrimp_want *w = (const terrimp_want *)wants;
+    return terrimpi_want_before(&w[b], &w[a]);
+}
+
 /* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
 static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node, int reason,
                               float urgency)
@@ -9143,23 +9143,19 @@ TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp
                                                uint32_t capacity, uint32_t *count)
 {
     struct terrimp_pages *p;
-    uint32_t i, k, gap, room = 0;
+    uint32_t order[TERRIMPI_PAGE_WANTS], i, room = 0;
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
     TERRIMPI_REFUSE(!wants && capacity > 0, TERRIMP_E_NULL);
     p = terrain->tree.pages;
-    for (gap = p->want_count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < p->want_count; i++) {
-            terrimp_want moved = p->wants[i];
-            for (k = i; k >= gap && terrimpi_want_before(&moved, &p->wants[k - gap]); k -= gap)
-                p->wants[k] = p->wants[k - gap];
-            p->wants[k] = moved;
-        }
+    for (i = 0; i < p->want_count; i++)
+        order[i] = i;
+    terrimpi_sort(order, p->want_count, p->wants, terrimpi_want_after);
     for (i = 0; i < p->slot_count; i++)
         room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
     room = terrimpi_min_u32(room, capacity);
     for (*count = i = 0; i < p->want_count && *count < room; i++)
-        if (!p->slot_of[p->wants[i].node]) /* it has not been begun since */
-            wants[(*count)++] = p->wants[i];
+        if (!p->slot_of[p->wants[order[i]].node]) /* it has not been begun since */
+            wants[(*count)++] = p->wants[order[i]];
     return TERRIMP_OK;
 }
 
@@ -11954,30 +11950,16 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
     return used;
 }
 
-/* Whether a candidate is to be captured before another: what is missing first, then what is due,
-   then what soon will be; among equals the lower node. */
-static int terrimpi_candidate_before(const terrimpi_candidate *a, const terrimpi_candidate *b)
+/* Whether a candidate is to be captured after another: what is missing comes first, then what is
+   due, then what soon will be; among equals the lower node. */
+static int terrimpi_candidate_after(const void *candidates, uint32_t a, uint32_t b)
 {
-    if (a->rank != b->rank)
-        return a->rank > b->rank;
-    if (a->weight > b->weight || a->weight < b->weight)
-        return a->weight > b->weight;
-    return a->node.number < b->node.number;
-}
-
-static void terrimpi_view_sort_queue(const terrimpi_candidate *candidates, uint32_t *queue,
-                                     uint32_t count)
-{
-    uint32_t gap, i, k;
-    for (gap = count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < count; i++) {
-            uint32_t moved = queue[i];
-            for (k = i; k >= gap && terrimpi_candidate_before(&candidates[moved],
-                                                              &candidates[queue[k - gap]]);
-                 k -= gap)
-                queue[k] = queue[k - gap];
-            queue[k] = moved;
-        }
+    const terrimpi_candidate *c = (const terrimpi_candidate *)candidates;
+    if (c[a].rank != c[b].rank)
+        return c[a].rank < c[b].rank;
+    if (c[a].weight > c[b].weight || c[a].weight < c[b].weight)
+        return c[a].weight < c[b].weight;
+    return c[a].node.number > c[b].node.number;
 }
 
 /* Lists what could be captured, most urgent first; each rank by the error on the screen times the
@@ -12004,7 +11986,7 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
                                                     terrimpi_view_age(&v->frame, c->picture));
             v->queue[count++] = index;
         }
-    terrimpi_view_sort_queue(v->candidates, v->queue, count);
+    terrimpi_sort(v->queue, count, v->candidates, terrimpi_candidate_after);
     return count;
 }
 
@@ -17454,22 +17436,21 @@ static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t
     return r;
 }
 
-/* Copies the samples of a node of the part into its page. */
-static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n,
-                                    unsigned char *out)
+/* Copies the samples of a node of the part into the page, or out of it. */
+static void terrimpi_paging_copy(const terrimpi_paging *w, const terrimp_node *n, int out)
 {
     const terrimp_quadtree *t = &w->part->tree;
-    uint32_t i, j, quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field);
-    for (j = 0; j <= quads; j++) {
-        const unsigned char *row = (const unsigned char *)terrimpi_field_row(
-            &t->field, terrimpi_tree_row(t, n->level, n->z * quads + j));
-        for (i = 0; i <= quads; i++, out += size) {
+    size_t size = terrimpi_field_sample_bytes(t->field.format);
+    unsigned char *page = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
+                          4u * w->whole.vertex_limit + w->whole.index_limit;
+    uint32_t i, j, quads = t->chunk_quads;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++, page += size) {
             uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
-            uint16_t wide = row[t->field.format == TERRIMP_FORMAT_U8 ? x : 0];
-            memcpy(out, t->field.format == TERRIMP_FORMAT_U8 ? (const void *)&wide : row + x * size,
-                   size);
+            uint32_t z = terrimpi_tree_row(t, n->level, n->z * quads + j);
+            unsigned char *sample = w->samples + ((size_t)z * t->field.width + x) * size;
+            memcpy(out ? sample : page, out ? page : sample, size);
         }
-    }
 }
 
 /* The node of the whole that a node of the part is. */
@@ -17502,7 +17483,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
     at += 4u * t->vertex_limit;
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
-    terrimpi_paging_samples(w, n, w->page + at + t->index_limit);
+    terrimpi_paging_copy(w, n, 0);
     memcpy(w->page, &head, sizeof head);
     head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
@@ -17586,25 +17567,11 @@ TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *d
 /* Takes over what a block's topmost page says: the part's level 0. */
 static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terrimp_node *n)
 {
-    const terrimp_quadtree *t = &w->part->tree;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field), i, j, x, z;
     terrimpi_page_head head;
-    const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
-                                4u * w->whole.vertex_limit + w->whole.index_limit;
     TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++, from += size) {
-            uint16_t sample;
-            x = terrimpi_tree_col(t, 0, n->x * quads + i);
-            z = terrimpi_tree_row(t, 0, n->z * quads + j);
-            memcpy(&sample, from, sizeof sample);
-            if (t->field.format == TERRIMP_FORMAT_U8)
-                w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
-            else
-                memcpy(w->samples + ((size_t)z * t->field.width + x) * size, from, size);
-        }
-    t->nodes[n->number] = head.record.ground;
+    terrimpi_paging_copy(w, n, 1);
+    w->part->tree.nodes[n->number] = head.record.ground;
     w->part->meshes[n->number] = head.record.mesh;
     w->held[n->number] = head.record.held;
     w->missed[n->number] = head.record.ground.error;
