@@ -9266,14 +9266,10 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
                                       terrimpi_pages_layout(&t, &p, NULL, &copy)));
     if (field) {
-        terrimp_heightfield place = *field;
+        terrimp_heightfield place = t.desc.field;
         place.samples = header;
-        place.width = t.desc.field.width;
-        place.depth = t.desc.field.depth;
-        place.format = t.desc.field.format;
-        place.row_bytes = 0;
-        place.height_scale = t.desc.field.height_scale;
-        place.height_offset = t.desc.field.height_offset;
+        place.spacing_x = field->spacing_x, place.spacing_z = field->spacing_z;
+        place.origin_x = field->origin_x, place.origin_z = field->origin_z;
         TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
     }
     t.desc.field.samples = NULL; /* there are none but those of pages */
@@ -9341,26 +9337,20 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
     return TERRIMP_OK;
 }
 
-/* Whether a ray comes into the columns and rows of a box before a distance. The direction's length
-   is 1. */
+/* Whether a ray comes into a box before a distance, or by. The direction's length is 1. */
 static int terrimpi_page_on_way(const terrimp_box *box, const float origin[3],
                                 const float direction[3], float distance)
 {
-    float from = 0.0f, to = distance;
+    float from = 0.0f;
     int i;
     for (i = 0; i < 3; i++) {
         float slack = 1e-5f * (terrimpi_abs(box->min[i]) + terrimpi_abs(box->max[i]) +
                                terrimpi_abs(origin[i]));
-        float low = box->min[i] - origin[i] - slack, high = box->max[i] - origin[i] + slack;
-        if (direction[i] > -1e-12f && direction[i] < 1e-12f) {
-            if (low > 0.0f || high < 0.0f)
-                return 0;
-            continue;
-        }
-        from = terrimpi_max(from, (direction[i] > 0.0f ? low : high) / direction[i]);
-        to = terrimpi_min(to, (direction[i] > 0.0f ? high : low) / direction[i]);
+        if (!terrimpi_field_ray_clip(origin[i], direction[i], box->min[i] - slack,
+                                     box->max[i] + slack, &from, &distance))
+            return 0;
     }
-    return from <= to;
+    return 1;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
@@ -9385,10 +9375,10 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
                                            hit);
     }
     TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, tree->node_count - 1u), TERRIMP_E_PAGE);
-    memcpy(way, direction, sizeof way);
     TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
                     !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_normalize(way), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_field_ray_aim(direction, way),
+                    TERRIMP_E_RANGE);
     memset(&best, 0, sizeof best);
     terrimpi_tree_begin(&walk, tree, origin, 0);
     while (terrimpi_tree_next(&walk, &v)) {
@@ -17185,7 +17175,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 typedef struct terrimpi_paging {
     const terrimp_pages_desc *desc; /* resolved */
     terrimp_terrain whole;          /* nothing but its numbers */
-    uint32_t stamp;
+    terrimpi_pages_head head;       /* of the file, but for what is known at the end */
     uint32_t level;                 /* of the whole: of the part's level 0 */
     uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
     terrimp_terrain *part;
@@ -17225,30 +17215,6 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     *block_count = t.tree.level_x[d.block_level] * t.tree.level_z[d.block_level];
     *out = d;
     return TERRIMP_OK;
-}
-
-/* The number that all pages of a file bear. */
-static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
-{
-    const terrimp_terrain_desc *t = &d->terrain;
-    uint32_t words[14], i, hash = 2166136261u;
-    words[0] = d->stamp;
-    words[1] = t->field.width;
-    words[2] = t->field.depth;
-    words[3] = (uint32_t)t->field.format;
-    words[4] = t->chunk_quads;
-    words[5] = t->triangle_budget;
-    words[6] = d->block_level;
-    words[7] = (t->no_lower_skirts ? 1u : 0u) | TERRIMP_PAGES_VERSION << 1;
-    words[8] = terrimpi_bake_float_bits(t->field.height_scale);
-    words[9] = terrimpi_bake_float_bits(t->field.height_offset);
-    words[10] = terrimpi_bake_float_bits(t->height_low);
-    words[11] = terrimpi_bake_float_bits(t->height_high);
-    words[12] = terrimpi_bake_float_bits(t->proud);
-    words[13] = terrimpi_bake_float_bits(d->morph_ratio);
-    for (i = 0; i < 14u; i++)
-        hash = terrimpi_bake_hash_word(hash, words[i]);
-    return hash;
 }
 
 /* Begins a window of columns [x, x + width) and rows of the field at a level's steps; w has its
@@ -17328,9 +17294,16 @@ static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terr
     TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
     memset(w, 0, sizeof *w);
     w->desc = d;
-    w->stamp = terrimpi_paging_stamp(d);
     w->whole.desc = d->terrain;
     terrimpi_terrain_count(&w->whole);
+    terrimpi_bake_describe(&w->whole, &w->head.bake);
+    w->head.bake.magic = TERRIMPI_PAGES_MAGIC;
+    w->head.bake.version = TERRIMP_PAGES_VERSION;
+    w->head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
+    w->head.block_level = d->block_level;
+    w->head.morph_ratio = d->morph_ratio;
+    w->head.stamp = d->stamp;
+    w->head.stamp = terrimpi_page_hash((const unsigned char *)&w->head, sizeof w->head);
     return TERRIMP_OK;
 }
 
@@ -17469,7 +17442,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN;
     terrimpi_page_head head;
     memset(w->page, 0, bytes);
-    head.stamp = w->stamp;
+    head.stamp = w->head.stamp;
     head.node = whole.number;
     head.record = terrimpi_paging_record(w, n->number);
     for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
@@ -17544,7 +17517,7 @@ static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terri
                                    terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
                                    bytes), TERRIMP_E_PAGE);
     memcpy(head, page, sizeof *head);
-    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->stamp &&
+    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->head.stamp &&
                    head->node == n->number ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
@@ -17636,32 +17609,22 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
 /* Makes and stores the header. */
 static terrimp_result terrimpi_paging_header(const terrimpi_paging *w)
 {
-    unsigned char *room = w->header;
-    const terrimp_terrain *t = &w->whole;
-    terrimp_node root = terrimpi_tree_root(&t->tree);
-    terrimpi_pages_head head;
+    terrimp_node root = terrimpi_tree_root(&w->whole.tree);
+    terrimpi_pages_head head = w->head;
     terrimpi_page_head top;
-    memset(&head, 0, sizeof head);
-    memset(room, 0, TERRIMP_PAGES_HEADER_BYTES);
-    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(room + sizeof head)));
+    memset(w->header, 0, TERRIMP_PAGES_HEADER_BYTES);
+    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(w->header + sizeof head)));
     TERRIMPI_TRY(terrimpi_paging_load(w, &root, w->page, &top));
-    terrimpi_bake_describe(t, &head.bake);
-    head.bake.magic = TERRIMPI_PAGES_MAGIC;
-    head.bake.version = TERRIMP_PAGES_VERSION;
-    head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
     head.bake.sample_low = w->part->sample_low;
     head.bake.sample_high = w->part->sample_high;
     head.bake.range_low = w->part->range_low;
     head.bake.range_step = w->part->range_step;
-    head.block_level = w->desc->block_level;
-    head.morph_ratio = w->desc->morph_ratio;
-    head.stamp = w->stamp;
     head.root = top.record;
-    memcpy(room, &head, sizeof head);
-    head.bake.checksum = terrimpi_bake_hash(room);
-    memcpy(room, &head, sizeof head);
-    return w->desc->store(w->desc->user, 0, room, TERRIMP_PAGES_HEADER_BYTES) ? TERRIMP_OK
-                                                                              : TERRIMP_E_PAGE;
+    memcpy(w->header, &head, sizeof head);
+    head.bake.checksum = terrimpi_bake_hash(w->header);
+    memcpy(w->header, &head, sizeof head);
+    return w->desc->store(w->desc->user, 0, w->header, TERRIMP_PAGES_HEADER_BYTES)
+               ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
 TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,
