@@ -1354,14 +1354,16 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain);
 
 /* Goes on after an edit: the blocks that reach to what was edited, and the end, have been built
-   anew. All pages are given up, and come again; what views show of it is theirs to be told
-   (terrimp_view_touch).
+   anew. The pages of the nodes that terrimp_terrain_touched lists are given up, the root's too, and
+   have to come again; a host that reads them before the next update, root first, misses no frame.
+   What views show of it is theirs to be told (terrimp_view_touch).
 
    header      [bytes] as it is now
+   samples     that were edited; NULL: all
    Errors      E_STATE while a page is coming; E_BAKE when the header is damaged or of another file:
                nothing has changed */
 TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
-                                               size_t bytes);
+                                               size_t bytes, const terrimp_rect *samples);
 
 typedef enum terrimp_page_state {
     TERRIMP_PAGE_ABSENT = 0,
@@ -8555,8 +8557,9 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 /* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
    terrain only while it is made).
 
-   The parent of a page that is here is here too, so whatever is missing has a stand-in, and what is
-   known of a node hangs on its parent's page alone. */
+   The parent of a page that is here is here too (but for a while after an edit, when no frame comes
+   to what lies below), so whatever is missing has a stand-in, and what is known of a node hangs on
+   its parent's page alone. */
 
 #define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
 #define TERRIMPI_PAGE_SURE 4.0f  /* square of a guess of an error over its limit that is believed */
@@ -8798,8 +8801,8 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     n = terrimpi_tree_node(&terrain->tree, node);
     for (i = 0; i < 4u; i++)
         if (terrimpi_tree_quarter(&terrain->tree, &n, i, &child)) {
-            found->lacking++;
-            if (p->slot_of[child.number]) /* it failed, and they stay */
+            found->lacking = (uint8_t)(found->lacking + !terrimpi_page_of(p, child.number));
+            if (p->slot_of[child.number]) /* it failed or was edited, and they stay */
                 found->children++;
         }
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
@@ -8823,10 +8826,12 @@ static float terrimpi_page_held_by(float morph_ratio, float held)
     return 0.5f * morph_ratio * morph_ratio * held;
 }
 
-/* Whether the records of a node's children are held by its own. */
+/* Whether the records of a node's children are held by its own. Children that are here since before
+   an edit have to be those that it knows. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
 {
+    terrimpi_page_slot *slot;
     terrimp_node child;
     uint32_t i;
     for (i = 0; i < 4u; i++) {
@@ -8840,6 +8845,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
             r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
             terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
+        slot = terrimpi_page_slot_of(t->tree.pages, child.number);
+        if (slot && slot->page && memcmp(slot->record, &r, sizeof r) != 0)
+            terrimpi_page_clear(&t->tree, slot);
     }
     return 1;
 }
@@ -9292,13 +9300,16 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
 }
 
 TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
-                                               size_t bytes)
+                                               size_t bytes, const terrimp_rect *samples)
 {
+    const terrimp_rect all = {0, 0, 0xffffffffu, 0xffffffffu};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages *p;
     uint32_t i;
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, header));
+    samples = samples ? samples : &all;
+    TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
     p = terrain->tree.pages;
     TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
@@ -9307,11 +9318,14 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
     memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
     terrain->sample_low = t.sample_low;
     terrain->sample_high = t.sample_high;
-    memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
-    for (i = 0; i < p->slot_count; i++) {
-        p->slots[i].node = p->node_count;
-        p->slots[i].page = NULL;
-    }
+    for (i = 0; i < p->slot_count; i++)
+        if (p->slots[i].page) {
+            terrimp_node n = terrimpi_tree_node(&terrain->tree, p->slots[i].node);
+            terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, n.level,
+                                                                         0);
+            if (n.x >= in.x0 && n.x <= in.x1 && n.z >= in.z0 && n.z <= in.z1)
+                terrimpi_page_clear(&terrain->tree, &p->slots[i]);
+        }
     return TERRIMP_OK;
 }
 
