@@ -1319,7 +1319,7 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    those of the same terrain in memory. A view's morph_ratio is the file's at most, with the rule
    PICTURE. */
 
-#define TERRIMP_PAGES_VERSION 2u
+#define TERRIMP_PAGES_VERSION 3u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
 
 /* What a header says. */
@@ -1354,14 +1354,16 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain);
 
 /* Goes on after an edit: the blocks that reach to what was edited, and the end, have been built
-   anew. All pages are given up, and come again; what views show of it is theirs to be told
-   (terrimp_view_touch).
+   anew. The pages of the nodes that terrimp_terrain_touched lists are given up, the root's too, and
+   have to come again; a host that reads them before the next update, root first, misses no frame.
+   What views show of it is theirs to be told (terrimp_view_touch).
 
    header      [bytes] as it is now
+   samples     that were edited; NULL: all
    Errors      E_STATE while a page is coming; E_BAKE when the header is damaged or of another file:
                nothing has changed */
 TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
-                                               size_t bytes);
+                                               size_t bytes, const terrimp_rect *samples);
 
 typedef enum terrimp_page_state {
     TERRIMP_PAGE_ABSENT = 0,
@@ -7185,12 +7187,6 @@ static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node
     return terrimpi_corners_of(t, node) + t->index_limit / 4u;
 }
 
-/* Bytes of a sample in a page: as the field's, but two at least. */
-static uint32_t terrimpi_page_sample_bytes(const terrimp_heightfield *field)
-{
-    return field->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
-}
-
 /* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
    is taken for a whole one. */
 static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_t node)
@@ -7198,8 +7194,7 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     terrimp_heightfield f = t->desc.field;
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     f.samples = terrimpi_page_samples(t, node);
-    f.row_bytes = terrimpi_page_sample_bytes(&f) * (t->desc.chunk_quads + 1u);
-    f.format = f.format == TERRIMP_FORMAT_U8 ? TERRIMP_FORMAT_U16 : f.format;
+    f.row_bytes = terrimpi_field_sample_bytes(f.format) * (t->desc.chunk_quads + 1u);
     f.origin_x = terrimpi_terrain_x(t, p.x);
     f.origin_z = terrimpi_terrain_z(t, p.z);
     f.spacing_x *= (float)(1u << p.level);
@@ -8562,8 +8557,9 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 /* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
    terrain only while it is made).
 
-   The parent of a page that is here is here too, so whatever is missing has a stand-in, and what is
-   known of a node hangs on its parent's page alone. */
+   The parent of a page that is here is here too (but for a while after an edit, when no frame comes
+   to what lies below), so whatever is missing has a stand-in, and what is known of a node hangs on
+   its parent's page alone. */
 
 #define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
 #define TERRIMPI_PAGE_SURE 4.0f  /* square of a guess of an error over its limit that is believed */
@@ -8589,8 +8585,9 @@ typedef struct terrimpi_pages_head {
 static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 {
     uint32_t side = t->desc.chunk_quads + 1u;
+    uint32_t size = (uint32_t)terrimpi_field_sample_bytes(t->desc.field.format);
     uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
-                     t->index_limit + terrimpi_page_sample_bytes(&t->desc.field) * side * side;
+                     t->index_limit + size * side * side;
     return (bytes + 15u) / 16u * 16u;
 }
 
@@ -8804,8 +8801,8 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
     n = terrimpi_tree_node(&terrain->tree, node);
     for (i = 0; i < 4u; i++)
         if (terrimpi_tree_quarter(&terrain->tree, &n, i, &child)) {
-            found->lacking++;
-            if (p->slot_of[child.number]) /* it failed, and they stay */
+            found->lacking = (uint8_t)(found->lacking + !terrimpi_page_of(p, child.number));
+            if (p->slot_of[child.number]) /* it failed or was edited, and they stay */
                 found->children++;
         }
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
@@ -8829,10 +8826,12 @@ static float terrimpi_page_held_by(float morph_ratio, float held)
     return 0.5f * morph_ratio * morph_ratio * held;
 }
 
-/* Whether the records of a node's children are held by its own. */
+/* Whether the records of a node's children are held by its own. Children that are here since before
+   an edit have to be those that it knows. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
 {
+    terrimpi_page_slot *slot;
     terrimp_node child;
     uint32_t i;
     for (i = 0; i < 4u; i++) {
@@ -8846,6 +8845,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
             r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
             terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
+        slot = terrimpi_page_slot_of(t->tree.pages, child.number);
+        if (slot && slot->page && memcmp(slot->record, &r, sizeof r) != 0)
+            terrimpi_page_clear(&t->tree, slot);
     }
     return 1;
 }
@@ -8956,6 +8958,12 @@ static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
     if (a->urgency > b->urgency || a->urgency < b->urgency)
         return a->urgency > b->urgency;
     return a->level != b->level ? a->level > b->level : a->node < b->node;
+}
+
+static int terrimpi_want_after(const void *wants, uint32_t a, uint32_t b)
+{
+    const terrimp_want *w = (const terrimp_want *)wants;
+    return terrimpi_want_before(&w[b], &w[a]);
 }
 
 /* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
@@ -9143,23 +9151,19 @@ TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp
                                                uint32_t capacity, uint32_t *count)
 {
     struct terrimp_pages *p;
-    uint32_t i, k, gap, room = 0;
+    uint32_t order[TERRIMPI_PAGE_WANTS], i, room = 0;
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
     TERRIMPI_REFUSE(!wants && capacity > 0, TERRIMP_E_NULL);
     p = terrain->tree.pages;
-    for (gap = p->want_count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < p->want_count; i++) {
-            terrimp_want moved = p->wants[i];
-            for (k = i; k >= gap && terrimpi_want_before(&moved, &p->wants[k - gap]); k -= gap)
-                p->wants[k] = p->wants[k - gap];
-            p->wants[k] = moved;
-        }
+    for (i = 0; i < p->want_count; i++)
+        order[i] = i;
+    terrimpi_sort(order, p->want_count, p->wants, terrimpi_want_after);
     for (i = 0; i < p->slot_count; i++)
         room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
     room = terrimpi_min_u32(room, capacity);
     for (*count = i = 0; i < p->want_count && *count < room; i++)
-        if (!p->slot_of[p->wants[i].node]) /* it has not been begun since */
-            wants[(*count)++] = p->wants[i];
+        if (!p->slot_of[p->wants[order[i]].node]) /* it has not been begun since */
+            wants[(*count)++] = p->wants[order[i]];
     return TERRIMP_OK;
 }
 
@@ -9270,14 +9274,10 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
                                       terrimpi_pages_layout(&t, &p, NULL, &copy)));
     if (field) {
-        terrimp_heightfield place = *field;
+        terrimp_heightfield place = t.desc.field;
         place.samples = header;
-        place.width = t.desc.field.width;
-        place.depth = t.desc.field.depth;
-        place.format = t.desc.field.format;
-        place.row_bytes = 0;
-        place.height_scale = t.desc.field.height_scale;
-        place.height_offset = t.desc.field.height_offset;
+        place.spacing_x = field->spacing_x, place.spacing_z = field->spacing_z;
+        place.origin_x = field->origin_x, place.origin_z = field->origin_z;
         TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
     }
     t.desc.field.samples = NULL; /* there are none but those of pages */
@@ -9300,13 +9300,16 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
 }
 
 TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
-                                               size_t bytes)
+                                               size_t bytes, const terrimp_rect *samples)
 {
+    const terrimp_rect all = {0, 0, 0xffffffffu, 0xffffffffu};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages *p;
     uint32_t i;
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, header));
+    samples = samples ? samples : &all;
+    TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
     p = terrain->tree.pages;
     TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
@@ -9315,11 +9318,14 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
     memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
     terrain->sample_low = t.sample_low;
     terrain->sample_high = t.sample_high;
-    memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
-    for (i = 0; i < p->slot_count; i++) {
-        p->slots[i].node = p->node_count;
-        p->slots[i].page = NULL;
-    }
+    for (i = 0; i < p->slot_count; i++)
+        if (p->slots[i].page) {
+            terrimp_node n = terrimpi_tree_node(&terrain->tree, p->slots[i].node);
+            terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, n.level,
+                                                                         0);
+            if (n.x >= in.x0 && n.x <= in.x1 && n.z >= in.z0 && n.z <= in.z1)
+                terrimpi_page_clear(&terrain->tree, &p->slots[i]);
+        }
     return TERRIMP_OK;
 }
 
@@ -9345,26 +9351,20 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
     return TERRIMP_OK;
 }
 
-/* Whether a ray comes into the columns and rows of a box before a distance. The direction's length
-   is 1. */
+/* Whether a ray comes into a box before a distance, or by. The direction's length is 1. */
 static int terrimpi_page_on_way(const terrimp_box *box, const float origin[3],
                                 const float direction[3], float distance)
 {
-    float from = 0.0f, to = distance;
+    float from = 0.0f;
     int i;
     for (i = 0; i < 3; i++) {
         float slack = 1e-5f * (terrimpi_abs(box->min[i]) + terrimpi_abs(box->max[i]) +
                                terrimpi_abs(origin[i]));
-        float low = box->min[i] - origin[i] - slack, high = box->max[i] - origin[i] + slack;
-        if (direction[i] > -1e-12f && direction[i] < 1e-12f) {
-            if (low > 0.0f || high < 0.0f)
-                return 0;
-            continue;
-        }
-        from = terrimpi_max(from, (direction[i] > 0.0f ? low : high) / direction[i]);
-        to = terrimpi_min(to, (direction[i] > 0.0f ? high : low) / direction[i]);
+        if (!terrimpi_field_ray_clip(origin[i], direction[i], box->min[i] - slack,
+                                     box->max[i] + slack, &from, &distance))
+            return 0;
     }
-    return from <= to;
+    return 1;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
@@ -9389,10 +9389,10 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
                                            hit);
     }
     TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, tree->node_count - 1u), TERRIMP_E_PAGE);
-    memcpy(way, direction, sizeof way);
     TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
                     !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_normalize(way), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_field_ray_aim(direction, way),
+                    TERRIMP_E_RANGE);
     memset(&best, 0, sizeof best);
     terrimpi_tree_begin(&walk, tree, origin, 0);
     while (terrimpi_tree_next(&walk, &v)) {
@@ -11954,30 +11954,16 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
     return used;
 }
 
-/* Whether a candidate is to be captured before another: what is missing first, then what is due,
-   then what soon will be; among equals the lower node. */
-static int terrimpi_candidate_before(const terrimpi_candidate *a, const terrimpi_candidate *b)
+/* Whether a candidate is to be captured after another: what is missing comes first, then what is
+   due, then what soon will be; among equals the lower node. */
+static int terrimpi_candidate_after(const void *candidates, uint32_t a, uint32_t b)
 {
-    if (a->rank != b->rank)
-        return a->rank > b->rank;
-    if (a->weight > b->weight || a->weight < b->weight)
-        return a->weight > b->weight;
-    return a->node.number < b->node.number;
-}
-
-static void terrimpi_view_sort_queue(const terrimpi_candidate *candidates, uint32_t *queue,
-                                     uint32_t count)
-{
-    uint32_t gap, i, k;
-    for (gap = count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < count; i++) {
-            uint32_t moved = queue[i];
-            for (k = i; k >= gap && terrimpi_candidate_before(&candidates[moved],
-                                                              &candidates[queue[k - gap]]);
-                 k -= gap)
-                queue[k] = queue[k - gap];
-            queue[k] = moved;
-        }
+    const terrimpi_candidate *c = (const terrimpi_candidate *)candidates;
+    if (c[a].rank != c[b].rank)
+        return c[a].rank < c[b].rank;
+    if (c[a].weight > c[b].weight || c[a].weight < c[b].weight)
+        return c[a].weight < c[b].weight;
+    return c[a].node.number > c[b].node.number;
 }
 
 /* Lists what could be captured, most urgent first; each rank by the error on the screen times the
@@ -12004,7 +11990,7 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
                                                     terrimpi_view_age(&v->frame, c->picture));
             v->queue[count++] = index;
         }
-    terrimpi_view_sort_queue(v->candidates, v->queue, count);
+    terrimpi_sort(v->queue, count, v->candidates, terrimpi_candidate_after);
     return count;
 }
 
@@ -17203,7 +17189,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 typedef struct terrimpi_paging {
     const terrimp_pages_desc *desc; /* resolved */
     terrimp_terrain whole;          /* nothing but its numbers */
-    uint32_t stamp;
+    terrimpi_pages_head head;       /* of the file, but for what is known at the end */
     uint32_t level;                 /* of the whole: of the part's level 0 */
     uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
     terrimp_terrain *part;
@@ -17243,30 +17229,6 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     *block_count = t.tree.level_x[d.block_level] * t.tree.level_z[d.block_level];
     *out = d;
     return TERRIMP_OK;
-}
-
-/* The number that all pages of a file bear. */
-static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
-{
-    const terrimp_terrain_desc *t = &d->terrain;
-    uint32_t words[14], i, hash = 2166136261u;
-    words[0] = d->stamp;
-    words[1] = t->field.width;
-    words[2] = t->field.depth;
-    words[3] = (uint32_t)t->field.format;
-    words[4] = t->chunk_quads;
-    words[5] = t->triangle_budget;
-    words[6] = d->block_level;
-    words[7] = (t->no_lower_skirts ? 1u : 0u) | TERRIMP_PAGES_VERSION << 1;
-    words[8] = terrimpi_bake_float_bits(t->field.height_scale);
-    words[9] = terrimpi_bake_float_bits(t->field.height_offset);
-    words[10] = terrimpi_bake_float_bits(t->height_low);
-    words[11] = terrimpi_bake_float_bits(t->height_high);
-    words[12] = terrimpi_bake_float_bits(t->proud);
-    words[13] = terrimpi_bake_float_bits(d->morph_ratio);
-    for (i = 0; i < 14u; i++)
-        hash = terrimpi_bake_hash_word(hash, words[i]);
-    return hash;
 }
 
 /* Begins a window of columns [x, x + width) and rows of the field at a level's steps; w has its
@@ -17346,9 +17308,16 @@ static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terr
     TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
     memset(w, 0, sizeof *w);
     w->desc = d;
-    w->stamp = terrimpi_paging_stamp(d);
     w->whole.desc = d->terrain;
     terrimpi_terrain_count(&w->whole);
+    terrimpi_bake_describe(&w->whole, &w->head.bake);
+    w->head.bake.magic = TERRIMPI_PAGES_MAGIC;
+    w->head.bake.version = TERRIMP_PAGES_VERSION;
+    w->head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
+    w->head.block_level = d->block_level;
+    w->head.morph_ratio = d->morph_ratio;
+    w->head.stamp = d->stamp;
+    w->head.stamp = terrimpi_page_hash((const unsigned char *)&w->head, sizeof w->head);
     return TERRIMP_OK;
 }
 
@@ -17454,22 +17423,21 @@ static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t
     return r;
 }
 
-/* Copies the samples of a node of the part into its page. */
-static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n,
-                                    unsigned char *out)
+/* Copies the samples of a node of the part into the page, or out of it. */
+static void terrimpi_paging_copy(const terrimpi_paging *w, const terrimp_node *n, int out)
 {
     const terrimp_quadtree *t = &w->part->tree;
-    uint32_t i, j, quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field);
-    for (j = 0; j <= quads; j++) {
-        const unsigned char *row = (const unsigned char *)terrimpi_field_row(
-            &t->field, terrimpi_tree_row(t, n->level, n->z * quads + j));
-        for (i = 0; i <= quads; i++, out += size) {
+    size_t size = terrimpi_field_sample_bytes(t->field.format);
+    unsigned char *page = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
+                          4u * w->whole.vertex_limit + w->whole.index_limit;
+    uint32_t i, j, quads = t->chunk_quads;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++, page += size) {
             uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
-            uint16_t wide = row[t->field.format == TERRIMP_FORMAT_U8 ? x : 0];
-            memcpy(out, t->field.format == TERRIMP_FORMAT_U8 ? (const void *)&wide : row + x * size,
-                   size);
+            uint32_t z = terrimpi_tree_row(t, n->level, n->z * quads + j);
+            unsigned char *sample = w->samples + ((size_t)z * t->field.width + x) * size;
+            memcpy(out ? sample : page, out ? page : sample, size);
         }
-    }
 }
 
 /* The node of the whole that a node of the part is. */
@@ -17488,7 +17456,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN;
     terrimpi_page_head head;
     memset(w->page, 0, bytes);
-    head.stamp = w->stamp;
+    head.stamp = w->head.stamp;
     head.node = whole.number;
     head.record = terrimpi_paging_record(w, n->number);
     for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
@@ -17502,7 +17470,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
     at += 4u * t->vertex_limit;
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
-    terrimpi_paging_samples(w, n, w->page + at + t->index_limit);
+    terrimpi_paging_copy(w, n, 0);
     memcpy(w->page, &head, sizeof head);
     head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
@@ -17563,7 +17531,7 @@ static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terri
                                    terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
                                    bytes), TERRIMP_E_PAGE);
     memcpy(head, page, sizeof *head);
-    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->stamp &&
+    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->head.stamp &&
                    head->node == n->number ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
@@ -17586,25 +17554,11 @@ TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *d
 /* Takes over what a block's topmost page says: the part's level 0. */
 static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terrimp_node *n)
 {
-    const terrimp_quadtree *t = &w->part->tree;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field), i, j, x, z;
     terrimpi_page_head head;
-    const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
-                                4u * w->whole.vertex_limit + w->whole.index_limit;
     TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++, from += size) {
-            uint16_t sample;
-            x = terrimpi_tree_col(t, 0, n->x * quads + i);
-            z = terrimpi_tree_row(t, 0, n->z * quads + j);
-            memcpy(&sample, from, sizeof sample);
-            if (t->field.format == TERRIMP_FORMAT_U8)
-                w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
-            else
-                memcpy(w->samples + ((size_t)z * t->field.width + x) * size, from, size);
-        }
-    t->nodes[n->number] = head.record.ground;
+    terrimpi_paging_copy(w, n, 1);
+    w->part->tree.nodes[n->number] = head.record.ground;
     w->part->meshes[n->number] = head.record.mesh;
     w->held[n->number] = head.record.held;
     w->missed[n->number] = head.record.ground.error;
@@ -17669,32 +17623,22 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
 /* Makes and stores the header. */
 static terrimp_result terrimpi_paging_header(const terrimpi_paging *w)
 {
-    unsigned char *room = w->header;
-    const terrimp_terrain *t = &w->whole;
-    terrimp_node root = terrimpi_tree_root(&t->tree);
-    terrimpi_pages_head head;
+    terrimp_node root = terrimpi_tree_root(&w->whole.tree);
+    terrimpi_pages_head head = w->head;
     terrimpi_page_head top;
-    memset(&head, 0, sizeof head);
-    memset(room, 0, TERRIMP_PAGES_HEADER_BYTES);
-    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(room + sizeof head)));
+    memset(w->header, 0, TERRIMP_PAGES_HEADER_BYTES);
+    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(w->header + sizeof head)));
     TERRIMPI_TRY(terrimpi_paging_load(w, &root, w->page, &top));
-    terrimpi_bake_describe(t, &head.bake);
-    head.bake.magic = TERRIMPI_PAGES_MAGIC;
-    head.bake.version = TERRIMP_PAGES_VERSION;
-    head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
     head.bake.sample_low = w->part->sample_low;
     head.bake.sample_high = w->part->sample_high;
     head.bake.range_low = w->part->range_low;
     head.bake.range_step = w->part->range_step;
-    head.block_level = w->desc->block_level;
-    head.morph_ratio = w->desc->morph_ratio;
-    head.stamp = w->stamp;
     head.root = top.record;
-    memcpy(room, &head, sizeof head);
-    head.bake.checksum = terrimpi_bake_hash(room);
-    memcpy(room, &head, sizeof head);
-    return w->desc->store(w->desc->user, 0, room, TERRIMP_PAGES_HEADER_BYTES) ? TERRIMP_OK
-                                                                              : TERRIMP_E_PAGE;
+    memcpy(w->header, &head, sizeof head);
+    head.bake.checksum = terrimpi_bake_hash(w->header);
+    memcpy(w->header, &head, sizeof head);
+    return w->desc->store(w->desc->user, 0, w->header, TERRIMP_PAGES_HEADER_BYTES)
+               ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
 TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,

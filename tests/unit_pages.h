@@ -319,8 +319,9 @@ static void pages_are_built_in_any_order(void)
     }
 }
 
-/* After an edit: blocks that reach to it are built anew, others are as they were; old pages are
-   refused, and the new ones say what memory does. */
+/* After an edit: blocks that reach to it are built anew, others are as they were; pages that it
+   reaches are read anew, no others, and those that do not fit when the host tells of another place;
+   old ones are refused, and what there is says what memory does. */
 static void pages_are_edited(void)
 {
     uint32_t turn;
@@ -331,8 +332,8 @@ static void pages_are_edited(void)
         void *scratch;
         uint16_t *samples;
         uint32_t i, x, z, width = 8u * random_range(10, 15), depth = random_range(70, 110), block;
-        uint32_t root, rebuilt = 0;
-        terrimp_rect edit;
+        uint32_t root, rebuilt = 0, touched = 0, same = 0, kept = 0;
+        terrimp_rect edit, elsewhere = {0, 0, 1, 1};
         terrimp_page_info info;
         void *page;
         paged_prepare(&p, width, depth, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2);
@@ -363,12 +364,25 @@ static void pages_are_edited(void)
               TERRIMP_OK);
         memcpy(header, p.file, sizeof header);
         header[100] ^= 1u;
-        CHECK(terrimp_pages_renew(p.opened, header, sizeof header) == TERRIMP_E_BAKE);
-        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes) == TERRIMP_OK);
+        CHECK(terrimp_pages_renew(p.opened, header, sizeof header, &edit) == TERRIMP_E_BAKE);
         root = p.l.info.node_count - 1u;
+        CHECK(terrimp_terrain_touched(p.l.terrain, &edit, 0, NULL, 0, &touched) == TERRIMP_OK);
+        for (i = 0; i <= root; i++) { /* pages that the edit does not reach are the same */
+            CHECK(terrimp_page_get_info(p.opened, i, &info) == TERRIMP_OK);
+            same += memcmp(old + info.offset, p.file + info.offset, info.bytes) == 0;
+        }
+        CHECK(same + touched > root);
+        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes, turn == 0   ? NULL
+                                                             : turn == 1u ? &edit
+                                                                          : &elsewhere) ==
+              TERRIMP_OK);
+        for (i = 0; i <= root; i++)
+            kept += (uint32_t)paged_is_here(&p, i);
+        CHECK(kept == (turn ? root + 1u - touched : 0u) || turn == 2u);
+        CHECK(touched * 3u < root);
         CHECK(!paged_is_here(&p, root));
         CHECK(terrimp_page_begin(p.opened, root, &page) == TERRIMP_OK);
-        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes) == TERRIMP_E_STATE);
+        CHECK(terrimp_pages_renew(p.opened, p.file, p.bytes, &edit) == TERRIMP_E_STATE);
         CHECK(terrimp_page_get_info(p.opened, root, &info) == TERRIMP_OK);
         memcpy(page, old + info.offset, info.bytes);
         CHECK(terrimp_page_put(p.opened, root) ==
