@@ -16,8 +16,8 @@ static const char *check_only; /* only tests run whose names have this in them; 
 #endif
 static uint32_t check_state = CHECK_SEED;
 
-/* Notes a failed condition and goes on; at most three lines a test. A function, and tests are called
-   through RUN by pointer, since thousands of copies of either would take longer to compile. */
+/* Notes a failed condition and goes on; at most three lines a test. It is a function, and tests are
+   called through a pointer, since thousands of copies of either would take longer to compile. */
 static void check_failure(const char *file, int line, const char *test, const char *condition)
 {
     if (check_bad++ < 3)
