@@ -1319,7 +1319,7 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
    those of the same terrain in memory. A view's morph_ratio is the file's at most, with the rule
    PICTURE. */
 
-#define TERRIMP_PAGES_VERSION 2u
+#define TERRIMP_PAGES_VERSION 3u
 #define TERRIMP_PAGES_HEADER_BYTES 8192u
 
 /* What a header says. */
@@ -1354,14 +1354,16 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain);
 
 /* Goes on after an edit: the blocks that reach to what was edited, and the end, have been built
-   anew. All pages are given up, and come again; what views show of it is theirs to be told
-   (terrimp_view_touch).
+   anew. The pages of the nodes that terrimp_terrain_touched lists are given up, the root's too, and
+   have to come again; a host that reads them before the next update, root first, misses no frame.
+   What views show of it is theirs to be told (terrimp_view_touch).
 
    header      [bytes] as it is now
+   samples     that were edited; NULL: all
    Errors      E_STATE while a page is coming; E_BAKE when the header is damaged or of another file:
                nothing has changed */
 TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
-                                               size_t bytes);
+                                               size_t bytes, const terrimp_rect *samples);
 
 typedef enum terrimp_page_state {
     TERRIMP_PAGE_ABSENT = 0,
@@ -1384,13 +1386,14 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
 /* Finds a slot for a node's page, in the place of the one that was of no use for longest.
 
    page        out: [bytes of the info] aligned to 8 bytes, to be filled, by any thread
-   Errors      E_STATE when it is here or coming, or its parent is not here: a page comes after its
-               parent's; E_CAPACITY when the frame uses all slots */
+   Errors      E_STATE when it is here or coming, or its parent is neither; E_CAPACITY when the
+               frame uses all slots */
 TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page);
 
 /* Looks at a page that has been filled, and takes it if it is good. Else its slot is free again.
 
-   Errors      E_STATE when it has not been begun; E_BAKE when it is damaged, or another node's, or
+   Errors      E_STATE when it has not been begun; E_PAGE when its parent's page is not here: it
+               stays, to be put again after that; E_BAKE when it is damaged, or another node's, or
                another file's
    Cost        O(samples), about 10 us */
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node);
@@ -1418,15 +1421,16 @@ typedef struct terrimp_want {
 } terrimp_want;
 
 /* The pages that the updates of this frame would have liked to have, those of all views, best
-   first, and no more than there are slots for. None of them is here or coming, and the parents of
-   all are here.
+   first, and no more than there are slots for. None of them is here or coming; the parents of all
+   are, or are listed before them.
 
    wants       [capacity] out
    count       out: how many */
 TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp_want *wants,
                                                uint32_t capacity, uint32_t *count);
 
-/* Lists the pages that have been begun and that no view wanted in this frame and the one before.
+/* Lists the pages that have been begun and that no view wanted in this frame and the one before, or
+   whose parent's has failed.
 
    nodes       [capacity] out, by slot; count: how many there are, also when they are more */
 TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrain, uint32_t *nodes,
@@ -4555,12 +4559,17 @@ TERRIMP_API terrimp_result terrimp_quadtree_find(const terrimp_quadtree *tree, u
 
 /* ---- what is kept of it ---- */
 
+#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
+#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
+
 /* A place for a page, see the room Residency. */
 typedef struct terrimpi_page_slot {
     uint32_t node;      /* whose page it has or waits for; node_count: none */
     uint32_t used;      /* the last frame that had a use for it */
-    uint8_t is_here;    /* the page has come and is good */
-    uint8_t children;   /* nodes below that have a slot */
+    const unsigned char *page; /* NULL: it has not come, or it is no good */
+    uint8_t children;   /* nodes below that have a slot, */
+    uint8_t lacking;    /* ... and those whose pages are not here */
+    float record[TERRIMPI_PAGE_RECORD / sizeof(float)]; /* the page's own: what a frame looks at */
 } terrimpi_page_slot;
 
 struct terrimp_pages {
@@ -4573,6 +4582,7 @@ struct terrimp_pages {
     uint32_t slot_count, page_bytes, node_count;
     uint32_t frame, block_level, stamp;
     float morph_ratio;         /* of views, at most */
+    float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit] of this frame */
     uint32_t want_count, want_limit;
@@ -4582,13 +4592,21 @@ struct terrimp_pages {
 struct terrimpi_mip_frame;
 struct terrimpi_mip_ground;
 
+/* Why a node is to be left for its children. */
+typedef struct terrimpi_page_need {
+    const terrimp_frustum *frustum;
+    const float *eye;
+    int reason;    /* terrimp_want_reason */
+    float urgency; /* square of its error over the limit. 0: what is missing is not wanted */
+} terrimpi_page_need;
+
 /* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
     int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
-                   const terrimp_frustum *frustum, int reason, float urgency);
+                   const struct terrimpi_page_need *need);
     uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
                        const float away[3]);
@@ -4598,22 +4616,34 @@ typedef struct terrimpi_page_calls {
     float (*sample)(const terrimp_quadtree *t, uint32_t x, uint32_t z);
 } terrimpi_page_calls;
 
-#define TERRIMPI_PAGE_CHILDREN 56u /* where the records of the children stand in a page, */
-#define TERRIMPI_PAGE_RECORD 44u   /* ... and how long a record is: it begins with the ground's */
-
 /* The page of a node, NULL when it is not here. */
 static const unsigned char *terrimpi_page_of(const struct terrimp_pages *p, uint32_t node)
 {
     uint32_t slot = p->slot_of[node];
-    return slot && p->slots[slot - 1u].is_here ? p->pages + (size_t)(slot - 1u) * p->page_bytes
-                                               : NULL;
+    return slot ? p->slots[slot - 1u].page : NULL;
+}
+
+/* Notes that a page is of use in this frame, if it is here or coming. */
+static void terrimpi_page_use(const struct terrimp_pages *p, uint32_t node)
+{
+    if (p->slot_of[node])
+        p->slots[p->slot_of[node] - 1u].used = p->frame;
+}
+
+/* The record of a node whose page or whose parent's is here; else NULL. */
+static const unsigned char *terrimpi_tree_record(const terrimp_quadtree *t, uint32_t number)
+{
+    uint32_t slot = t->pages->slot_of[number];
+    return slot && t->pages->slots[slot - 1u].page
+               ? (const unsigned char *)t->pages->slots[slot - 1u].record
+               : t->pages->calls->record(t, number);
 }
 
 /* What PICTURE asks of a node for those below it: the last number of its record. */
 static float terrimpi_page_held(const terrimp_quadtree *t, uint32_t number)
 {
-    return *(const float *)(const void *)(t->pages->calls->record(t, number) +
-                                          TERRIMPI_PAGE_RECORD - sizeof(float));
+    return *(const float *)(const void *)(terrimpi_tree_record(t, number) + TERRIMPI_PAGE_RECORD -
+                                          sizeof(float));
 }
 
 /* Heights and errors of a node. */
@@ -4622,7 +4652,7 @@ static const struct terrimp_geomip_node *terrimpi_tree_kept(const terrimp_quadtr
 {
     return t->nodes ? t->nodes + number
                     : (const struct terrimp_geomip_node *)(const void *)
-                          t->pages->calls->record(t, number);
+                          terrimpi_tree_record(t, number);
 }
 
 /* Whether there is anything to be known of a tree's nodes. */
@@ -5116,12 +5146,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
 static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, uint32_t node)
 {
     const terrimp_quadtree *t = f->tree;
-    const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
-    float d, rms = t->pages ? terrimpi_page_held(t, node) : n->rms;
+    float d;
     if (level == 0)
         return 0.0f;
     if (f->view->rule != TERRIMP_GEOMIP_PICTURE) {
         /* Rounding of heights and of the error itself, so that the bound is one. */
+        const terrimp_geomip_node *n = terrimpi_tree_kept(t, node);
         float size = terrimpi_max(terrimpi_abs(n->low), terrimpi_abs(n->high));
         d = n->error > 0.0f ? n->error + 5e-7f * size : 0.0f;
         d *= f->factor / f->view->tolerance_px;
@@ -5131,6 +5161,7 @@ static float terrimpi_mip_distance(const terrimpi_mip_frame *f, uint32_t level, 
            same triangles; so what a split gains goes with (rms * K / d)^2 * (quad * K / d)^2, and
            is equal over all nodes where rms * quad / d^2 is. */
         float quad = 0.5f * (t->field.spacing_x + t->field.spacing_z) * (float)(1u << level);
+        float rms = t->pages ? terrimpi_page_held(t, node) : t->nodes[node].rms;
         d = rms * f->factor * (quad * f->factor) /
             (f->view->tolerance_px * TERRIMPI_MIP_PICTURE_QUAD);
     }
@@ -6730,8 +6761,7 @@ static const terrimpi_mesh *terrimpi_mesh_of(const terrimp_terrain *t, uint32_t 
 {
     if (t->meshes)
         return &t->meshes[node];
-    return &((const terrimpi_record *)(const void *)t->tree.pages->calls->record(&t->tree,
-                                                                                     node))->mesh;
+    return &((const terrimpi_record *)(const void *)terrimpi_tree_record(&t->tree, node))->mesh;
 }
 
 /* The node of the built terrain that a node is, or repeats. */
@@ -7157,12 +7187,6 @@ static const void *terrimpi_page_samples(const terrimp_terrain *t, uint32_t node
     return terrimpi_corners_of(t, node) + t->index_limit / 4u;
 }
 
-/* Bytes of a sample in a page: as the field's, but two at least. */
-static uint32_t terrimpi_page_sample_bytes(const terrimp_heightfield *field)
-{
-    return field->format == TERRIMP_FORMAT_F32 ? 4u : 2u;
-}
-
 /* A page as a heightfield: what of it lies within the terrain. Beside the far edges the last quad
    is taken for a whole one. */
 static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_t node)
@@ -7170,8 +7194,7 @@ static terrimp_heightfield terrimpi_page_field(const terrimp_terrain *t, uint32_
     terrimp_heightfield f = t->desc.field;
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
     f.samples = terrimpi_page_samples(t, node);
-    f.row_bytes = terrimpi_page_sample_bytes(&f) * (t->desc.chunk_quads + 1u);
-    f.format = f.format == TERRIMP_FORMAT_U8 ? TERRIMP_FORMAT_U16 : f.format;
+    f.row_bytes = terrimpi_field_sample_bytes(f.format) * (t->desc.chunk_quads + 1u);
     f.origin_x = terrimpi_terrain_x(t, p.x);
     f.origin_z = terrimpi_terrain_z(t, p.z);
     f.spacing_x *= (float)(1u << p.level);
@@ -8534,10 +8557,12 @@ TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_q
 /* Based on: de Boer 2000, section 3.2 (streaming); Hess 2010, section 6.6 (a picture needs its
    terrain only while it is made).
 
-   The parent of a page that has a slot has one too, so whatever is missing has a stand-in, and what
-   is known of a node hangs on its parent's page alone. */
+   The parent of a page that is here is here too (but for a while after an edit, when no frame comes
+   to what lies below), so whatever is missing has a stand-in, and what is known of a node hangs on
+   its parent's page alone. */
 
 #define TERRIMPI_PAGE_WANTS 512u /* listed in a frame at most */
+#define TERRIMPI_PAGE_SURE 4.0f  /* square of a guess of an error over its limit that is believed */
 #define TERRIMPI_PAGES_MAGIC 0x54494d51u
 #define TERRIMPI_PAGES_MAGIC_SWAPPED 0x514d4954u
 
@@ -8560,8 +8585,9 @@ typedef struct terrimpi_pages_head {
 static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 {
     uint32_t side = t->desc.chunk_quads + 1u;
+    uint32_t size = (uint32_t)terrimpi_field_sample_bytes(t->desc.field.format);
     uint32_t bytes = TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD + 4u * t->vertex_limit +
-                     t->index_limit + terrimpi_page_sample_bytes(&t->desc.field) * side * side;
+                     t->index_limit + size * side * side;
     return (bytes + 15u) / 16u * 16u;
 }
 
@@ -8719,7 +8745,7 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
     info->offset = terrimpi_page_offset(terrain, terrain->tree.pages->block_level, &n);
     info->bytes = terrain->tree.pages->page_bytes;
     info->level = n.level;
-    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->is_here ? TERRIMP_PAGE_HERE
+    info->state = !slot ? TERRIMP_PAGE_ABSENT : slot->page ? TERRIMP_PAGE_HERE
                                                               : TERRIMP_PAGE_COMING;
     info->slot = slot ? (uint32_t)(slot - terrain->tree.pages->slots) : 0u;
     return TERRIMP_OK;
@@ -8729,29 +8755,32 @@ TERRIMP_API terrimp_result terrimp_page_get_info(const terrimp_terrain *terrain,
    before, and no page below it. The root stays. */
 static int terrimpi_page_is_spare(const struct terrimp_pages *p, const terrimpi_page_slot *slot)
 {
-    return slot->is_here && slot->children == 0 && slot->used + 1u < p->frame &&
+    return slot->page && slot->children == 0 && slot->used + 1u < p->frame &&
            slot->node + 1u < p->node_count;
 }
 
 static void terrimpi_page_clear(const terrimp_quadtree *t, terrimpi_page_slot *slot)
 {
     terrimpi_page_slot *above = terrimpi_page_above(t, slot->node);
-    if (above)
+    if (above) {
         above->children--;
+        above->lacking = (uint8_t)(above->lacking + (slot->page != NULL));
+    }
     t->pages->slot_of[slot->node] = 0;
     slot->node = t->node_count;
-    slot->is_here = 0;
+    slot->page = NULL;
 }
 
 TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t node, void **page)
 {
     struct terrimp_pages *p;
     terrimpi_page_slot *above, *found = NULL, *slot;
+    terrimp_node n, child;
+    uint32_t i;
     TERRIMPI_TRY(terrimpi_page_check(terrain, node, page));
     p = terrain->tree.pages;
     above = terrimpi_page_above(&terrain->tree, node);
-    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && (!above || !above->is_here)),
-                    TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(p->slot_of[node] || (node + 1u < p->node_count && !above), TERRIMP_E_STATE);
     for (slot = p->slots; slot < p->slots + p->slot_count; slot++) {
         if (slot->node == p->node_count) {
             found = slot;
@@ -8768,7 +8797,14 @@ TERRIMP_API terrimp_result terrimp_page_begin(terrimp_terrain *terrain, uint32_t
         above->children++;
     found->node = node;
     found->used = p->frame;
-    found->is_here = found->children = 0;
+    found->children = found->lacking = 0;
+    n = terrimpi_tree_node(&terrain->tree, node);
+    for (i = 0; i < 4u; i++)
+        if (terrimpi_tree_quarter(&terrain->tree, &n, i, &child)) {
+            found->lacking = (uint8_t)(found->lacking + !terrimpi_page_of(p, child.number));
+            if (p->slot_of[child.number]) /* it failed or was edited, and they stay */
+                found->children++;
+        }
     p->slot_of[node] = (uint16_t)(found - p->slots + 1);
     *page = p->pages + (size_t)(found - p->slots) * p->page_bytes;
     return TERRIMP_OK;
@@ -8780,7 +8816,7 @@ static terrimp_result terrimpi_page_begun(const terrimp_terrain *t, uint32_t nod
 {
     TERRIMPI_TRY(terrimpi_page_check(t, node, t));
     *slot = terrimpi_page_slot_of(t->tree.pages, node);
-    return *slot && !(*slot)->is_here ? TERRIMP_OK : TERRIMP_E_STATE;
+    return *slot && !(*slot)->page ? TERRIMP_OK : TERRIMP_E_STATE;
 }
 
 /* What a child asks of its parent's `held`: PICTURE counts rms times the length of a quad, and when
@@ -8790,10 +8826,12 @@ static float terrimpi_page_held_by(float morph_ratio, float held)
     return 0.5f * morph_ratio * morph_ratio * held;
 }
 
-/* Whether the records of a node's children are held by its own. */
+/* Whether the records of a node's children are held by its own. Children that are here since before
+   an edit have to be those that it knows. */
 static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_node *n,
                                      const terrimpi_record *own)
 {
+    terrimpi_page_slot *slot;
     terrimp_node child;
     uint32_t i;
     for (i = 0; i < 4u; i++) {
@@ -8807,6 +8845,9 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
             r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
             terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
+        slot = terrimpi_page_slot_of(t->tree.pages, child.number);
+        if (slot && slot->page && memcmp(slot->record, &r, sizeof r) != 0)
+            terrimpi_page_clear(&t->tree, slot);
     }
     return 1;
 }
@@ -8835,16 +8876,27 @@ static int terrimpi_page_ok(const terrimp_terrain *t, uint32_t node, const unsig
 
 TERRIMP_API terrimp_result terrimp_page_put(terrimp_terrain *terrain, uint32_t node)
 {
-    terrimpi_page_slot *slot;
+    const terrimp_quadtree *t;
+    terrimpi_page_slot *slot, *above;
     const unsigned char *record;
+    float *mean;
     TERRIMPI_TRY(terrimpi_page_begun(terrain, node, &slot));
-    record = terrain->tree.pages->calls->record(&terrain->tree, node);
-    slot->is_here = 1; /* to be looked at */
-    slot->used = terrain->tree.pages->frame;
-    if (terrimpi_page_ok(terrain, node, record))
-        return TERRIMP_OK;
-    terrimpi_page_clear(&terrain->tree, slot);
-    return TERRIMP_E_BAKE;
+    t = &terrain->tree;
+    record = terrimpi_tree_record(t, node);
+    TERRIMPI_REFUSE(!record, TERRIMP_E_PAGE);
+    above = terrimpi_page_above(t, node);
+    if (above)
+        above->lacking--;
+    slot->page = t->pages->pages + (size_t)(slot - t->pages->slots) * t->pages->page_bytes;
+    slot->used = t->pages->frame;
+    memcpy(slot->record, record, sizeof slot->record);
+    if (!terrimpi_page_ok(terrain, node, record)) {
+        terrimpi_page_clear(t, slot);
+        return TERRIMP_E_BAKE;
+    }
+    mean = &t->pages->held[terrimpi_tree_node(t, node).level];
+    *mean += (terrimpi_page_held(t, node) - *mean) * (*mean > 0.0f ? 0.1f : 1.0f);
+    return TERRIMP_OK;
 }
 
 TERRIMP_API terrimp_result terrimp_page_fail(terrimp_terrain *terrain, uint32_t node)
@@ -8874,7 +8926,9 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
     *count = 0;
     for (i = 0; i < p->slot_count; i++) {
         const terrimpi_page_slot *slot = &p->slots[i];
-        if (slot->node == p->node_count || slot->is_here || slot->used + 1u >= p->frame)
+        if (slot->node == p->node_count || slot->page ||
+            (slot->used + 1u >= p->frame && (slot->node + 1u == p->node_count ||
+                                             terrimpi_page_above(&terrain->tree, slot->node))))
             continue;
         if (*count < capacity)
             nodes[*count] = slot->node;
@@ -8885,13 +8939,11 @@ TERRIMP_API terrimp_result terrimp_pages_withdrawn(const terrimp_terrain *terrai
 
 /* ---- what a frame uses ---- */
 
-/* The record of a node: its own page has it, and its parent's. NULL when neither is here. */
+/* The record of a node whose page is not here: in its parent's. NULL when that is not here. */
 static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint32_t number)
 {
     terrimp_node n;
-    const unsigned char *page = terrimpi_page_of(t->pages, number);
-    if (page)
-        return page + offsetof(terrimpi_page_head, record);
+    const unsigned char *page;
     if (number + 1u == t->node_count)
         return t->pages->root;
     n = terrimpi_tree_node(t, number);
@@ -8908,41 +8960,29 @@ static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
     return a->level != b->level ? a->level > b->level : a->node < b->node;
 }
 
-/* Notes that a page is of use in this frame, and those above it. If it is missing, it is wanted at
-   an urgency above 0, or the one above it that has to come first. Returns whether it is here. */
-static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+static int terrimpi_want_after(const void *wants, uint32_t a, uint32_t b)
+{
+    const terrimp_want *w = (const terrimp_want *)wants;
+    return terrimpi_want_before(&w[b], &w[a]);
+}
+
+/* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
+static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node, int reason,
                               float urgency)
 {
-    struct terrimp_pages *p = t->pages;
-    terrimp_node n = *node;
-    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
     terrimp_want want, *worst = p->wants;
     uint32_t i;
-    while (!slot && n.level + 1u < t->level_count) {
-        terrimp_node above = terrimpi_tree_parent(t, &n);
-        slot = terrimpi_page_slot_of(p, above.number);
-        if (slot)
-            slot->used = p->frame; /* or it might be given up for this */
-        if (slot && slot->is_here) {
-            slot = NULL;
-            break;
-        }
-        n = above;
-    }
-    if (slot)
-        slot->used = p->frame;
-    if (slot || !(urgency > 0.0f))
-        return slot && slot->is_here;
-    want.node = n.number;
-    want.level = n.level;
+    want.node = node->number;
+    want.level = node->level;
     want.bytes = p->page_bytes;
     want.reason = reason;
     want.urgency = urgency;
     for (i = 0; i < p->want_count; i++) {
-        if (p->wants[i].node == n.number) {
-            if (terrimpi_want_before(&want, &p->wants[i]))
-                p->wants[i] = want;
-            return 0;
+        if (p->wants[i].node == want.node) {
+            if (!terrimpi_want_before(&want, &p->wants[i]))
+                return 0;
+            p->wants[i] = want;
+            return 1;
         }
         if (terrimpi_want_before(worst, &p->wants[i]))
             worst = &p->wants[i];
@@ -8951,34 +8991,90 @@ static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *nod
         p->wants[p->want_count++] = want;
     else if (terrimpi_want_before(&want, worst))
         *worst = want;
-    return 0;
+    return 1;
+}
+
+/* Notes that a page is of use in this frame. If it is missing, it is wanted at an urgency above 0,
+   and those above it up to the one that is here. Returns whether it is here itself. */
+static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
+                              float urgency)
+{
+    struct terrimp_pages *p = t->pages;
+    terrimp_node n = *node;
+    for (;;) {
+        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+        if (slot)
+            slot->used = p->frame; /* or it might be given up for this */
+        if (slot && slot->page)
+            return n.number == node->number;
+        if ((!slot && urgency > 0.0f && !terrimpi_page_list(p, &n, reason, urgency)) ||
+            n.level + 1u == t->level_count)
+            return 0;
+        n = terrimpi_tree_parent(t, &n);
+    }
+}
+
+/* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
+static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node, terrimp_box *box)
+{
+    terrimp_node known = *node;
+    while (!terrimpi_tree_record(&t->tree, known.number))
+        known = terrimpi_tree_parent(&t->tree, &known);
+    terrimpi_tree_box(&t->tree, node, terrimpi_mesh_of(t, known.number)->low,
+                      terrimpi_mesh_of(t, known.number)->high, box);
+}
+
+/* The square of a node's error over that of its parent, at one distance: by the rule PICTURE, see
+   terrimpi_mip_distance, and by those of both levels that have come. */
+static float terrimpi_page_step(const struct terrimp_pages *p, uint32_t level)
+{
+    const float *held = p->held + level;
+    return held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f;
 }
 
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
    whether all are here. Then the walk that finds what is in sight comes by and uses the children,
-   unless `strays` says that it may not. */
+   unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
+   nobody knows; when it will if it is like others of its level, all is asked for in one breath: so
+   what a far jump needs comes at once, and not one level after the other. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
-                                 const terrimp_frustum *frustum, int reason, float urgency)
+                                 const terrimpi_page_need *need)
 {
     const struct terrimp_pages *p = t->tree.pages;
-    int uses = p->strays || reason != TERRIMP_WANT_GROUND, all = 1;
+    terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
+    int all, uses = p->strays || need->reason != TERRIMP_WANT_GROUND;
+    float urgency;
+    terrimpi_page_need below;
     terrimp_node child;
-    terrimp_box box;
+    terrimp_box box, whole;
     uint32_t i;
-    if (!terrimpi_page_want(&t->tree, node, reason, urgency))
-        return 0;
-    for (i = 0; i < 4u; i++) {
+    if (!uses && slot && slot->page && slot->lacking == 0) {
+        slot->used = p->frame;
+        return 1;
+    }
+    below = *need;
+    urgency = TERRIMP_SQRTF(need->urgency);
+    all = terrimpi_page_want(&t->tree, node, need->reason, urgency);
+    for (i = 0; i < 4u && (all || need->urgency > 0.0f); i++) {
         if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
             (!uses && terrimpi_page_of(p, child.number)))
             continue;
-        terrimpi_terrain_node_box(t, &child, &box);
-        if (terrimp_frustum_test(frustum, &box, TERRIMP_PLANES_ALL) == TERRIMP_PLANES_OUTSIDE)
+        terrimpi_page_box(t, &child, &box);
+        if (terrimp_frustum_test(need->frustum, &box, TERRIMP_PLANES_ALL) ==
+                TERRIMP_PLANES_OUTSIDE ||
+            terrimpi_page_want(&t->tree, &child, need->reason, urgency))
             continue;
-        all &= terrimpi_page_want(&t->tree, &child, reason, urgency);
-        if (!all && !uses) { /* it does not come: once more */
+        if (all && !uses) { /* it does not come to them: once more */
             uses = 1;
             i = 0xffffffffu;
         }
+        all = 0;
+        terrimpi_page_box(t, node, &whole);
+        below.urgency = terrimpi_page_step(p, child.level) * need->urgency *
+                        (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
+                        (1e-6f + terrimpi_mip_distance2(&box, need->eye));
+        if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
+            terrimpi_page_divides(t, &child, &below);
     }
     return all;
 }
@@ -9004,6 +9100,7 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
    ground below the eye, which says whether it is over it. Returns how many are joined. */
 static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
 {
+    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
@@ -9014,9 +9111,9 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
              number = mip->view->marks[number].next) {
             terrimp_geomip_mark *mark = &mip->view->marks[number];
             terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            need.urgency = mark->measure;
             if (mark->measure < 1.0f ||
-                (terrimpi_page_divides(t, &node, &mip->frustum, TERRIMP_WANT_GROUND,
-                                       TERRIMP_SQRTF(mark->measure)) &&
+                (terrimpi_page_divides(t, &node, &need) &&
                  (late == 0 || terrimpi_page_has_around(mip, &node))))
                 continue;
             mark->measure = 0.0f;
@@ -9030,22 +9127,23 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
                                      const float away[3])
 {
-    uint32_t i, k;
+    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f};
+    float eye[3];
+    uint32_t i;
+    for (i = 0; i < 3u; i++)
+        eye[i] = mip->eye[i] + away[i];
+    need.eye = eye;
     for (i = 0; i < mip->view->draw_count; i++) {
-        const terrimp_node *node = &mip->view->draws[i].node;
-        float measure = mip->view->draws[i].error_px / mip->view->tolerance_px, now, soon, eye[3];
+        const terrimp_geomip_draw *draw = &mip->view->draws[i];
+        float error = draw->error_px / mip->view->tolerance_px;
         terrimp_box box;
-        if (node->level == 0)
+        if (draw->node.level == 0)
             continue;
-        measure *= measure;
-        terrimpi_terrain_node_box(t, node, &box);
-        for (k = 0; k < 3u; k++)
-            eye[k] = mip->eye[k] + away[k];
-        now = terrimp_box_distance(&box, mip->eye);
-        soon = terrimp_box_distance(&box, eye);
-        if (measure * now * now >= soon * soon)
-            terrimpi_page_divides(t, node, &mip->frustum, TERRIMP_WANT_AHEAD,
-                                  0.99f * terrimpi_min(measure, 1.0f));
+        terrimpi_terrain_node_box(t, &draw->node, &box);
+        need.urgency = 0.98f * terrimpi_min(error * error, 1.0f);
+        if (error * error * terrimpi_mip_distance2(&box, mip->eye) >=
+            terrimpi_mip_distance2(&box, eye))
+            terrimpi_page_divides(t, &draw->node, &need);
     }
 }
 
@@ -9053,23 +9151,19 @@ TERRIMP_API terrimp_result terrimp_pages_wants(terrimp_terrain *terrain, terrimp
                                                uint32_t capacity, uint32_t *count)
 {
     struct terrimp_pages *p;
-    uint32_t i, k, gap, room = 0;
+    uint32_t order[TERRIMPI_PAGE_WANTS], i, room = 0;
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, count));
     TERRIMPI_REFUSE(!wants && capacity > 0, TERRIMP_E_NULL);
     p = terrain->tree.pages;
-    for (gap = p->want_count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < p->want_count; i++) {
-            terrimp_want moved = p->wants[i];
-            for (k = i; k >= gap && terrimpi_want_before(&moved, &p->wants[k - gap]); k -= gap)
-                p->wants[k] = p->wants[k - gap];
-            p->wants[k] = moved;
-        }
+    for (i = 0; i < p->want_count; i++)
+        order[i] = i;
+    terrimpi_sort(order, p->want_count, p->wants, terrimpi_want_after);
     for (i = 0; i < p->slot_count; i++)
         room += p->slots[i].node == p->node_count || terrimpi_page_is_spare(p, &p->slots[i]);
     room = terrimpi_min_u32(room, capacity);
     for (*count = i = 0; i < p->want_count && *count < room; i++)
-        if (!p->slot_of[p->wants[i].node]) /* it has not been begun since */
-            wants[(*count)++] = p->wants[i];
+        if (!p->slot_of[p->wants[order[i]].node]) /* it has not been begun since */
+            wants[(*count)++] = p->wants[order[i]];
     return TERRIMP_OK;
 }
 
@@ -9180,14 +9274,10 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
     TERRIMPI_TRY(terrimpi_check_block(memory, memory_bytes,
                                       terrimpi_pages_layout(&t, &p, NULL, &copy)));
     if (field) {
-        terrimp_heightfield place = *field;
+        terrimp_heightfield place = t.desc.field;
         place.samples = header;
-        place.width = t.desc.field.width;
-        place.depth = t.desc.field.depth;
-        place.format = t.desc.field.format;
-        place.row_bytes = 0;
-        place.height_scale = t.desc.field.height_scale;
-        place.height_offset = t.desc.field.height_offset;
+        place.spacing_x = field->spacing_x, place.spacing_z = field->spacing_z;
+        place.origin_x = field->origin_x, place.origin_z = field->origin_z;
         TERRIMPI_TRY(terrimp_heightfield_resolve(&place, &t.desc.field));
     }
     t.desc.field.samples = NULL; /* there are none but those of pages */
@@ -9210,24 +9300,32 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
 }
 
 TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const void *header,
-                                               size_t bytes)
+                                               size_t bytes, const terrimp_rect *samples)
 {
+    const terrimp_rect all = {0, 0, 0xffffffffu, 0xffffffffu};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages *p;
     uint32_t i;
     TERRIMPI_TRY(terrimpi_page_check(terrain, 0, header));
+    samples = samples ? samples : &all;
+    TERRIMPI_TRY(terrimpi_terrain_check_touched(terrain, samples));
     TERRIMPI_TRY(terrimpi_pages_read(header, bytes, &t, &head));
     p = terrain->tree.pages;
     TERRIMPI_REFUSE(head.stamp != p->stamp, TERRIMP_E_BAKE);
     for (i = 0; i < p->slot_count; i++)
-        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].is_here, TERRIMP_E_STATE);
+        TERRIMPI_REFUSE(p->slots[i].node < p->node_count && !p->slots[i].page, TERRIMP_E_STATE);
     memcpy(p->header, header, TERRIMP_PAGES_HEADER_BYTES);
     terrain->sample_low = t.sample_low;
     terrain->sample_high = t.sample_high;
-    memset(p->slot_of, 0, p->node_count * sizeof *p->slot_of);
     for (i = 0; i < p->slot_count; i++)
-        p->slots[i].node = p->node_count;
+        if (p->slots[i].page) {
+            terrimp_node n = terrimpi_tree_node(&terrain->tree, p->slots[i].node);
+            terrimpi_terrain_touched in = terrimpi_terrain_touched_nodes(terrain, samples, n.level,
+                                                                         0);
+            if (n.x >= in.x0 && n.x <= in.x1 && n.z >= in.z0 && n.z <= in.z1)
+                terrimpi_page_clear(&terrain->tree, &p->slots[i]);
+        }
     return TERRIMP_OK;
 }
 
@@ -9253,26 +9351,20 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
     return TERRIMP_OK;
 }
 
-/* Whether a ray comes into the columns and rows of a box before a distance. The direction's length
-   is 1. */
+/* Whether a ray comes into a box before a distance, or by. The direction's length is 1. */
 static int terrimpi_page_on_way(const terrimp_box *box, const float origin[3],
                                 const float direction[3], float distance)
 {
-    float from = 0.0f, to = distance;
+    float from = 0.0f;
     int i;
     for (i = 0; i < 3; i++) {
         float slack = 1e-5f * (terrimpi_abs(box->min[i]) + terrimpi_abs(box->max[i]) +
                                terrimpi_abs(origin[i]));
-        float low = box->min[i] - origin[i] - slack, high = box->max[i] - origin[i] + slack;
-        if (direction[i] > -1e-12f && direction[i] < 1e-12f) {
-            if (low > 0.0f || high < 0.0f)
-                return 0;
-            continue;
-        }
-        from = terrimpi_max(from, (direction[i] > 0.0f ? low : high) / direction[i]);
-        to = terrimpi_min(to, (direction[i] > 0.0f ? high : low) / direction[i]);
+        if (!terrimpi_field_ray_clip(origin[i], direction[i], box->min[i] - slack,
+                                     box->max[i] + slack, &from, &distance))
+            return 0;
     }
-    return from <= to;
+    return 1;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
@@ -9297,10 +9389,10 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
                                            hit);
     }
     TERRIMPI_REFUSE(!terrimpi_page_of(tree->pages, tree->node_count - 1u), TERRIMP_E_PAGE);
-    memcpy(way, direction, sizeof way);
     TERRIMPI_REFUSE(!terrimpi_finite3(origin) || !terrimpi_finite3(direction) ||
                     !terrimpi_finite(max_distance), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_normalize(way), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!(max_distance > 0.0f) || !terrimpi_field_ray_aim(direction, way),
+                    TERRIMP_E_RANGE);
     memset(&best, 0, sizeof best);
     terrimpi_tree_begin(&walk, tree, origin, 0);
     while (terrimpi_tree_next(&walk, &v)) {
@@ -10292,7 +10384,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
-    const struct terrimp_pages *pages;
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f};
+    const struct terrimp_pages *pages = f->terrain->tree.pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
     if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
@@ -10310,9 +10403,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
-    pages = f->terrain->tree.pages;
-    return !pages || pages->calls->divides(f->terrain, node, &f->frustum, 0, 0.0f)
-               ? 0 : 1 + TERRIMPI_CULL_SHORT;
+    return !pages || pages->calls->divides(f->terrain, node, &need) ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -10397,7 +10488,7 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         if (terrimpi_cull_hides(cull, f, &v.node, &planes, &box))
             continue;
         if (pages)
-            pages->calls->want(&f->terrain->tree, &v.node, 0, 0.0f);
+            terrimpi_page_use(pages, v.node.number);
         if (cull->count++ == cull->capacity)
             return 0;
         if (cull->impostor_count > f->desc->max_impostors)
@@ -11710,6 +11801,19 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
+/* Asks for the pages without which the picture of a node stands for those below it: of these, and
+   of the ground that they will show. */
+static void terrimpi_view_lacks(const terrimpi_frame *f, const terrimpi_candidate *c)
+{
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
+    float rms = terrimpi_tree_kept(&f->terrain->tree, c->node.number)->rms;
+    rms *= f->pixel_factor * f->density;
+    need.urgency = terrimpi_max(2.0f, rms / (TERRIMPI_CAPTURE_SOURCE_TEXELS *
+                                             terrimpi_max(c->closest, 1e-6f)));
+    need.urgency *= need.urgency;
+    f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
+}
+
 /* Whether all pages are here that a capture draws; those that are not are wanted. */
 static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
                                    uint32_t count, float urgency)
@@ -11763,8 +11867,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     int is_known;
     memset(job, 0, sizeof *job);
     if (c->is_short) {
-        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &f->frustum,
-                                               TERRIMP_WANT_PICTURE, 2.0f);
+        terrimpi_view_lacks(f, c);
         v->late++;
         return 0;
     }
@@ -11851,30 +11954,16 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
     return used;
 }
 
-/* Whether a candidate is to be captured before another: what is missing first, then what is due,
-   then what soon will be; among equals the lower node. */
-static int terrimpi_candidate_before(const terrimpi_candidate *a, const terrimpi_candidate *b)
+/* Whether a candidate is to be captured after another: what is missing comes first, then what is
+   due, then what soon will be; among equals the lower node. */
+static int terrimpi_candidate_after(const void *candidates, uint32_t a, uint32_t b)
 {
-    if (a->rank != b->rank)
-        return a->rank > b->rank;
-    if (a->weight > b->weight || a->weight < b->weight)
-        return a->weight > b->weight;
-    return a->node.number < b->node.number;
-}
-
-static void terrimpi_view_sort_queue(const terrimpi_candidate *candidates, uint32_t *queue,
-                                     uint32_t count)
-{
-    uint32_t gap, i, k;
-    for (gap = count / 2u; gap > 0; gap /= 2u)
-        for (i = gap; i < count; i++) {
-            uint32_t moved = queue[i];
-            for (k = i; k >= gap && terrimpi_candidate_before(&candidates[moved],
-                                                              &candidates[queue[k - gap]]);
-                 k -= gap)
-                queue[k] = queue[k - gap];
-            queue[k] = moved;
-        }
+    const terrimpi_candidate *c = (const terrimpi_candidate *)candidates;
+    if (c[a].rank != c[b].rank)
+        return c[a].rank < c[b].rank;
+    if (c[a].weight > c[b].weight || c[a].weight < c[b].weight)
+        return c[a].weight < c[b].weight;
+    return c[a].node.number > c[b].node.number;
 }
 
 /* Lists what could be captured, most urgent first; each rank by the error on the screen times the
@@ -11901,7 +11990,7 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
                                                     terrimpi_view_age(&v->frame, c->picture));
             v->queue[count++] = index;
         }
-    terrimpi_view_sort_queue(v->candidates, v->queue, count);
+    terrimpi_sort(v->queue, count, v->candidates, terrimpi_candidate_after);
     return count;
 }
 
@@ -17082,7 +17171,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 typedef struct terrimpi_paging {
     const terrimp_pages_desc *desc; /* resolved */
     terrimp_terrain whole;          /* nothing but its numbers */
-    uint32_t stamp;
+    terrimpi_pages_head head;       /* of the file, but for what is known at the end */
     uint32_t level;                 /* of the whole: of the part's level 0 */
     uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
     terrimp_terrain *part;
@@ -17122,30 +17211,6 @@ TERRIMP_API terrimp_result terrimp_pages_desc_resolve(const terrimp_pages_desc *
     *block_count = t.tree.level_x[d.block_level] * t.tree.level_z[d.block_level];
     *out = d;
     return TERRIMP_OK;
-}
-
-/* The number that all pages of a file bear. */
-static uint32_t terrimpi_paging_stamp(const terrimp_pages_desc *d)
-{
-    const terrimp_terrain_desc *t = &d->terrain;
-    uint32_t words[14], i, hash = 2166136261u;
-    words[0] = d->stamp;
-    words[1] = t->field.width;
-    words[2] = t->field.depth;
-    words[3] = (uint32_t)t->field.format;
-    words[4] = t->chunk_quads;
-    words[5] = t->triangle_budget;
-    words[6] = d->block_level;
-    words[7] = (t->no_lower_skirts ? 1u : 0u) | TERRIMP_PAGES_VERSION << 1;
-    words[8] = terrimpi_bake_float_bits(t->field.height_scale);
-    words[9] = terrimpi_bake_float_bits(t->field.height_offset);
-    words[10] = terrimpi_bake_float_bits(t->height_low);
-    words[11] = terrimpi_bake_float_bits(t->height_high);
-    words[12] = terrimpi_bake_float_bits(t->proud);
-    words[13] = terrimpi_bake_float_bits(d->morph_ratio);
-    for (i = 0; i < 14u; i++)
-        hash = terrimpi_bake_hash_word(hash, words[i]);
-    return hash;
 }
 
 /* Begins a window of columns [x, x + width) and rows of the field at a level's steps; w has its
@@ -17225,9 +17290,16 @@ static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terr
     TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
     memset(w, 0, sizeof *w);
     w->desc = d;
-    w->stamp = terrimpi_paging_stamp(d);
     w->whole.desc = d->terrain;
     terrimpi_terrain_count(&w->whole);
+    terrimpi_bake_describe(&w->whole, &w->head.bake);
+    w->head.bake.magic = TERRIMPI_PAGES_MAGIC;
+    w->head.bake.version = TERRIMP_PAGES_VERSION;
+    w->head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
+    w->head.block_level = d->block_level;
+    w->head.morph_ratio = d->morph_ratio;
+    w->head.stamp = d->stamp;
+    w->head.stamp = terrimpi_page_hash((const unsigned char *)&w->head, sizeof w->head);
     return TERRIMP_OK;
 }
 
@@ -17333,22 +17405,21 @@ static terrimpi_record terrimpi_paging_record(const terrimpi_paging *w, uint32_t
     return r;
 }
 
-/* Copies the samples of a node of the part into its page. */
-static void terrimpi_paging_samples(const terrimpi_paging *w, const terrimp_node *n,
-                                    unsigned char *out)
+/* Copies the samples of a node of the part into the page, or out of it. */
+static void terrimpi_paging_copy(const terrimpi_paging *w, const terrimp_node *n, int out)
 {
     const terrimp_quadtree *t = &w->part->tree;
-    uint32_t i, j, quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field);
-    for (j = 0; j <= quads; j++) {
-        const unsigned char *row = (const unsigned char *)terrimpi_field_row(
-            &t->field, terrimpi_tree_row(t, n->level, n->z * quads + j));
-        for (i = 0; i <= quads; i++, out += size) {
+    size_t size = terrimpi_field_sample_bytes(t->field.format);
+    unsigned char *page = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
+                          4u * w->whole.vertex_limit + w->whole.index_limit;
+    uint32_t i, j, quads = t->chunk_quads;
+    for (j = 0; j <= quads; j++)
+        for (i = 0; i <= quads; i++, page += size) {
             uint32_t x = terrimpi_tree_col(t, n->level, n->x * quads + i);
-            uint16_t wide = row[t->field.format == TERRIMP_FORMAT_U8 ? x : 0];
-            memcpy(out, t->field.format == TERRIMP_FORMAT_U8 ? (const void *)&wide : row + x * size,
-                   size);
+            uint32_t z = terrimpi_tree_row(t, n->level, n->z * quads + j);
+            unsigned char *sample = w->samples + ((size_t)z * t->field.width + x) * size;
+            memcpy(out ? sample : page, out ? page : sample, size);
         }
-    }
 }
 
 /* The node of the whole that a node of the part is. */
@@ -17367,7 +17438,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     uint32_t bytes = terrimpi_page_bytes(&w->whole), i, at = TERRIMPI_PAGE_CHILDREN;
     terrimpi_page_head head;
     memset(w->page, 0, bytes);
-    head.stamp = w->stamp;
+    head.stamp = w->head.stamp;
     head.node = whole.number;
     head.record = terrimpi_paging_record(w, n->number);
     for (i = 0; i < 4u; i++, at += TERRIMPI_PAGE_RECORD) {
@@ -17381,7 +17452,7 @@ static terrimp_result terrimpi_paging_store(const terrimpi_paging *w, const terr
     memcpy(w->page + at, terrimpi_points_of(t, n->number), 4u * t->vertex_limit);
     at += 4u * t->vertex_limit;
     memcpy(w->page + at, terrimpi_corners_of(t, n->number), t->index_limit);
-    terrimpi_paging_samples(w, n, w->page + at + t->index_limit);
+    terrimpi_paging_copy(w, n, 0);
     memcpy(w->page, &head, sizeof head);
     head.checksum = terrimpi_page_hash(w->page, bytes);
     memcpy(w->page, &head.checksum, sizeof head.checksum);
@@ -17442,7 +17513,7 @@ static terrimp_result terrimpi_paging_load(const terrimpi_paging *w, const terri
                                    terrimpi_page_offset(&w->whole, w->desc->block_level, n), page,
                                    bytes), TERRIMP_E_PAGE);
     memcpy(head, page, sizeof *head);
-    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->stamp &&
+    return head->checksum == terrimpi_page_hash(page, bytes) && head->stamp == w->head.stamp &&
                    head->node == n->number ? TERRIMP_OK : TERRIMP_E_BAKE;
 }
 
@@ -17465,25 +17536,11 @@ TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *d
 /* Takes over what a block's topmost page says: the part's level 0. */
 static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terrimp_node *n)
 {
-    const terrimp_quadtree *t = &w->part->tree;
     terrimp_node whole = terrimpi_paging_whole(w, n);
-    uint32_t quads = t->chunk_quads, size = terrimpi_page_sample_bytes(&t->field), i, j, x, z;
     terrimpi_page_head head;
-    const unsigned char *from = w->page + TERRIMPI_PAGE_CHILDREN + 4u * TERRIMPI_PAGE_RECORD +
-                                4u * w->whole.vertex_limit + w->whole.index_limit;
     TERRIMPI_TRY(terrimpi_paging_load(w, &whole, w->page, &head));
-    for (j = 0; j <= quads; j++)
-        for (i = 0; i <= quads; i++, from += size) {
-            uint16_t sample;
-            x = terrimpi_tree_col(t, 0, n->x * quads + i);
-            z = terrimpi_tree_row(t, 0, n->z * quads + j);
-            memcpy(&sample, from, sizeof sample);
-            if (t->field.format == TERRIMP_FORMAT_U8)
-                w->samples[(size_t)z * t->field.width + x] = (uint8_t)sample;
-            else
-                memcpy(w->samples + ((size_t)z * t->field.width + x) * size, from, size);
-        }
-    t->nodes[n->number] = head.record.ground;
+    terrimpi_paging_copy(w, n, 1);
+    w->part->tree.nodes[n->number] = head.record.ground;
     w->part->meshes[n->number] = head.record.mesh;
     w->held[n->number] = head.record.held;
     w->missed[n->number] = head.record.ground.error;
@@ -17548,32 +17605,22 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
 /* Makes and stores the header. */
 static terrimp_result terrimpi_paging_header(const terrimpi_paging *w)
 {
-    unsigned char *room = w->header;
-    const terrimp_terrain *t = &w->whole;
-    terrimp_node root = terrimpi_tree_root(&t->tree);
-    terrimpi_pages_head head;
+    terrimp_node root = terrimpi_tree_root(&w->whole.tree);
+    terrimpi_pages_head head = w->head;
     terrimpi_page_head top;
-    memset(&head, 0, sizeof head);
-    memset(room, 0, TERRIMP_PAGES_HEADER_BYTES);
-    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(room + sizeof head)));
+    memset(w->header, 0, TERRIMP_PAGES_HEADER_BYTES);
+    TERRIMPI_TRY(terrimpi_paging_floor(w, (float *)(void *)(w->header + sizeof head)));
     TERRIMPI_TRY(terrimpi_paging_load(w, &root, w->page, &top));
-    terrimpi_bake_describe(t, &head.bake);
-    head.bake.magic = TERRIMPI_PAGES_MAGIC;
-    head.bake.version = TERRIMP_PAGES_VERSION;
-    head.bake.bytes = TERRIMP_PAGES_HEADER_BYTES;
     head.bake.sample_low = w->part->sample_low;
     head.bake.sample_high = w->part->sample_high;
     head.bake.range_low = w->part->range_low;
     head.bake.range_step = w->part->range_step;
-    head.block_level = w->desc->block_level;
-    head.morph_ratio = w->desc->morph_ratio;
-    head.stamp = w->stamp;
     head.root = top.record;
-    memcpy(room, &head, sizeof head);
-    head.bake.checksum = terrimpi_bake_hash(room);
-    memcpy(room, &head, sizeof head);
-    return w->desc->store(w->desc->user, 0, room, TERRIMP_PAGES_HEADER_BYTES) ? TERRIMP_OK
-                                                                              : TERRIMP_E_PAGE;
+    memcpy(w->header, &head, sizeof head);
+    head.bake.checksum = terrimpi_bake_hash(w->header);
+    memcpy(w->header, &head, sizeof head);
+    return w->desc->store(w->desc->user, 0, w->header, TERRIMP_PAGES_HEADER_BYTES)
+               ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
 TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *desc, void *scratch,

@@ -25,7 +25,9 @@ typedef struct source {
     const char *folder;           /* NULL: made by a formula */
     int north, west;              /* degrees: of the first tile */
     uint32_t across, down, side;  /* tiles, and samples along a side of one */
-    char *voids;                  /* of each tile: 1 has some, 2 has none, 3 there is no tile */
+    char *voids;                  /* of each tile: 1 has some, 2 has none */
+    int16_t *tile;                /* one of those with voids, filled: */
+    const char *tile_of;          /* ... that of this place of voids */
     int file;
     pthread_mutex_t lock;         /* one tile at a time is filled */
     terrimp_pages_desc desc;
@@ -130,8 +132,7 @@ static int read_tile(source *s, uint32_t i, uint32_t j, const terrimp_rect *r, i
     size_t bytes = terrimp_heightfield_fill_voids_scratch_bytes(s->side, s->side);
     size_t count = (size_t)s->side * s->side;
     int file = open_tile(s, i, j), ok = 1;
-    int16_t *tile = NULL;
-    void *scratch = NULL;
+    int16_t *tile;
     char *voids = &s->voids[j * s->across + i];
     if (file < 0)
         return 1; /* the sea */
@@ -139,18 +140,23 @@ static int read_tile(source *s, uint32_t i, uint32_t j, const terrimp_rect *r, i
     x1 = r->x + r->width < x0 + s->side ? r->x + r->width : x0 + s->side;
     z1 = r->y + r->height < z0 + s->side ? r->y + r->height : z0 + s->side;
     pthread_mutex_lock(&s->lock);
-    if (*voids != 2) {
-        tile = malloc(count * 2u);
-        scratch = malloc(bytes);
-        ok = tile && scratch && pread(file, tile, count * 2u, 0) == (ssize_t)(count * 2u);
+    tile = s->tile;
+    if (*voids != 2 && s->tile_of != voids) {
+        tile = s->tile = tile ? tile : malloc(count * 2u);
+        s->tile_of = NULL;
+        ok = tile && pread(file, tile, count * 2u, 0) == (ssize_t)(count * 2u);
         for (z = 0; ok && *voids == 0 && z < count; z++) {
             const unsigned char *b = (const unsigned char *)(tile + z);
             *voids = b[0] == 0x80 && b[1] == 0;
         }
-        if (*voids == 0)
+        if (*voids == 0) {
             *voids = 2;
-        else
-            ok = ok && fill_tile(s, file, tile, scratch, bytes);
+        } else {
+            void *scratch = malloc(bytes);
+            ok = ok && scratch && fill_tile(s, file, tile, scratch, bytes);
+            s->tile_of = ok ? voids : NULL;
+            free(scratch);
+        }
     }
     for (z = r->y > z0 ? r->y : z0; ok && z < z1; z++) {
         int16_t *to = (int16_t *)(void *)((char *)out + (z - r->y) * row) + (x - r->x);
@@ -163,8 +169,6 @@ static int read_tile(source *s, uint32_t i, uint32_t j, const terrimp_rect *r, i
         }
     }
     pthread_mutex_unlock(&s->lock);
-    free(tile);
-    free(scratch);
     close(file);
     return ok;
 }
@@ -317,6 +321,7 @@ int main(int argc, char **argv)
         s.result = terrimp_pages_check(scratch, 8192, &info);
     free(scratch);
     free(s.voids);
+    free(s.tile);
     getrusage(RUSAGE_SELF, &usage);
     printf("\n%s: %s, %u x %u samples, %.1f MB of pages, %.1f MiB of memory\n", out,
            terrimp_result_text(s.result), (unsigned)s.desc.terrain.field.width,

@@ -1,8 +1,8 @@
 /* Shows how a host feeds a terrain that is larger than memory: flies over a file of pages
-   (examples/pages.c) while threads read what the view wants, from a disk as slow as you like.
+   (examples/pages.c) while a thread reads what the view wants, from a disk as slow as you like.
    Build:  cc -O2 -std=c99 -I. examples/stream.c -lm -lpthread -o stream
    Use:    stream FILE [--slots N] [--latency MS] [--rate MB] [--frames N] [--speed WU] [--compare]
-           --latency, --rate: of a read, in milliseconds and MB a second; 64 are under way at once
+           --latency, --rate: of a read, in milliseconds and MB a second; 256 are under way at once
            --compare: the same path with all pages here; needs memory for them
    Expect: each second what has been read, how much is here, and what pages were missing for; at
            last how many frames drew just what memory would have. */
@@ -19,15 +19,15 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { MOST = 64 }; /* reads under way, each by a thread: what is slow is the way there */
+enum { MOST = 256 }; /* reads under way: what is slow is the way there */
 
-/* A read: the frame's thread owns those that are free or done, a reading thread the others. */
+/* A read: the frame's thread owns those that are free or done, the reading thread the others. */
 typedef struct job {
     uint32_t node;
     terrimp_page_info info;
     void *page;
     enum { FREE, WAITING, READING, DONE, FAILED } state;
-    uint32_t order; /* the lowest is read first */
+    double due; /* [s] when it has come all the way */
 } job;
 
 typedef struct reader {
@@ -38,12 +38,14 @@ typedef struct reader {
     job jobs[MOST];
     int stop;
     uint64_t bytes;
-    uint32_t reads, orders;
+    uint32_t reads;
 } reader;
 
 static void pause_for(double seconds)
 {
     struct timespec t;
+    if (seconds <= 0.0)
+        return;
     t.tv_sec = (time_t)seconds;
     t.tv_nsec = (long)((seconds - (double)t.tv_sec) * 1e9);
     nanosleep(&t, NULL);
@@ -64,7 +66,7 @@ static void *read_pages(void *shared)
         job *next = NULL;
         int i, ok;
         for (i = 0; i < MOST; i++)
-            if (r->jobs[i].state == WAITING && (!next || r->jobs[i].order < next->order))
+            if (r->jobs[i].state == WAITING && (!next || r->jobs[i].due < next->due))
                 next = &r->jobs[i];
         if (!next) {
             pthread_cond_wait(&r->wake, &r->lock);
@@ -72,7 +74,7 @@ static void *read_pages(void *shared)
         }
         next->state = READING;
         pthread_mutex_unlock(&r->lock);
-        pause_for(r->latency + (double)next->info.bytes / r->rate);
+        pause_for(next->due - now());
         ok = pread(r->file, next->page, next->info.bytes, (off_t)next->info.offset) ==
              (ssize_t)next->info.bytes;
         pthread_mutex_lock(&r->lock);
@@ -84,20 +86,23 @@ static void *read_pages(void *shared)
     return NULL;
 }
 
-/* Before an update: takes what has come. */
+/* Before an update: takes what has come, parents before their children. */
 static void take(reader *r, terrimp_terrain *terrain)
 {
-    int i;
+    int i, taken;
     pthread_mutex_lock(&r->lock);
-    for (i = 0; i < MOST; i++) {
-        job *j = &r->jobs[i];
-        if (j->state == DONE)
-            terrimp_page_put(terrain, j->node); /* one that is damaged will be wanted again */
-        else if (j->state == FAILED)
-            terrimp_page_fail(terrain, j->node);
-        if (j->state == DONE || j->state == FAILED)
-            j->state = FREE;
-    }
+    do {
+        taken = 0;
+        for (i = 0; i < MOST; i++) {
+            job *j = &r->jobs[i];
+            if (j->state == FAILED)
+                terrimp_page_fail(terrain, j->node);
+            else if (j->state != DONE || terrimp_page_put(terrain, j->node) == TERRIMP_E_PAGE)
+                continue;
+            j->state = FREE; /* one that is damaged will be wanted again */
+            taken = 1;
+        }
+    } while (taken);
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -110,8 +115,9 @@ static void ask(reader *r, terrimp_terrain *terrain)
     terrimp_pages_wants(terrain, wants, MOST, &count);
     pthread_mutex_lock(&r->lock);
     for (i = 0; i < MOST; i++)
-        for (k = 0; k < gone_count && k < MOST && r->jobs[i].state == WAITING; k++)
-            if (gone[k] == r->jobs[i].node) {
+        for (k = 0; k < gone_count && k < MOST; k++)
+            if (gone[k] == r->jobs[i].node &&
+                (r->jobs[i].state == WAITING || r->jobs[i].state == DONE)) {
                 terrimp_page_fail(terrain, gone[k]);
                 r->jobs[i].state = FREE;
             }
@@ -124,7 +130,7 @@ static void ask(reader *r, terrimp_terrain *terrain)
             terrimp_page_begin(terrain, wants[i].node, &r->jobs[k].page) != TERRIMP_OK)
             continue;
         r->jobs[k].node = wants[i].node;
-        r->jobs[k].order = r->orders++;
+        r->jobs[k].due = now() + r->latency + (double)r->jobs[k].info.bytes / r->rate;
         r->jobs[k].state = WAITING;
     }
     pthread_cond_broadcast(&r->wake);
@@ -182,7 +188,7 @@ int main(int argc, char **argv)
     terrimp_view *view, *all_view = NULL;
     terrimp_camera camera = {0};
     terrimp_stats stats;
-    pthread_t threads[MOST];
+    pthread_t thread;
     uint32_t slots = 900, frames = 600, frame, i, node, late = 0, same = 0, here;
     float speed = 20.0f, ground = 0.0f;
     double start, worst = 0.0;
@@ -228,8 +234,7 @@ int main(int argc, char **argv)
     }
     pthread_mutex_init(&r.lock, NULL);
     pthread_cond_init(&r.wake, NULL);
-    for (k = 0; k < MOST; k++)
-        pthread_create(&threads[k], NULL, read_pages, &r);
+    pthread_create(&thread, NULL, read_pages, &r);
     camera.eye[0] = 0.2f * 30.0f * (float)info.width;
     camera.eye[2] = 0.5f * 30.0f * (float)info.depth;
     camera.forward[0] = 1.0f;
@@ -290,7 +295,6 @@ int main(int argc, char **argv)
     r.stop = 1;
     pthread_cond_broadcast(&r.wake);
     pthread_mutex_unlock(&r.lock);
-    for (k = 0; k < MOST; k++)
-        pthread_join(threads[k], NULL);
+    pthread_join(thread, NULL);
     return 0;
 }

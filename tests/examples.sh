@@ -75,6 +75,27 @@ pages_in_parts()
         cmp $work/whole.pages $work/parts.pages
 }
 
+pages_go_on()
+{
+    rm -f $work/stopped.pages
+    build/pages $work/stopped.pages --made 500 --block 2 > /dev/null &
+    builder=$!
+    while kill -0 $builder && ! [ "$(wc -c < $work/stopped.pages)" -gt 300000 ]; do :; done
+    kill -9 $builder
+    wait $builder || ! cmp -s $work/whole.pages $work/stopped.pages &&
+        build/pages $work/stopped.pages --made 500 --block 2 > /dev/null &&
+        cmp $work/whole.pages $work/stopped.pages
+}
+
+# A folder with a tile that has voids.
+pages_of_tiles()
+{
+    mkdir -p $work/tiles
+    { head -c 1000000 /dev/zero; printf '\200\000\200\000\001\000\200\000'
+      head -c $((1201 * 1201 * 2 - 1000008)) /dev/zero; } > $work/tiles/N42E001.hgt
+    build/pages $work/tiles.pages $work/tiles | grep -a ": ok, 1201 x 1201"
+}
+
 stream_flies()
 {
     build/stream $work/whole.pages --frames 60 --latency 5 --slots 60 > $work/stream.txt &&
@@ -219,6 +240,8 @@ check "make builds every example" make -s all
 check "parallel_build makes the same bytes with 2 threads" parallel_repeats 2
 check "parallel_build makes the same bytes with 5 threads" parallel_repeats 5
 check "pages makes the same file in parts as at once" pages_in_parts
+check "pages goes on where it was killed" pages_go_on
+check "pages fills the voids of a tile of a folder" pages_of_tiles
 check "stream flies over it with few slots and a slow disk" stream_flies
 check "bake makes a bake that opens, and C source" bakes
 check "bake writes C source that holds the bake" bake_source_holds_the_bake

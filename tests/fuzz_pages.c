@@ -1,7 +1,7 @@
 /* Fuzzes terrain in pages: sequences of calls on a terrain with few slots, whose pages come in any
    order, late, not at all, or with bytes that are changed, the checksum made right for half of
    them. Whatever is taken is drawn and filled into buffers; what a frame uses is here, and so are
-   its parents. The header may be changed too. See tests/fuzz.h. */
+   its parents, until there is an edit. The header may be changed too. See tests/fuzz.h. */
 #define TERRIMP_ASSERT(condition) FUZZ_CHECK(condition)
 #include "fuzz.h"
 
@@ -13,6 +13,7 @@ enum { WIDE = 97, DEEP = 81, CHUNK = 8, MOST_BYTES = 1 << 20, BUFFER = 4000 };
 static unsigned char file[MOST_BYTES];
 static size_t file_bytes;
 static uint16_t samples[WIDE * DEEP];
+static int edited;
 
 static int read_samples(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows, void *out,
                         size_t row_bytes)
@@ -149,13 +150,20 @@ static void step(terrimp_terrain *terrain, terrimp_view *view, uint32_t *node)
     terrimp_want wants[16];
     terrimp_page_info info, above;
     terrimp_ray_hit hit;
+    terrimp_rect edit;
     float from[3], way[3], height;
     void *page;
     switch (fuzz_below(8)) {
     case 0: terrimp_pages_next_frame(terrain); break;
     case 1: frame(terrain, view); break;
     case 2: terrimp_page_fail(terrain, *node); break;
-    case 3: *node = fuzz_u8() * 7u; break;
+    case 3:
+        *node = fuzz_u8() * 7u;
+        edit.x = fuzz_below(WIDE), edit.y = fuzz_below(DEEP);
+        edit.width = edit.height = 1u + fuzz_below(20);
+        edited |= *node % 4u == 0 &&
+                  terrimp_pages_renew(terrain, file, file_bytes, &edit) == TERRIMP_OK;
+        break;
     case 4:
         for (i = 0; i < 3u; i++)
             from[i] = fuzz_float(100.0f), way[i] = fuzz_float(1.0f);
@@ -169,7 +177,7 @@ static void step(terrimp_terrain *terrain, terrimp_view *view, uint32_t *node)
             if (terrimp_page_get_info(terrain, *node, &info) != TERRIMP_OK ||
                 info.offset + info.bytes > file_bytes || /* of a header that was changed */
                 terrimp_page_begin(terrain, *node, &page) != TERRIMP_OK)
-                continue;
+                continue; /* parents are listed before their children */
             memcpy(page, file + info.offset, info.bytes);
             if (fuzz_u8() % 4u == 0)
                 damage((unsigned char *)page, info.bytes, 0, 1);
@@ -178,9 +186,9 @@ static void step(terrimp_terrain *terrain, terrimp_view *view, uint32_t *node)
         }
         break;
     }
-    for (i = 0; i + 1u < nodes; i++) {
+    for (i = 0; i + 1u < nodes && !edited; i++) {
         FUZZ_CHECK(terrimp_page_get_info(terrain, i, &info) == TERRIMP_OK);
-        if (info.state == TERRIMP_PAGE_ABSENT)
+        if (info.state != TERRIMP_PAGE_HERE)
             continue;
         terrimp_page_get_info(terrain, terrimpi_tree_parent_number(&terrain->tree, i), &above);
         FUZZ_CHECK(above.state == TERRIMP_PAGE_HERE);
@@ -200,6 +208,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
         build();
     fuzz_bytes = bytes;
     fuzz_left = size;
+    edited = 0;
     memcpy(header, file, sizeof header);
     if (fuzz_u8() % 8u == 0) /* its checksum is of the words behind it */
         damage(header, sizeof header, 3, 4);

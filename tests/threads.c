@@ -1,4 +1,5 @@
-/* Threads: nodes are built by several at once, and one terrain is drawn by several views at once.
+/* Threads: nodes and blocks of pages are built by several at once, and one terrain is drawn by
+   several views at once.
    Meant for ThreadSanitizer, which tells of races that do not show in the results.
    Build: cc -std=c99 -g -O1 -fsanitize=thread -I. tests/threads.c -lm -lpthread */
 #define TERRIMP_IMPLEMENTATION
@@ -99,6 +100,85 @@ static void nodes_built_at_once_are_those_built_in_turn(void)
     terrimp_terrain_destroy(alone);
 }
 
+/* ---- building pages ---- */
+
+enum { FILE_BYTES = 1 << 20 };
+
+typedef struct pages_part {
+    pthread_t thread;
+    terrimp_pages_desc desc;
+    uint32_t first, end; /* blocks, every step-th one */
+    uint32_t step;
+    int failed;
+} pages_part;
+
+static int read_samples(void *user, uint32_t x, uint32_t z, uint32_t cols, uint32_t rows, void *out,
+                        size_t row_bytes)
+{
+    uint32_t j;
+    (void)user;
+    for (j = 0; j < rows; j++)
+        memcpy((char *)out + j * row_bytes, samples + (z + j) * SIDE + x, cols * sizeof *samples);
+    return 1;
+}
+
+static int load(void *user, uint64_t offset, void *bytes, size_t count)
+{
+    memcpy(bytes, (const char *)user + offset, count);
+    return offset + count <= FILE_BYTES;
+}
+
+static int store(void *user, uint64_t offset, const void *bytes, size_t count)
+{
+    memcpy((char *)user + offset, bytes, count);
+    return offset + count <= FILE_BYTES;
+}
+
+static void *build_blocks(void *user)
+{
+    pages_part *p = (pages_part *)user;
+    size_t bytes = terrimp_pages_scratch_bytes(&p->desc);
+    void *scratch = malloc(bytes);
+    uint32_t block;
+    for (block = p->first; block < p->end; block += p->step)
+        p->failed |= terrimp_pages_build_block(&p->desc, block, scratch, bytes) != TERRIMP_OK;
+    free(scratch);
+    return NULL;
+}
+
+static void blocks_built_at_once_are_those_built_in_turn(void)
+{
+    pages_part parts[THREADS + 1]; /* the last one builds alone */
+    char *files[2];
+    uint32_t i;
+    memset(parts, 0, sizeof parts);
+    files[0] = (char *)calloc(1, FILE_BYTES);
+    files[1] = (char *)calloc(1, FILE_BYTES);
+    parts[0].desc.terrain = describe();
+    parts[0].desc.terrain.height_high = 1000.0f;
+    parts[0].desc.block_level = 1;
+    parts[0].desc.read = read_samples;
+    parts[0].desc.load = load;
+    parts[0].desc.store = store;
+    for (i = 0; i <= THREADS; i++) {
+        parts[i] = parts[0];
+        parts[i].desc.user = files[i == THREADS];
+        parts[i].first = i % THREADS;
+        parts[i].step = i < THREADS ? THREADS : 1u;
+        CHECK(terrimp_pages_desc_resolve(&parts[i].desc, &parts[i].desc, &parts[i].end) ==
+              TERRIMP_OK);
+    }
+    for (i = 0; i < THREADS; i++)
+        CHECK(pthread_create(&parts[i].thread, NULL, build_blocks, &parts[i]) == 0);
+    for (i = 0; i < THREADS; i++)
+        CHECK(pthread_join(parts[i].thread, NULL) == 0 && !parts[i].failed);
+    build_blocks(&parts[THREADS]);
+    CHECK(!parts[THREADS].failed && parts[THREADS].end > 3u * THREADS);
+    CHECK(memcmp(files[0], files[1], FILE_BYTES) == 0);
+    free(files[0]);
+    free(files[1]);
+}
+
 /* ---- drawing ---- */
 
 typedef struct flight {
@@ -193,6 +273,7 @@ static void views_on_several_threads_draw_as_alone(void)
 int main(void)
 {
     RUN(nodes_built_at_once_are_those_built_in_turn);
+    RUN(blocks_built_at_once_are_those_built_in_turn);
     RUN(views_on_several_threads_draw_as_alone);
     return check_report();
 }
