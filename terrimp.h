@@ -1572,8 +1572,8 @@ typedef struct terrimp_view_desc {
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
-                               they fit, and made finer again when that is predicted to fit, too; as
-                               many captures are made as leave no frame dearer
+                               they fit, and made finer again when that is predicted to fit, too;
+                               captures are made in pieces that leave no frame dearer
                                [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets

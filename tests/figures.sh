@@ -109,19 +109,6 @@ low()
     done
 }
 
-# The same in short: what each way costs, of the full mesh with nothing hidden.
-ground()
-{
-    echo "| flight | full mesh, hidden left out | geomip 1 px | hidden left out | auto 1 px |" \
-        "hidden left out | its PSNR |"
-    echo "|---|--:|--:|--:|--:|--:|--:|"
-    low | awk -F ' *[|] *' 'NR > 2 { if (!($2 in cost)) order[++n] = $2; cost[$2] = cost[$2] " | " $4
-                                     if ($3 ~ /auto 1 px, hiding/) psnr[$2] = $6 }
-        END { for (i = 1; i <= n; i++) { split(cost[order[i]], c, " [|] ")
-                  printf "| %s | %s | %s | %s | %s | %s | %s |\n", order[i], c[3], c[4], c[5], c[6],
-                         c[7], psnr[order[i]] } }'
-}
-
 circle()
 {
     echo "| circle, 2049 x 2049 | cost | median | 95 % | worst | PSNR | captures | holes |"
