@@ -4584,7 +4584,7 @@ struct terrimp_pages {
     float morph_ratio;         /* of views, at most */
     float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
-    terrimp_want *wants;       /* [want_limit] of this frame */
+    terrimp_want *wants;       /* [want_limit + 1] of this frame */
     uint32_t want_count, want_limit;
     const struct terrimpi_page_calls *calls;
 };
@@ -8952,45 +8952,35 @@ static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint
                       (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
 }
 
-/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
-static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
-{
-    if (a->urgency > b->urgency || a->urgency < b->urgency)
-        return a->urgency > b->urgency;
-    return a->level != b->level ? a->level > b->level : a->node < b->node;
-}
-
+/* Whether a want comes after another: the more urgent comes first, then the coarser, then the lower
+   node. */
 static int terrimpi_want_after(const void *wants, uint32_t a, uint32_t b)
 {
     const terrimp_want *w = (const terrimp_want *)wants;
-    return terrimpi_want_before(&w[b], &w[a]);
+    if (w[a].urgency > w[b].urgency || w[a].urgency < w[b].urgency)
+        return w[a].urgency < w[b].urgency;
+    return w[a].level != w[b].level ? w[a].level < w[b].level : w[a].node > w[b].node;
 }
 
 /* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
 static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node, int reason,
                               float urgency)
 {
-    terrimp_want want, *worst = p->wants;
-    uint32_t i;
-    want.node = node->number;
-    want.level = node->level;
-    want.bytes = p->page_bytes;
-    want.reason = reason;
-    want.urgency = urgency;
-    for (i = 0; i < p->want_count; i++) {
-        if (p->wants[i].node == want.node) {
-            if (!terrimpi_want_before(&want, &p->wants[i]))
-                return 0;
-            p->wants[i] = want;
-            return 1;
-        }
-        if (terrimpi_want_before(worst, &p->wants[i]))
-            worst = &p->wants[i];
-    }
-    if (p->want_count < p->want_limit)
-        p->wants[p->want_count++] = want;
-    else if (terrimpi_want_before(&want, worst))
-        *worst = want;
+    uint32_t i, worst = 0, last = p->want_count;
+    p->wants[last].node = node->number;
+    p->wants[last].level = node->level;
+    p->wants[last].bytes = p->page_bytes;
+    p->wants[last].reason = reason;
+    p->wants[last].urgency = urgency;
+    for (i = 0; i < last && p->wants[i].node != node->number; i++)
+        worst = terrimpi_want_after(p->wants, i, worst) ? i : worst;
+    if (i < last && !terrimpi_want_after(p->wants, i, last))
+        return 0;
+    worst = i < last ? i : worst;
+    if (i == last && last < p->want_limit)
+        p->want_count++;
+    else if (terrimpi_want_after(p->wants, worst, last))
+        p->wants[worst] = p->wants[last];
     return 1;
 }
 
@@ -9024,25 +9014,19 @@ static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node
                       terrimpi_mesh_of(t, known.number)->high, box);
 }
 
-/* The square of a node's error over that of its parent, at one distance: by the rule PICTURE, see
-   terrimpi_mip_distance, and by those of both levels that have come. */
-static float terrimpi_page_step(const struct terrimp_pages *p, uint32_t level)
-{
-    const float *held = p->held + level;
-    return held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f;
-}
-
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
    whether all are here. Then the walk that finds what is in sight comes by and uses the children,
    unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
-   nobody knows; when it will if it is like others of its level, all is asked for in one breath: so
-   what a far jump needs comes at once, and not one level after the other. */
+   nobody knows; when it will if it is like others of its level (as the rule PICTURE measures, see
+   terrimpi_mip_distance), all is asked for in one breath: so what a far jump needs comes at once,
+   and not one level after the other. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimpi_page_need *need)
 {
     const struct terrimp_pages *p = t->tree.pages;
     terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
     int all, uses = p->strays || need->reason != TERRIMP_WANT_GROUND;
+    const float *held;
     float urgency;
     terrimpi_page_need below;
     terrimp_node child;
@@ -9070,8 +9054,9 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
         }
         all = 0;
         terrimpi_page_box(t, node, &whole);
-        below.urgency = terrimpi_page_step(p, child.level) * need->urgency *
-                        (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
+        held = p->held + child.level;
+        below.urgency = (held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f) *
+                        need->urgency * (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
                         (1e-6f + terrimpi_mip_distance2(&box, need->eye));
         if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
             terrimpi_page_divides(t, &child, &below);
@@ -9227,7 +9212,7 @@ static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pag
     p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
     p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
     p->want_limit = terrimpi_min_u32(p->slot_count, TERRIMPI_PAGE_WANTS);
-    p->wants = (terrimp_want *)terrimpi_take(&b, p->want_limit, sizeof *p->wants);
+    p->wants = (terrimp_want *)terrimpi_take(&b, p->want_limit + 1u, sizeof *p->wants);
     p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
     return b.ok ? b.bytes : 0;
 }
@@ -11801,19 +11786,6 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
-/* Asks for the pages without which the picture of a node stands for those below it: of these, and
-   of the ground that they will show. */
-static void terrimpi_view_lacks(const terrimpi_frame *f, const terrimpi_candidate *c)
-{
-    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
-    float rms = terrimpi_tree_kept(&f->terrain->tree, c->node.number)->rms;
-    rms *= f->pixel_factor * f->density;
-    need.urgency = terrimpi_max(2.0f, rms / (TERRIMPI_CAPTURE_SOURCE_TEXELS *
-                                             terrimpi_max(c->closest, 1e-6f)));
-    need.urgency *= need.urgency;
-    f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
-}
-
 /* Whether all pages are here that a capture draws; those that are not are wanted. */
 static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
                                    uint32_t count, float urgency)
@@ -11866,8 +11838,14 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
-    if (c->is_short) {
-        terrimpi_view_lacks(f, c);
+    if (c->is_short) { /* it wants the nodes that it stands for, and the ground that they show */
+        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
+        need.urgency = terrimpi_max(2.0f, terrimpi_view_sharpness(f, c->closest) /
+                                              TERRIMPI_CAPTURE_SOURCE_TEXELS *
+                                              terrimpi_tree_kept(&f->terrain->tree,
+                                                                 c->node.number)->rms);
+        need.urgency *= need.urgency;
+        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
         v->late++;
         return 0;
     }
@@ -17295,12 +17273,6 @@ static terrimp_rect terrimpi_paging_end(const terrimpi_paging *w)
                          ((w->whole.desc.field.depth - 2u) >> level) + 2u);
 }
 
-/* Whether there is anything above the blocks. */
-static int terrimpi_paging_has_end(const terrimpi_paging *w)
-{
-    return w->desc->block_level + 1u < w->whole.tree.level_count;
-}
-
 static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terrimp_pages_desc *d,
                                             terrimpi_paging *w)
 {
@@ -17346,17 +17318,15 @@ TERRIMP_API size_t terrimp_pages_scratch_bytes(const terrimp_pages_desc *desc)
     terrimp_terrain_desc part;
     terrimpi_paging w;
     terrimp_rect r, read;
-    size_t block, end = 1;
+    size_t block, end;
     if (terrimpi_paging_begin(desc, &d, &w) != TERRIMP_OK)
         return 0;
     r = terrimpi_paging_of(&w, 0, &read); /* the last of two blocks has the larger window */
     r.width = terrimpi_min_u32(w.whole.desc.field.width, 2u * r.width);
     r.height = terrimpi_min_u32(w.whole.desc.field.depth, 2u * r.height);
     block = terrimpi_paging_layout(&w, 0, &r, NULL, &part);
-    if (terrimpi_paging_has_end(&w)) {
-        r = terrimpi_paging_end(&w);
-        end = terrimpi_paging_layout(&w, d.block_level, &r, NULL, &part);
-    }
+    r = terrimpi_paging_end(&w);
+    end = terrimpi_paging_layout(&w, d.block_level, &r, NULL, &part);
     return block == 0 || end == 0 ? 0 : block > end ? block : end;
 }
 
