@@ -4598,6 +4598,7 @@ typedef struct terrimpi_page_need {
     const float *eye;
     int reason;    /* terrimp_want_reason */
     float urgency; /* square of its error over the limit. 0: what is missing is not wanted */
+    float reach;   /* square of the distance where that is 1; 0: nobody knows */
 } terrimpi_page_need;
 
 /* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
@@ -9030,7 +9031,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     float urgency;
     terrimpi_page_need below;
     terrimp_node child;
-    terrimp_box box, whole;
+    terrimp_box box;
     uint32_t i;
     if (!uses && slot && slot->page && slot->lacking == 0) {
         slot->used = p->frame;
@@ -9053,11 +9054,11 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
             i = 0xffffffffu;
         }
         all = 0;
-        terrimpi_page_box(t, node, &whole);
         held = p->held + child.level;
-        below.urgency = (held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f) *
-                        need->urgency * (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
-                        (1e-6f + terrimpi_mip_distance2(&box, need->eye));
+        below.reach = need->reach *
+                      (held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f);
+        below.urgency = terrimpi_min(below.reach / terrimpi_mip_distance2(&box, need->eye),
+                                     need->urgency);
         if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
             terrimpi_page_divides(t, &child, &below);
     }
@@ -9085,7 +9086,7 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
    ground below the eye, which says whether it is over it. Returns how many are joined. */
 static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
 {
-    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f};
+    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f, 0.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
@@ -9096,10 +9097,13 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
              number = mip->view->marks[number].next) {
             terrimp_geomip_mark *mark = &mip->view->marks[number];
             terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            if (mark->measure < 1.0f)
+                continue;
             need.urgency = mark->measure;
-            if (mark->measure < 1.0f ||
-                (terrimpi_page_divides(t, &node, &need) &&
-                 (late == 0 || terrimpi_page_has_around(mip, &node))))
+            need.reach = !terrimpi_tree_record(&t->tree, number) /* its neighbour asks for it */
+                             ? 0.0f : mip->relief * terrimpi_mip_distance(mip, level, number);
+            if (terrimpi_page_divides(t, &node, &need) &&
+                (late == 0 || terrimpi_page_has_around(mip, &node)))
                 continue;
             mark->measure = 0.0f;
             late++;
@@ -9112,7 +9116,7 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
                                      const float away[3])
 {
-    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f};
+    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f, 0.0f};
     float eye[3];
     uint32_t i;
     for (i = 0; i < 3u; i++)
@@ -10369,7 +10373,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
-    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f};
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f, 0.0f};
     const struct terrimp_pages *pages = f->terrain->tree.pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
@@ -11839,12 +11843,13 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     int is_known;
     memset(job, 0, sizeof *job);
     if (c->is_short) { /* it wants the nodes that it stands for, and the ground that they show */
-        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
+        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f, 0.0f};
         need.urgency = terrimpi_max(2.0f, terrimpi_view_sharpness(f, c->closest) /
                                               TERRIMPI_CAPTURE_SOURCE_TEXELS *
                                               terrimpi_tree_kept(&f->terrain->tree,
                                                                  c->node.number)->rms);
         need.urgency *= need.urgency;
+        need.reach = need.urgency * c->closest * c->closest;
         f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
         v->late++;
         return 0;
@@ -17168,6 +17173,7 @@ typedef struct terrimpi_paging {
     const terrimp_pages_desc *desc; /* resolved */
     terrimp_terrain whole;          /* nothing but its numbers */
     terrimpi_pages_head head;       /* of the file, but for what is known at the end */
+    uint32_t block_count;
     uint32_t level;                 /* of the whole: of the part's level 0 */
     uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
     terrimp_terrain *part;
@@ -17276,9 +17282,8 @@ static terrimp_rect terrimpi_paging_end(const terrimpi_paging *w)
 static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terrimp_pages_desc *d,
                                             terrimpi_paging *w)
 {
-    uint32_t count;
-    TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
     memset(w, 0, sizeof *w);
+    TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &w->block_count));
     w->desc = d;
     w->whole.desc = d->terrain;
     terrimpi_terrain_count(&w->whole);
@@ -17300,11 +17305,11 @@ TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, u
     terrimp_pages_desc d;
     terrimpi_paging w;
     const terrimp_quadtree *t = &w.whole.tree;
-    uint32_t all, page_bytes;
+    uint32_t page_bytes;
     TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
-    all = t->level_x[d.block_level] * t->level_z[d.block_level];
-    TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(first_block > w.block_count || block_count > w.block_count - first_block,
+                    TERRIMP_E_RANGE);
     page_bytes = terrimpi_page_bytes(&w.whole);
     *offset = TERRIMP_PAGES_HEADER_BYTES +
               terrimpi_page_first(t, d.block_level, first_block) * page_bytes;
@@ -17476,7 +17481,7 @@ TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *d
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
     x = block % w.whole.tree.level_x[d.block_level];
     z = block / w.whole.tree.level_x[d.block_level];
-    TERRIMPI_REFUSE(z >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(block >= w.block_count, TERRIMP_E_RANGE);
     r = terrimpi_paging_of(&w, block, &read);
     TERRIMPI_TRY(terrimpi_paging_open(&w, 0, &r, scratch, bytes));
     size = (uint32_t)terrimpi_field_sample_bytes(d.terrain.field.format);
@@ -17514,8 +17519,8 @@ TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *d
     terrimp_node n;
     uint32_t across;
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    TERRIMPI_REFUSE(block >= w.block_count, TERRIMP_E_RANGE);
     across = w.whole.tree.level_x[d.block_level];
-    TERRIMPI_REFUSE(block / across >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, terrimpi_page_bytes(&w.whole)));
     n = terrimpi_tree_at(&w.whole.tree, d.block_level, block % across, block / across);
     return terrimpi_paging_load(&w, &n, (unsigned char *)scratch, &head);
