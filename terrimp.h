@@ -1572,8 +1572,8 @@ typedef struct terrimp_view_desc {
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
-                               they fit, and made finer again when that is predicted to fit, too; as
-                               many captures are made as leave no frame dearer
+                               they fit, and made finer again when that is predicted to fit, too;
+                               captures are made in pieces that leave no frame dearer
                                [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
@@ -12864,14 +12864,10 @@ static uint32_t terrimpi_sorted_here(const terrimp_sorted *s, int32_t x, int32_t
 {
     int32_t quads = (int32_t)s->desc.page_quads;
     uint32_t level = s->page.level;
-    if (z == 0)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z0]);
-    if (z == quads)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_Z1]);
-    if (x == 0)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X0]);
-    if (x == quads)
-        level = terrimpi_max_u32(level, s->side_levels[TERRIMP_SIDE_X1]);
+    int side;
+    for (side = 0; side < 4; side++)
+        if ((terrimpi_along_x(side) ? z : x) == (side & 1 ? quads : 0))
+            level = terrimpi_max_u32(level, s->side_levels[side]);
     return level;
 }
 
@@ -12920,43 +12916,35 @@ static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s,
            terrimpi_sorted_mix(corner, to, u, width);
 }
 
-/* The height of a place of a square that comes when that is split, into quarters of a level. */
-static terrimp_sorted_height terrimpi_sorted_height_at(const terrimp_sorted *s,
-                                                       const terrimp_sorted_cell *c,
-                                                       uint32_t place, uint32_t level)
+/* Makes the heights of places of a square that come when it is split, into quarters of a level. */
+static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell *c,
+                                    const uint8_t *places, uint32_t count, uint32_t level)
 {
-    uint32_t column = place & 3u, row = place >> 2;
-    int32_t x = c->at[0] + (int32_t)(column << level), z = c->at[1] + (int32_t)(row << level);
-    terrimp_sorted_int away = c->away[0][column] * c->away[0][column] +
-                              c->away[1][row] * c->away[1][row] + s->rise;
-    terrimp_sorted_int left = s->split[level + 1u] - away;
-    int here = !s->partial || terrimpi_sorted_here(s, x, z) <= level;
-    terrimp_sorted_height rest;
-    if (here && away <= s->whole[level])
-        return terrimpi_sorted_sample(s, x, z);
-    rest = terrimpi_sorted_rest(s, c, place, x, z, 2 << level);
-    if (!here || left <= 0)
-        return rest;
+    for (; count > 0; count--, places++) {
+        uint32_t place = *places, column = place & 3u, row = place >> 2;
+        int32_t x = c->at[0] + (int32_t)(column << level), z = c->at[1] + (int32_t)(row << level);
+        terrimp_sorted_int away = c->away[0][column] * c->away[0][column] +
+                                  c->away[1][row] * c->away[1][row] + s->rise;
+        terrimp_sorted_int left = s->split[level + 1u] - away;
+        int here = !s->partial || terrimpi_sorted_here(s, x, z) <= level;
+        terrimp_sorted_height *height = &c->heights[place];
+        if (here && away <= s->whole[level]) {
+            *height = terrimpi_sorted_sample(s, x, z);
+            continue;
+        }
+        *height = terrimpi_sorted_rest(s, c, place, x, z, 2 << level);
+        if (here && left > 0) {
 #ifdef TERRIMP_FIXED
-    {
-        terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
-        int shift = range < 1 << 16 ? 0 : 15;
-        return rest + (terrimpi_sorted_sample(s, x, z) - rest) / 64 *
-                      ((left >> shift) * 64 / ((range >> shift) + 1));
-    }
+            terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
+            int shift = range < 1 << 16 ? 0 : 15;
+            *height += (terrimpi_sorted_sample(s, x, z) - *height) / 64 *
+                       ((left >> shift) * 64 / ((range >> shift) + 1));
 #else
-    return rest + (terrimpi_sorted_sample(s, x, z) - rest) *
-                  terrimpi_min((float)left * s->fade[level], 1.0f);
+            *height += (terrimpi_sorted_sample(s, x, z) - *height) *
+                       terrimpi_min((float)left * s->fade[level], 1.0f);
 #endif
-}
-
-/* The heights of the places of a square that is split, but for its corners. */
-static void terrimpi_sorted_fill(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
-{
-    static const uint8_t places[5] = { 1, 4, 5, 6, 9 };
-    int i;
-    for (i = 0; i < 5; i++)
-        c->heights[places[i]] = terrimpi_sorted_height_at(s, c, places[i], level);
+        }
+    }
 }
 
 /* ---- the order ---- */
@@ -13146,20 +13134,11 @@ static int terrimpi_sorted_open(terrimp_sorted *s)
     return 1;
 }
 
-/* Gives a quarter the corners that are places of its square. */
-static void terrimpi_sorted_inherit(const terrimp_sorted_cell *from, int place,
-                                    terrimp_sorted_cell *quarter)
-{
-    quarter->heights[0] = from->heights[place];
-    quarter->heights[2] = from->heights[place + 1];
-    quarter->heights[8] = from->heights[place + 4];
-    quarter->heights[10] = from->heights[place + 5];
-}
-
 /* Looks at the next quarter or page. Returns 1 when it is the present square, 0 when it is not, -1
    when there is none. to_count: heights are not wanted. */
 static int terrimpi_sorted_look(terrimp_sorted *s, int to_count)
 {
+    static const uint8_t inner[5] = { 1, 4, 5, 6, 9 };
     terrimp_sorted_cell *c = &s->stack[s->depth + 1];
     int is_page = s->depth < 0, place = 0, found;
     if (is_page && !terrimpi_sorted_next_page(s))
@@ -13171,10 +13150,14 @@ static int terrimpi_sorted_look(terrimp_sorted *s, int to_count)
         return found > 0;
     if (is_page && !terrimpi_sorted_open(s))
         return 0;
-    if (!is_page)
-        terrimpi_sorted_inherit(c - 1, place, c);
+    if (!is_page) { /* its corners are places of the square that it is a quarter of */
+        c->heights[0] = c[-1].heights[place];
+        c->heights[2] = c[-1].heights[place + 1];
+        c->heights[8] = c[-1].heights[place + 4];
+        c->heights[10] = c[-1].heights[place + 5];
+    }
     if (!found)
-        terrimpi_sorted_fill(s, c, terrimpi_sorted_level(s));
+        terrimpi_sorted_heights(s, c, inner, 5, terrimpi_sorted_level(s));
     return found;
 }
 
@@ -13272,10 +13255,11 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
     int middle[4] = { 0, 0, 0, 0 };
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
-            c->heights[sides[i]] = terrimpi_sorted_height_at(s, c, sides[i], level - 1u);
             middle[i] = (int)count;
             places[count++] = sides[i];
         }
+    if (count > 4u)
+        terrimpi_sorted_heights(s, c, places + 4, count - 4u, level - 1u);
     if (s->partial)
         terrimpi_sorted_trim(s, c, level);
     for (i = 0; i < count; i++) {
@@ -13637,12 +13621,10 @@ static int terrimpi_sorted_find(uint32_t quads, const terrimp_ground_command *co
             return 1;
     }
     for (i = 0; i < terrimpi_mip_columns(quads); i++) {
-        uint32_t row, z0, count;
-        *part = terrimpi_terrain_rows(quads, i, 0, quads);
-        row = part->index_count / quads;
-        z0 = (first - part->first_index) / row;
-        count = command->index_count / row;
-        if (first < part->first_index || z0 >= quads || count == 0 || count > quads - z0)
+        terrimpi_terrain_pattern all = terrimpi_terrain_rows(quads, i, 0, quads);
+        uint32_t row = all.index_count / quads, z0 = (first - all.first_index) / row;
+        uint32_t count = command->index_count / row;
+        if (z0 >= quads || count - 1u >= quads - z0)
             continue;
         *part = terrimpi_terrain_rows(quads, i, z0, z0 + count);
         return part->first_index == first && part->index_count == command->index_count;

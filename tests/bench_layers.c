@@ -11,6 +11,7 @@
 #define CHECK_NOTE(what, value) note(__func__, what, (double)(value))
 #define PLACE_SETS 20000
 #define PREPARE_EYES 10000
+#define PREPARE_SIDE 257u
 #define DEPTH_RAYS 40000
 static void note(const char *test, const char *what, double value);
 int unit_main(int argc, char **argv);

@@ -16,12 +16,16 @@ static const char *check_only; /* only tests run whose names have this in them; 
 #endif
 static uint32_t check_state = CHECK_SEED;
 
-/* Notes a failed condition and goes on; at most three lines a test. */
-#define CHECK(condition)                                                                 \
-    do {                                                                                 \
-        if (!(condition) && check_bad++ < 3)                                             \
-            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, __func__, #condition); \
-    } while (0)
+/* Notes a failed condition and goes on; at most three lines a test. It is a function, and tests are
+   called through a pointer, since thousands of copies of either would take longer to compile. */
+static void check_failure(const char *file, int line, const char *test, const char *condition)
+{
+    if (check_bad++ < 3)
+        fprintf(stderr, "%s:%d: %s: %s\n", file, line, test, condition);
+}
+
+#define CHECK(condition) \
+    ((condition) ? (void)0 : check_failure(__FILE__, __LINE__, __func__, #condition))
 
 /* A figure that a test has measured, for benchmarks that report it. */
 #ifndef CHECK_NOTE
@@ -30,18 +34,20 @@ static uint32_t check_state = CHECK_SEED;
 
 /* Runs one test function; its name says the behaviour. Each starts with the same random numbers,
    whatever ran before it. */
-#define RUN(test)                                                    \
-    do {                                                             \
-        if (check_only && !strstr(#test, check_only))                \
-            break;                                                   \
-        check_bad = 0;                                               \
-        check_state = CHECK_SEED;                                    \
-        test();                                                      \
-        if (check_bad)                                               \
-            fprintf(stderr, "FAILED %s (%d)\n", #test, check_bad);   \
-        check_failed += check_bad != 0;                              \
-        check_passed += check_bad == 0;                              \
-    } while (0)
+static inline void check_run(void (*test)(void), const char *name)
+{
+    if (check_only && !strstr(name, check_only))
+        return;
+    check_bad = 0;
+    check_state = CHECK_SEED;
+    test();
+    if (check_bad)
+        fprintf(stderr, "FAILED %s (%d)\n", name, check_bad);
+    check_failed += check_bad != 0;
+    check_passed += check_bad == 0;
+}
+
+#define RUN(test) check_run(test, #test)
 
 /* A test that cannot run here says why and counts as skipped. */
 #define SKIP(why) (printf("skipped %s: %s\n", __func__, why), check_skipped++, check_passed--)

@@ -650,7 +650,7 @@ static void check_edit_bounds(land *l, const terrimp_terrain *anew)
    for byte, one that is built anew. */
 static void edits_in_slices_end_as_what_is_built_anew(void)
 {
-    static const uint32_t sizes[][3] = {{131, 100, 8}, {70, 59, 4}, {257, 40, 16}, {3, 90, 4}};
+    static const uint32_t sizes[][3] = {{67, 52, 8}, {38, 31, 4}, {129, 40, 16}, {3, 46, 4}};
     size_t i;
     for (i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         land l;

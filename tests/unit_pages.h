@@ -92,6 +92,7 @@ static void paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int for
     memset(p, 0, sizeof *p);
     land_prepare(&p->l, width, depth, format, shape);
     p->l.desc.chunk_quads = chunk_quads;
+    p->l.desc.triangle_budget = width > 256u ? 40u : 0u; /* many nodes are built, so small meshes */
     p->l.desc.height_low = -126.0f;
     p->l.desc.height_high = 257.0f;
     p->last = UINT32_MAX;
@@ -264,10 +265,10 @@ static void pages_say_what_memory_does(void)
     uint32_t turn;
     for (turn = 0; turn < 12u; turn++) {
         paged_land p;
-        uint32_t width = random_range(2, 220), depth = random_range(2, 150);
+        uint32_t width = random_range(2, 130), depth = random_range(2, 90);
         uint32_t block_level = turn % 3u, chunk = turn % 2u ? 16u : 8u;
         if (turn % 4u == 1u)
-            width = depth = 257u;
+            width = depth = 129u;
         paged_prepare(&p, width, depth, formats[turn % 4u], turn % 5u ? LAND_HILLS : LAND_NOISE,
                       chunk, block_level);
         if (land_build(&p.l) && paged_build(&p)) {
@@ -289,7 +290,7 @@ static void pages_are_built_in_any_order(void)
         paged_land p;
         unsigned char *file;
         uint32_t i, block, left;
-        paged_prepare(&p, 8u * random_range(8, 22), random_range(50, 150), TERRIMP_FORMAT_S16,
+        paged_prepare(&p, 8u * random_range(5, 14), random_range(35, 100), TERRIMP_FORMAT_S16,
                       LAND_HILLS, 8, 2);
         if (!paged_build(&p)) {
             paged_free(&p);
@@ -330,7 +331,7 @@ static void pages_are_edited(void)
         size_t scratch_bytes;
         void *scratch;
         uint16_t *samples;
-        uint32_t i, x, z, width = 8u * random_range(16, 24), depth = random_range(90, 150), block;
+        uint32_t i, x, z, width = 8u * random_range(10, 15), depth = random_range(70, 110), block;
         uint32_t root, rebuilt = 0, touched = 0, same = 0, kept = 0;
         terrimp_rect edit, elsewhere = {0, 0, 1, 1};
         terrimp_page_info info;
@@ -402,10 +403,10 @@ static void pages_that_are_no_good_are_refused(void)
     uint32_t turn, node, root, child, count;
     void *page;
     terrimp_page_info info;
-    paged_prepare(&p, 150, 130, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2);
+    paged_prepare(&p, 90, 70, TERRIMP_FORMAT_U16, LAND_HILLS, 8, 2);
     if (!paged_build(&p) || !paged_open(&p, 40))
         return;
-    paged_prepare(&other, 150, 130, TERRIMP_FORMAT_U16, LAND_NOISE, 8, 2);
+    paged_prepare(&other, 90, 70, TERRIMP_FORMAT_U16, LAND_NOISE, 8, 2);
     other.desc.stamp = 8;
     paged_build(&other);
     root = p.l.info.node_count - 1u;
@@ -552,7 +553,7 @@ static void pages_are_closed_upwards(void)
     uint32_t turn, node, count, state[4] = {0, 0, 0, 0}, coming[64], full = 0, frame = 0, given = 0;
     paged_past *past;
     void *page;
-    paged_prepare(&p, 200, 170, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0);
+    paged_prepare(&p, 120, 80, TERRIMP_FORMAT_S16, LAND_HILLS, 8, 0);
     if (!paged_build(&p) || !paged_open(&p, 24))
         return;
     past = (paged_past *)calloc(p.l.info.node_count, sizeof *past);
@@ -1089,8 +1090,8 @@ static void pages_morph_as_memory_does(void)
         terrimp_view_desc desc;
         uint32_t node, count, morphs = 0, i;
         float ratio = turn == 1u ? 2.0f : random_float(1.1f, 2.0f);
-        paged_prepare(&p, turn ? random_range(120, 200) : 257u,
-                      turn ? random_range(120, 200) : 257u, TERRIMP_FORMAT_U16,
+        paged_prepare(&p, turn ? random_range(60, 110) : 257u,
+                      turn ? random_range(60, 110) : 257u, TERRIMP_FORMAT_U16,
                       turn == 1u ? LAND_NOISE : LAND_HILLS, 8, turn < 2u ? 0u : 2u);
         p.desc.morph_ratio = ratio;
         if (!land_build(&p.l) || !paged_build(&p) || !paged_open(&p, p.l.info.node_count + 8u))

@@ -280,7 +280,8 @@ static void placement_refuses(void)
 /* ---- a prepared set for a terrain ---- */
 
 #ifndef PREPARE_EYES
-#define PREPARE_EYES 1000 /* -DPREPARE_EYES=n: so many random views */
+#define PREPARE_EYES 1000 /* -DPREPARE_EYES=n: so many random views, */
+#define PREPARE_SIDE 129u /* ... of so many samples, over 5120 wu */
 #endif
 
 enum { PREPARE_CANDIDATES = 100000, PREPARE_GAINS = 2000000, PREPARE_VIEWS = 4096,
@@ -293,12 +294,12 @@ static uint32_t prepare_parents[PREPARE_NODES];
 static float prepare_costs[PREPARE_VIEWS], prepare_left[PREPARE_VIEWS];
 static uint8_t prepare_shown[PREPARE_GAINS];
 
-/* Hills of 16 x 16 chunks, and eyes over the middle of them. */
+/* Hills of 8 x 8 chunks or more, and eyes over the middle of them. */
 static void prepare_begin(land *l, terrimp_place_terrain_desc *d, terrimp_place_set *s)
 {
-    land_prepare(l, 257, 257, TERRIMP_FORMAT_F32, LAND_HILLS);
+    land_prepare(l, PREPARE_SIDE, PREPARE_SIDE, TERRIMP_FORMAT_F32, LAND_HILLS);
     l->desc.chunk_quads = 16;
-    l->desc.field.spacing_x = l->desc.field.spacing_z = 20.0f;
+    l->desc.field.spacing_x = l->desc.field.spacing_z = 5120.0f / (PREPARE_SIDE - 1u);
     land_build(l);
     memset(d, 0, sizeof *d);
     d->terrain = l->terrain;
@@ -397,7 +398,7 @@ static void check_prepared(const terrimp_place_terrain_desc *d, const terrimp_pl
 {
     uint32_t i, k, behind = 0;
     float size = (d->eyes.max[0] - d->eyes.min[0]) / 8.0f;
-    CHECK(s->view_count == 64 * 12 && s->cluster_count == 341);
+    CHECK(s->view_count == 64 * 12 && s->cluster_count == (PREPARE_SIDE == 129u ? 85u : 341u));
     for (i = 0; i < s->candidate_count; i += 7) {
         const terrimp_place_picture *p = &s->pictures[i];
         const terrimp_place_candidate *c = &s->candidates[i];

@@ -2056,7 +2056,8 @@ static void dear_captures_leave_only_ground(void)
    impostors alone, by its own currency, over flights that rest now and then. The eye moves by
    `step`, or with a step below 0 jumps; after each `lose` frames all pictures are lost. What is
    learnt at the start, in the first `begin` frames, does not count. */
-static double flight_cost(const land *l, int mode, float step, int lose, int begin, flight *f)
+static double flight_cost(const land *l, int mode, float step, int lose, int begin, int frames,
+                          flight *f)
 {
     terrimp_view_desc d;
     terrimp_camera camera = camera_beside(l);
@@ -2069,7 +2070,7 @@ static double flight_cost(const land *l, int mode, float step, int lose, int beg
     if (!flight_open(f, l, &d))
         return 0.0;
     check_state = 77u;
-    for (i = 0; i < 120 + begin; i++) {
+    for (i = 0; i < begin + frames; i++) {
         camera.eye[0] = step < 0.0f ? start + random_float(0.0f, side)
                                     : start + fmodf((float)(i + 1) * step, side);
         if (lose && i % lose == 0)
@@ -2091,9 +2092,9 @@ static void auto_is_not_dearer_than_ground_or_impostors_alone(void)
     land l;
     make_hills(&l);
     if (land_build(&l)) {
-        double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, 0.05f, 0, 0, &flight_room);
-        double impostors = flight_cost(&l, TERRIMP_MODE_IMPOSTOR, 0.05f, 0, 0, &flight_room);
-        double both = flight_cost(&l, TERRIMP_MODE_AUTO, 0.05f, 0, 0, &flight_room);
+        double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, 0.05f, 0, 0, 120, &flight_room);
+        double impostors = flight_cost(&l, TERRIMP_MODE_IMPOSTOR, 0.05f, 0, 0, 120, &flight_room);
+        double both = flight_cost(&l, TERRIMP_MODE_AUTO, 0.05f, 0, 0, 120, &flight_room);
         CHECK(both < 1.1 * fmin(ground, impostors));
         CHECK(flight_room.total_impostors > 100);
     }
@@ -2110,10 +2111,10 @@ static void auto_is_not_dearer_than_ground_where_pictures_do_not_last(void)
     make_hills(&l);
     if (land_build(&l))
         for (i = 0; i < sizeof steps / sizeof *steps; i++) {
-            double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, steps[i], 0, 80, &flight_room);
+            double ground = flight_cost(&l, TERRIMP_MODE_GEOMIP, steps[i], 0, 60, 60, &flight_room);
             for (k = 0; k < 4u; k++)
-                CHECK(flight_cost(&l, TERRIMP_MODE_AUTO, steps[i], losses[k], 80, &flight_room) <=
-                      1.1 * ground);
+                CHECK(flight_cost(&l, TERRIMP_MODE_AUTO, steps[i], losses[k], 60, 60,
+                                  &flight_room) <= 1.1 * ground);
         }
     land_free(&l);
 }

@@ -231,14 +231,16 @@ static void visibility_hides_nothing_that_shows(void)
 
 /* ---- visible sets ---- */
 
-static void visible_sets(const visible_scene *s, terrimp_sets *sets, float error, float low)
+/* Sets of at most so many bytes, of random levels. */
+static void visible_sets(const visible_scene *s, terrimp_sets *sets, float error, float low,
+                         size_t most)
 {
     uint32_t cell = 0;
     size_t bytes;
     memset(sets, 0, sizeof *sets);
     sets->error = error;
     sets->low = low;
-    while ((bytes = terrimp_sets_bytes(&s->tree, sets)) > 8000) {
+    while ((bytes = terrimp_sets_bytes(&s->tree, sets)) > most) {
         if (random_range(0, 1))
             sets->cell_level++;
         else
@@ -295,13 +297,13 @@ static terrimp_rect visible_edit(const visible_scene *s)
    and after its cells have been built anew. */
 static void visible_sets_hide_nothing_that_shows(void)
 {
-    uint32_t round, rounds = check_rounds(40, 400), hidden[3] = {0, 0, 0}, step, eye, cell;
+    uint32_t round, rounds = check_rounds(24, 400), hidden[3] = {0, 0, 0}, step, eye, cell;
     for (round = 0; round < rounds; round++) {
         visible_scene s;
         terrimp_sets sets;
         terrimp_rect edit;
         visible_make_any(&s);
-        visible_sets(&s, &sets, round % 4u ? 0.0f : 0.01f, round % 4u ? 0.0f : 0.1f);
+        visible_sets(&s, &sets, round % 4u ? 0.0f : 0.01f, round % 4u ? 0.0f : 0.1f, 8000);
         for (step = 0; step < 3; step++) {
             if (step == 1) {
                 edit = visible_edit(&s);
@@ -310,7 +312,7 @@ static void visible_sets_hide_nothing_that_shows(void)
             for (cell = 0; step == 2; cell++)
                 if (terrimp_sets_build_cell(&sets, s.walls, cell, &edit) != TERRIMP_OK)
                     break;
-            for (eye = 0; eye < 30; eye++) {
+            for (eye = 0; eye < 50; eye++) {
                 terrimp_camera c = visible_camera(&s);
                 hidden[step] += visible_sets_hide(&s, &sets, &c);
             }
@@ -333,7 +335,7 @@ static void visible_sets_are_rebuilt_where_samples_change(void)
         terrimp_rect edit;
         size_t bytes;
         visible_make_any(&s);
-        visible_sets(&s, &sets, 0.0f, 0.0f);
+        visible_sets(&s, &sets, 0.0f, 0.0f, 2000);
         bytes = terrimp_sets_bytes(&s.tree, &sets);
         old = sets;
         old.codes = (uint8_t *)malloc(bytes);
@@ -679,7 +681,7 @@ static void views_leave_out_what_is_hidden(void)
         CHECK(terrimp_view_create(terrain, &settings, NULL, &views[0]) == TERRIMP_OK);
         memset(&sets, 0, sizeof sets);
         if (round % 3u == 0)
-            visible_sets(&s, &sets, round % 2u ? 0.0f : 0.1f, 0.0f);
+            visible_sets(&s, &sets, round % 2u ? 0.0f : 0.1f, 0.0f, 8000);
         CHECK(terrimp_horizon_init(&h, terrimp_terrain_tree(terrain), s.walls) == TERRIMP_OK);
         sets.hider.tree = terrimp_terrain_tree(terrain);
         settings.hider = round % 3u == 0 ? &sets.hider : &h.hider;
