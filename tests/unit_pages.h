@@ -999,8 +999,8 @@ static void pages_settle_to_what_memory_shows(void)
         if (turn % 3u == 1u) { /* low, where there is something to hide */
             CHECK(terrimp_heightfield_height(&p->l.desc.field, camera.eye[0], camera.eye[2],
                                              &camera.eye[1]) == TERRIMP_OK);
-            camera.eye[1] += 2.0f;
-            camera.z_near = 0.1f;
+            camera.eye[1] += 1.0f;
+            camera.z_near = 0.01f;
             CHECK(terrimp_quadtree_find(&p->l.terrain->tree, 0, camera.eye[0], camera.eye[2],
                                         &below) == TERRIMP_OK);
             CHECK(terrimp_sets_build_cell(&sets[0], walls, below.number, NULL) == TERRIMP_OK);
