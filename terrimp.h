@@ -2998,6 +2998,13 @@ static int terrimpi_finite2(float a, float b) { return terrimpi_finite(a) && ter
 /* NaN is not within anything. */
 static int terrimpi_within(float v, float low, float high) { return v >= low && v <= high; }
 
+/* What integer a float is at or above. */
+static int32_t terrimpi_round_down(float value)
+{
+    int32_t whole = (int32_t)value;
+    return (float)whole > value ? whole - 1 : whole;
+}
+
 static int terrimpi_within_u32(uint32_t v, uint32_t low, uint32_t high)
 {
     return v >= low && v <= high;
@@ -8019,13 +8026,6 @@ static float terrimpi_horizon_ground(const terrimp_horizon *h, uint32_t axis, ui
     return terrimpi_min(lowest, a + (b - a) * to);
 }
 
-/* What integer a float is at or above. */
-static int32_t terrimpi_horizon_floor(float value)
-{
-    int32_t whole = (int32_t)value;
-    return (float)whole > value ? whole - 1 : whole;
-}
-
 /* The least slope of what stands at a step, over the directions of a bin; NONE when a part of them
    has left the terrain. */
 static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, uint32_t bin,
@@ -8037,7 +8037,7 @@ static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, 
     float t = (float)bin * width - 1.0f, lowest, slope;
     float from = h->stand.within[other] + t * step->distance - h->stand.rounding;
     float to = h->stand.within[other] + (t + width) * step->distance + h->stand.rounding;
-    int32_t first = terrimpi_horizon_floor(from), last = terrimpi_horizon_floor(to);
+    int32_t first = terrimpi_round_down(from), last = terrimpi_round_down(to);
     i = h->stand.quad[other] + (uint32_t)first; /* below 0 it becomes large */
     j = h->stand.quad[other] + (uint32_t)last;
     if (i >= quads || j >= quads)
@@ -12701,14 +12701,6 @@ static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *
     side->rise = side->x + side->z + side->fall;
 }
 
-static int32_t terrimpi_sorted_larger(int32_t a, int32_t b) { return a > b ? a : b; }
-
-static int32_t terrimpi_sorted_floor(float value)
-{
-    int32_t whole = (int32_t)value;
-    return (float)whole > value ? whole - 1 : whole;
-}
-
 /* The convex hull of the points, and the pages between its ends along each axis. Of a hull with
    more sides than can be kept the last ones are left out: what is drawn too much does not show. */
 static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_hull *hull)
@@ -12716,8 +12708,8 @@ static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_h
     float page = (float)s->desc.page_quads;
     int i, k, first = 0, from, to;
     for (k = 0; k < 2; k++) {
-        s->bounds[k][0] = terrimpi_sorted_floor((hull->low[k] - 1.0f) / page);
-        s->bounds[k][1] = terrimpi_sorted_floor((hull->high[k] + 1.0f) / page);
+        s->bounds[k][0] = terrimpi_round_down((hull->low[k] - 1.0f) / page);
+        s->bounds[k][1] = terrimpi_round_down((hull->high[k] + 1.0f) / page);
     }
     for (i = 1; i < hull->count; i++) {
         const float *p = hull->at[i], *q = hull->at[first];
@@ -12764,10 +12756,10 @@ static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *f
         const terrimp_sorted_side *side = &s->sides[i];
         int32_t n = along == 0 ? side->x : side->z, m = side->x + side->z - n;
         int32_t most = (int32_t)(side->at >> s->top) + 1 + m * (m > 0 ? row + 1 : row);
-        if (n > 0)
-            *first = terrimpi_sorted_larger(*first, -most / n - 1);
-        else if (n < 0)
-            *last = -terrimpi_sorted_larger(-*last, most / n);
+        if (n > 0 && -most / n - 1 > *first)
+            *first = -most / n - 1;
+        if (n < 0 && -(most / n) < *last)
+            *last = -(most / n);
     }
 }
 
@@ -12800,7 +12792,7 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
         s->whole[level] = terrimpi_sorted_square(s, begins + 1.875f * size);
         begins = scale * (s->desc.table && level < s->top ? s->desc.table[level + 1] * unit
                                                            : 2.0f * size);
-        begins = (float)terrimpi_sorted_floor(terrimpi_min(begins, (float)s->limit));
+        begins = (float)terrimpi_round_down(terrimpi_min(begins, (float)s->limit));
         range = (float)(terrimpi_sorted_square(s, begins) - s->whole[level]);
         s->fade[level] = range > 1.0f ? 1.0f / range : 1.0f;
     }
@@ -13361,7 +13353,6 @@ static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
     terrimpi_sorted_restart(s);
     while (terrimpi_sorted_step(s, 1))
         count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
-    terrimpi_sorted_restart(s);
     return count;
 }
 
@@ -13403,22 +13394,19 @@ static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3],
                                  const terrimpi_sorted_hull *hull)
 {
     const terrimp_sorted_desc *d = &s->desc;
-    float spacing[2], larger, unit = 4096.0f, rise, reach = 0.0f;
+    float larger = terrimpi_max(d->field.spacing_x, d->field.spacing_z), unit = 4096.0f, rise;
+    float reach = 0.0f, page = (float)d->page_quads;
     int k;
     for (k = 0; k < 2; k++)
         reach = terrimpi_max(reach, terrimpi_max(-hull->low[k], hull->high[k]));
-    spacing[0] = d->field.spacing_x;
-    spacing[1] = d->field.spacing_z;
-    larger = terrimpi_max(spacing[0], spacing[1]);
-    if (!(reach < 1024.0f * (float)d->page_quads))
-        return 0;
-    while (unit > 8.0f && !((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
+    while (unit >= 8.0f && !((reach + 3.0f * page) * unit < TERRIMPI_SORTED_LIMIT))
         unit *= 0.5f;
-    if (!((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
+    if (unit < 8.0f || !(reach < 1024.0f * page))
         return 0;
     for (k = 0; k < 2; k++) {
-        s->unit[k] = (terrimp_sorted_int)terrimpi_max(spacing[k] / larger * unit + 0.5f, 1.0f);
-        s->eye[k] = (terrimp_sorted_int)terrimpi_sorted_floor(eye[2 * k] * (float)s->unit[k]);
+        float size = (k == 0 ? d->field.spacing_x : d->field.spacing_z) / larger * unit;
+        s->unit[k] = (terrimp_sorted_int)terrimpi_max(size + 0.5f, 1.0f);
+        s->eye[k] = (terrimp_sorted_int)terrimpi_round_down(eye[2 * k] * (float)s->unit[k]);
     }
     rise = terrimpi_max(terrimpi_max(eye[1] - d->high, d->low - eye[1]), 0.0f) / larger * unit;
     s->limit = (terrimp_sorted_int)(TERRIMPI_SORTED_LIMIT - unit);
@@ -13452,25 +13440,25 @@ static void terrimpi_sorted_arrange(terrimp_sorted *s, const terrimp_camera *cam
 TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
                                                 const terrimp_camera *camera)
 {
+    const terrimp_heightfield *f;
     terrimp_camera c;
     terrimpi_sorted_hull hull;
-    float eye[3];
+    float eye[3], quads;
     int k;
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
     sorted->depth = -1;
     sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     TERRIMPI_REFUSE(c.orthographic || c.z_far > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
-    for (k = 0; k < 3; k++) {
-        const terrimp_heightfield *f = &sorted->desc.field;
-        float quads = (float)sorted->desc.page_quads;
-        eye[k] = k == 1 ? c.eye[1] : k == 0 ? (c.eye[0] - f->origin_x) / f->spacing_x
-                                            : (c.eye[2] - f->origin_z) / f->spacing_z;
-        if (k == 1)
-            continue;
-        TERRIMPI_REFUSE(!(terrimpi_abs(eye[k]) < 8388608.0f), TERRIMP_E_RANGE);
-        sorted->eye_page[k / 2] = terrimpi_sorted_floor(eye[k] / quads);
-        eye[k] -= (float)sorted->eye_page[k / 2] * quads;
+    f = &sorted->desc.field;
+    quads = (float)sorted->desc.page_quads;
+    eye[0] = (c.eye[0] - f->origin_x) / f->spacing_x;
+    eye[1] = c.eye[1];
+    eye[2] = (c.eye[2] - f->origin_z) / f->spacing_z;
+    for (k = 0; k < 2; k++) {
+        TERRIMPI_REFUSE(!(terrimpi_abs(eye[2 * k]) < 8388608.0f), TERRIMP_E_RANGE);
+        sorted->eye_page[k] = terrimpi_round_down(eye[2 * k] / quads);
+        eye[2 * k] -= (float)sorted->eye_page[k] * quads;
     }
     terrimpi_sorted_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye,
                                  &hull);
@@ -13754,7 +13742,7 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
                                                uint32_t *circles)
 {
     terrimpi_sorted_net net;
-    uint32_t count = index_count / 3u, i;
+    uint32_t count = index_count / 3u, turn, i;
     TERRIMPI_REFUSE(!xyz || !eye || !indices || !scratch, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(index_count % 3u != 0 || index_count > 65535u || vertex_count > 65535u,
@@ -13772,15 +13760,11 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
     net.circles = 0;
     memcpy(net.corners, indices, index_count * sizeof *indices);
     terrimpi_sorted_net_begin(&net, vertex_count, count);
-    for (i = 0; i < count; i++)
-        if (net.seen[i] == TERRIMPI_SORTED_WALL && !terrimpi_sorted_faces(&net, i))
-            terrimpi_sorted_write_triangle(&net, i);
-    for (i = 0; i < count; i++)
-        if (net.seen[i] == 0)
-            terrimpi_sorted_write_triangle(&net, i);
-    for (i = 0; i < count; i++)
-        if (net.seen[i] == TERRIMPI_SORTED_WALL)
-            terrimpi_sorted_write_triangle(&net, i);
+    for (turn = 0; turn < 3; turn++) /* walls that face away, the surface, the other walls */
+        for (i = 0; i < count; i++)
+            if (net.seen[i] == (turn == 1 ? 0 : TERRIMPI_SORTED_WALL) &&
+                (turn > 0 || !terrimpi_sorted_faces(&net, i)))
+                terrimpi_sorted_write_triangle(&net, i);
     if (circles)
         *circles = net.circles;
     return TERRIMP_OK;
