@@ -137,15 +137,15 @@ static const run runs[] = {
       LOOK_MATERIALS, WAYS(look_ways), LOOK_FRAMES, LOOK_STRIDE, 1, 0 },
     { { .name = "rough, with trees", .key = "trees", ROUGH },
       LOOK_TREES, WAYS(look_ways), LOOK_FRAMES, LOOK_STRIDE, 1, 0 },
-    LOW("N42E001 (Pyrenees), a walk", "walk_n42e001", .file = "N42E001.hgt", 2.0f),
-    LOW("N42E001 (Pyrenees), through valleys", "valley_n42e001", .file = "N42E001.hgt", 100.0f),
-    LOW("N42E001 (Pyrenees), over passes", "pass_n42e001", .file = "N42E001.hgt", 400.0f),
-    LOW("N49E011 (hills), a walk", "walk_n49e011", .file = "N49E011.hgt", 2.0f),
-    LOW("N49E011 (hills), through valleys", "valley_n49e011", .file = "N49E011.hgt", 100.0f),
-    LOW("N49E011 (hills), over passes", "pass_n49e011", .file = "N49E011.hgt", 400.0f),
-    LOW("rough 2049 x 2049, a walk", "walk_rough", ROUGH_FIELD, 2.0f),
-    LOW("rough 2049 x 2049, through valleys", "valley_rough", ROUGH_FIELD, 20.0f),
-    LOW("rough 2049 x 2049, over passes", "pass_rough", ROUGH_FIELD, 60.0f),
+    LOW("walk-N42E001, 2 above the ground", "walk_n42e001", .file = "N42E001.hgt", 2.0f),
+    LOW("valley-N42E001, 100 above the ground", "valley_n42e001", .file = "N42E001.hgt", 100.0f),
+    LOW("pass-N42E001, 400 above the ground", "pass_n42e001", .file = "N42E001.hgt", 400.0f),
+    LOW("walk-N49E011, 2 above the ground", "walk_n49e011", .file = "N49E011.hgt", 2.0f),
+    LOW("valley-N49E011, 100 above the ground", "valley_n49e011", .file = "N49E011.hgt", 100.0f),
+    LOW("pass-N49E011, 400 above the ground", "pass_n49e011", .file = "N49E011.hgt", 400.0f),
+    LOW("walk-rough, 2 above the ground", "walk_rough", ROUGH_FIELD, 2.0f),
+    LOW("valley-rough, 20 above the ground", "valley_rough", ROUGH_FIELD, 20.0f),
+    LOW("pass-rough, 60 above the ground", "pass_rough", ROUGH_FIELD, 60.0f),
     { { .name = "N42E001 (Pyrenees), circle", .key = "n42e001", .file = "N42E001.hgt" },
       LOOK_LIGHTMAP, WAYS(tile_ways), 45, 6, 1, 0 },
     { { .name = "N49E011 (hills), circle", .key = "n49e011", .file = "N49E011.hgt" },
@@ -432,9 +432,9 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
         stats_summary ms = stats_summarise(&c->ms), ratio = stats_summarise(&c->ratio);
         double n = c->frames;
         fprintf(figures, "%s\t%s\t%s\t%zu\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t"
-                "%.3f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
+                "%.3f\t%.2f\t", r->scene.key, c->way->name, c->way->family, ms.count, ms.median,
                 ratio.median, ratio.mean, ratio.deviation, ratio.p95, ratio.p99, ratio.worst,
-                cost_of(c, &ways[0], 1), mean(&c->start_ms) / unit, quad_ms);
+                cost_of(c, &ways[0], 1), mean(&c->start_ms) / unit, quad_ms, ms.median / quad_ms);
         fprintf(figures, "%.0f\t%.1f\t%.3f\t%.0f\t%.1f\t%.2f\t", c->triangles / n, c->draws / n,
                 c->captures / n, c->captured_texels / n, (double)c->now.reuse, c->waiting / n);
         fprintf(figures, "%.3f\t%.3f\t%.3f\t%.5f\t%.3f\t%.5f\t%.3f\t%.2f\t%.0f\t%.0f\t%.2f\n",
@@ -448,7 +448,7 @@ static void write_figures(const run *r, const contender *ways, size_t count, dou
 static void write_headings(void)
 {
     fprintf(figures, "scene\tway\tfamily\tframes\tms_median\tratio_median\tratio_mean\t"
-            "ratio_deviation\tratio_p95\tratio_p99\tratio_worst\tcpu_ratio\tstart\tquad_ms\t"
+            "ratio_deviation\tratio_p95\tratio_p99\tratio_worst\tcpu_ratio\tstart\tquad_ms\tquads\t"
             "triangles\tdraws\tcaptures\tcaptured_texels\t"
             "reuse\twaiting\tpsnr_terrain\tpsnr_terrain_worst\tpsnr_picture\tssim\tpsnr_4x4\t"
             "ssim_4x4\tshimmer\tpop_block\tpop_pixel\tholes\tlow_pixels\n");

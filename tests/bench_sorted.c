@@ -182,6 +182,7 @@ typedef struct order_host {
     float view[16], projection[16], eye[3];
     float *meshes, xyz[(QUADS + 1) * (QUADS + 1) * 3];
     uint16_t *mesh_indices, indices[GRID], scratch[8192];
+    uint32_t filled; /* the node whose ground is in xyz */
     double ground_seconds, ground_triangles, mesh_seconds, mesh_triangles;
     size_t draws, captures;
     int capturing, on_screen;
@@ -234,7 +235,10 @@ static void view_ground(void *user, const terrimp_ground_command *c)
         h->ground_triangles += count / 3;
         h->draws++;
     }
-    need(terrimp_terrain_fill_ground(h->terrain, c->node, h->xyz, sizeof h->xyz / sizeof *h->xyz));
+    if (c->node != h->filled)
+        need(terrimp_terrain_fill_ground(h->terrain, c->node, h->xyz,
+                                         sizeof h->xyz / sizeof *h->xyz));
+    h->filled = c->node;
     style.texture = &h->land, style.texture_matrix = lit, style.share = RASTER_ALL;
     raster_draw(&h->r, &style, h->xyz, h->indices, count);
     memcpy(h->r.eye, eye, sizeof eye);
@@ -352,6 +356,7 @@ static void fly_views(size_t frames, double rate)
     desc.chunk_quads = QUADS;
     need(terrimp_terrain_create(&desc, NULL, &terrain));
     h.terrain = terrain;
+    h.filled = 0xffffffffu;
     need(terrimp_terrain_get_info(terrain, &h.info));
     h.meshes = (float *)calloc(3 * h.info.mesh_vertex_count, sizeof *h.meshes);
     h.mesh_indices = (uint16_t *)calloc(h.info.mesh_index_count, sizeof *h.mesh_indices);

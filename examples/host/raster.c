@@ -454,12 +454,13 @@ static relief relief_of(const raster *r, const raster_style *style)
 void raster_draw(raster *r, const raster_style *style, const float *xyz, const uint16_t *indices,
                  size_t index_count)
 {
-    size_t vertex_count = 0, i;
+    size_t first = RASTER_VERTICES, end = 0, i;
     relief own = relief_of(r, style);
-    for (i = 0; i < index_count; i++)
-        if (indices[i] >= vertex_count)
-            vertex_count = indices[i] + 1u;
-    for (i = 0; i < vertex_count; i++) {
+    for (i = 0; i < index_count; i++) {
+        first = indices[i] < first ? indices[i] : first;
+        end = indices[i] >= end ? indices[i] + 1u : end;
+    }
+    for (i = first; i < end; i++) {
         r->points[i] = transform(r, style, xyz + i * 3);
         r->sides[i] = (uint8_t)find_sides(r, style, &r->points[i]);
         if (!r->sides[i])
