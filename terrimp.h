@@ -2998,6 +2998,13 @@ static int terrimpi_finite2(float a, float b) { return terrimpi_finite(a) && ter
 /* NaN is not within anything. */
 static int terrimpi_within(float v, float low, float high) { return v >= low && v <= high; }
 
+/* What integer a float is at or above. */
+static int32_t terrimpi_round_down(float value)
+{
+    int32_t whole = (int32_t)value;
+    return (float)whole > value ? whole - 1 : whole;
+}
+
 static int terrimpi_within_u32(uint32_t v, uint32_t low, uint32_t high)
 {
     return v >= low && v <= high;
@@ -4584,7 +4591,7 @@ struct terrimp_pages {
     float morph_ratio;         /* of views, at most */
     float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
-    terrimp_want *wants;       /* [want_limit] of this frame */
+    terrimp_want *wants;       /* [want_limit + 1] of this frame */
     uint32_t want_count, want_limit;
     const struct terrimpi_page_calls *calls;
 };
@@ -4598,6 +4605,7 @@ typedef struct terrimpi_page_need {
     const float *eye;
     int reason;    /* terrimp_want_reason */
     float urgency; /* square of its error over the limit. 0: what is missing is not wanted */
+    float reach;   /* square of the distance where that is 1; 0: nobody knows */
 } terrimpi_page_need;
 
 /* What pages do for a frame. It is called through what terrimp_pages_open sets, so that a host
@@ -8018,13 +8026,6 @@ static float terrimpi_horizon_ground(const terrimp_horizon *h, uint32_t axis, ui
     return terrimpi_min(lowest, a + (b - a) * to);
 }
 
-/* What integer a float is at or above. */
-static int32_t terrimpi_horizon_floor(float value)
-{
-    int32_t whole = (int32_t)value;
-    return (float)whole > value ? whole - 1 : whole;
-}
-
 /* The least slope of what stands at a step, over the directions of a bin; NONE when a part of them
    has left the terrain. */
 static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, uint32_t bin,
@@ -8036,7 +8037,7 @@ static float terrimpi_horizon_slope(const terrimp_horizon *h, uint32_t quarter, 
     float t = (float)bin * width - 1.0f, lowest, slope;
     float from = h->stand.within[other] + t * step->distance - h->stand.rounding;
     float to = h->stand.within[other] + (t + width) * step->distance + h->stand.rounding;
-    int32_t first = terrimpi_horizon_floor(from), last = terrimpi_horizon_floor(to);
+    int32_t first = terrimpi_round_down(from), last = terrimpi_round_down(to);
     i = h->stand.quad[other] + (uint32_t)first; /* below 0 it becomes large */
     j = h->stand.quad[other] + (uint32_t)last;
     if (i >= quads || j >= quads)
@@ -8952,45 +8953,35 @@ static const unsigned char *terrimpi_page_record(const terrimp_quadtree *t, uint
                       (n.x % 2u + n.z % 2u * 2u) * TERRIMPI_PAGE_RECORD : NULL;
 }
 
-/* Whether a want comes before another: the more urgent, the coarser, the lower node. */
-static int terrimpi_want_before(const terrimp_want *a, const terrimp_want *b)
-{
-    if (a->urgency > b->urgency || a->urgency < b->urgency)
-        return a->urgency > b->urgency;
-    return a->level != b->level ? a->level > b->level : a->node < b->node;
-}
-
+/* Whether a want comes after another: the more urgent comes first, then the coarser, then the lower
+   node. */
 static int terrimpi_want_after(const void *wants, uint32_t a, uint32_t b)
 {
     const terrimp_want *w = (const terrimp_want *)wants;
-    return terrimpi_want_before(&w[b], &w[a]);
+    if (w[a].urgency > w[b].urgency || w[a].urgency < w[b].urgency)
+        return w[a].urgency < w[b].urgency;
+    return w[a].level != w[b].level ? w[a].level < w[b].level : w[a].node > w[b].node;
 }
 
 /* Lists a page as wanted. Returns 0 when it is listed already, as urgent as this. */
 static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node, int reason,
                               float urgency)
 {
-    terrimp_want want, *worst = p->wants;
-    uint32_t i;
-    want.node = node->number;
-    want.level = node->level;
-    want.bytes = p->page_bytes;
-    want.reason = reason;
-    want.urgency = urgency;
-    for (i = 0; i < p->want_count; i++) {
-        if (p->wants[i].node == want.node) {
-            if (!terrimpi_want_before(&want, &p->wants[i]))
-                return 0;
-            p->wants[i] = want;
-            return 1;
-        }
-        if (terrimpi_want_before(worst, &p->wants[i]))
-            worst = &p->wants[i];
-    }
-    if (p->want_count < p->want_limit)
-        p->wants[p->want_count++] = want;
-    else if (terrimpi_want_before(&want, worst))
-        *worst = want;
+    uint32_t i, worst = 0, last = p->want_count;
+    p->wants[last].node = node->number;
+    p->wants[last].level = node->level;
+    p->wants[last].bytes = p->page_bytes;
+    p->wants[last].reason = reason;
+    p->wants[last].urgency = urgency;
+    for (i = 0; i < last && p->wants[i].node != node->number; i++)
+        worst = terrimpi_want_after(p->wants, i, worst) ? i : worst;
+    if (i < last && !terrimpi_want_after(p->wants, i, last))
+        return 0;
+    worst = i < last ? i : worst;
+    if (i == last && last < p->want_limit)
+        p->want_count++;
+    else if (terrimpi_want_after(p->wants, worst, last))
+        p->wants[worst] = p->wants[last];
     return 1;
 }
 
@@ -9024,29 +9015,23 @@ static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node
                       terrimpi_mesh_of(t, known.number)->high, box);
 }
 
-/* The square of a node's error over that of its parent, at one distance: by the rule PICTURE, see
-   terrimpi_mip_distance, and by those of both levels that have come. */
-static float terrimpi_page_step(const struct terrimp_pages *p, uint32_t level)
-{
-    const float *held = p->held + level;
-    return held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f;
-}
-
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
    whether all are here. Then the walk that finds what is in sight comes by and uses the children,
    unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
-   nobody knows; when it will if it is like others of its level, all is asked for in one breath: so
-   what a far jump needs comes at once, and not one level after the other. */
+   nobody knows; when it will if it is like others of its level (as the rule PICTURE measures, see
+   terrimpi_mip_distance), all is asked for in one breath: so what a far jump needs comes at once,
+   and not one level after the other. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimpi_page_need *need)
 {
     const struct terrimp_pages *p = t->tree.pages;
     terrimpi_page_slot *slot = terrimpi_page_slot_of(p, node->number);
     int all, uses = p->strays || need->reason != TERRIMP_WANT_GROUND;
+    const float *held;
     float urgency;
     terrimpi_page_need below;
     terrimp_node child;
-    terrimp_box box, whole;
+    terrimp_box box;
     uint32_t i;
     if (!uses && slot && slot->page && slot->lacking == 0) {
         slot->used = p->frame;
@@ -9069,10 +9054,11 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
             i = 0xffffffffu;
         }
         all = 0;
-        terrimpi_page_box(t, node, &whole);
-        below.urgency = terrimpi_page_step(p, child.level) * need->urgency *
-                        (1e-6f + terrimpi_mip_distance2(&whole, need->eye)) /
-                        (1e-6f + terrimpi_mip_distance2(&box, need->eye));
+        held = p->held + child.level;
+        below.reach = need->reach *
+                      (held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f);
+        below.urgency = terrimpi_min(below.reach / terrimpi_mip_distance2(&box, need->eye),
+                                     need->urgency);
         if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
             terrimpi_page_divides(t, &child, &below);
     }
@@ -9100,7 +9086,7 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
    ground below the eye, which says whether it is over it. Returns how many are joined. */
 static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
 {
-    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f};
+    terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f, 0.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
@@ -9111,10 +9097,13 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
              number = mip->view->marks[number].next) {
             terrimp_geomip_mark *mark = &mip->view->marks[number];
             terrimp_node node = terrimpi_tree_node(&t->tree, number);
+            if (mark->measure < 1.0f)
+                continue;
             need.urgency = mark->measure;
-            if (mark->measure < 1.0f ||
-                (terrimpi_page_divides(t, &node, &need) &&
-                 (late == 0 || terrimpi_page_has_around(mip, &node))))
+            need.reach = !terrimpi_tree_record(&t->tree, number) /* its neighbour asks for it */
+                             ? 0.0f : mip->relief * terrimpi_mip_distance(mip, level, number);
+            if (terrimpi_page_divides(t, &node, &need) &&
+                (late == 0 || terrimpi_page_has_around(mip, &node)))
                 continue;
             mark->measure = 0.0f;
             late++;
@@ -9127,7 +9116,7 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
                                      const float away[3])
 {
-    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f};
+    terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f, 0.0f};
     float eye[3];
     uint32_t i;
     for (i = 0; i < 3u; i++)
@@ -9227,7 +9216,7 @@ static size_t terrimpi_pages_layout(const terrimp_terrain *t, struct terrimp_pag
     p->slots = (terrimpi_page_slot *)terrimpi_take(&b, p->slot_count, sizeof *p->slots);
     p->slot_of = (uint16_t *)terrimpi_take(&b, t->tree.node_count, sizeof *p->slot_of);
     p->want_limit = terrimpi_min_u32(p->slot_count, TERRIMPI_PAGE_WANTS);
-    p->wants = (terrimp_want *)terrimpi_take(&b, p->want_limit, sizeof *p->wants);
+    p->wants = (terrimp_want *)terrimpi_take(&b, p->want_limit + 1u, sizeof *p->wants);
     p->pages = (unsigned char *)terrimpi_take(&b, p->slot_count, p->page_bytes);
     return b.ok ? b.bytes : 0;
 }
@@ -10384,7 +10373,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
                                   int has_picture)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
-    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f};
+    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f, 0.0f};
     const struct terrimp_pages *pages = f->terrain->tree.pages;
     int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
@@ -11801,19 +11790,6 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
-/* Asks for the pages without which the picture of a node stands for those below it: of these, and
-   of the ground that they will show. */
-static void terrimpi_view_lacks(const terrimpi_frame *f, const terrimpi_candidate *c)
-{
-    terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f};
-    float rms = terrimpi_tree_kept(&f->terrain->tree, c->node.number)->rms;
-    rms *= f->pixel_factor * f->density;
-    need.urgency = terrimpi_max(2.0f, rms / (TERRIMPI_CAPTURE_SOURCE_TEXELS *
-                                             terrimpi_max(c->closest, 1e-6f)));
-    need.urgency *= need.urgency;
-    f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
-}
-
 /* Whether all pages are here that a capture draws; those that are not are wanted. */
 static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
                                    uint32_t count, float urgency)
@@ -11866,8 +11842,15 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
-    if (c->is_short) {
-        terrimpi_view_lacks(f, c);
+    if (c->is_short) { /* it wants the nodes that it stands for, and the ground that they show */
+        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f, 0.0f};
+        need.urgency = terrimpi_max(2.0f, terrimpi_view_sharpness(f, c->closest) /
+                                              TERRIMPI_CAPTURE_SOURCE_TEXELS *
+                                              terrimpi_tree_kept(&f->terrain->tree,
+                                                                 c->node.number)->rms);
+        need.urgency *= need.urgency;
+        need.reach = need.urgency * c->closest * c->closest;
+        f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
         v->late++;
         return 0;
     }
@@ -12718,14 +12701,6 @@ static void terrimpi_sorted_side(terrimp_sorted *s, const terrimpi_sorted_hull *
     side->rise = side->x + side->z + side->fall;
 }
 
-static int32_t terrimpi_sorted_larger(int32_t a, int32_t b) { return a > b ? a : b; }
-
-static int32_t terrimpi_sorted_floor(float value)
-{
-    int32_t whole = (int32_t)value;
-    return (float)whole > value ? whole - 1 : whole;
-}
-
 /* The convex hull of the points, and the pages between its ends along each axis. Of a hull with
    more sides than can be kept the last ones are left out: what is drawn too much does not show. */
 static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_hull *hull)
@@ -12733,8 +12708,8 @@ static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_h
     float page = (float)s->desc.page_quads;
     int i, k, first = 0, from, to;
     for (k = 0; k < 2; k++) {
-        s->bounds[k][0] = terrimpi_sorted_floor((hull->low[k] - 1.0f) / page);
-        s->bounds[k][1] = terrimpi_sorted_floor((hull->high[k] + 1.0f) / page);
+        s->bounds[k][0] = terrimpi_round_down((hull->low[k] - 1.0f) / page);
+        s->bounds[k][1] = terrimpi_round_down((hull->high[k] + 1.0f) / page);
     }
     for (i = 1; i < hull->count; i++) {
         const float *p = hull->at[i], *q = hull->at[first];
@@ -12781,10 +12756,10 @@ static void terrimpi_sorted_row(const terrimp_sorted *s, int32_t row, int32_t *f
         const terrimp_sorted_side *side = &s->sides[i];
         int32_t n = along == 0 ? side->x : side->z, m = side->x + side->z - n;
         int32_t most = (int32_t)(side->at >> s->top) + 1 + m * (m > 0 ? row + 1 : row);
-        if (n > 0)
-            *first = terrimpi_sorted_larger(*first, -most / n - 1);
-        else if (n < 0)
-            *last = -terrimpi_sorted_larger(-*last, most / n);
+        if (n > 0 && -most / n - 1 > *first)
+            *first = -most / n - 1;
+        if (n < 0 && -(most / n) < *last)
+            *last = -(most / n);
     }
 }
 
@@ -12817,7 +12792,7 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
         s->whole[level] = terrimpi_sorted_square(s, begins + 1.875f * size);
         begins = scale * (s->desc.table && level < s->top ? s->desc.table[level + 1] * unit
                                                            : 2.0f * size);
-        begins = (float)terrimpi_sorted_floor(terrimpi_min(begins, (float)s->limit));
+        begins = (float)terrimpi_round_down(terrimpi_min(begins, (float)s->limit));
         range = (float)(terrimpi_sorted_square(s, begins) - s->whole[level]);
         s->fade[level] = range > 1.0f ? 1.0f / range : 1.0f;
     }
@@ -13378,7 +13353,6 @@ static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
     terrimpi_sorted_restart(s);
     while (terrimpi_sorted_step(s, 1))
         count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
-    terrimpi_sorted_restart(s);
     return count;
 }
 
@@ -13420,22 +13394,19 @@ static int terrimpi_sorted_units(terrimp_sorted *s, const float eye[3],
                                  const terrimpi_sorted_hull *hull)
 {
     const terrimp_sorted_desc *d = &s->desc;
-    float spacing[2], larger, unit = 4096.0f, rise, reach = 0.0f;
+    float larger = terrimpi_max(d->field.spacing_x, d->field.spacing_z), unit = 4096.0f, rise;
+    float reach = 0.0f, page = (float)d->page_quads;
     int k;
     for (k = 0; k < 2; k++)
         reach = terrimpi_max(reach, terrimpi_max(-hull->low[k], hull->high[k]));
-    spacing[0] = d->field.spacing_x;
-    spacing[1] = d->field.spacing_z;
-    larger = terrimpi_max(spacing[0], spacing[1]);
-    if (!(reach < 1024.0f * (float)d->page_quads))
-        return 0;
-    while (unit > 8.0f && !((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
+    while (unit >= 8.0f && !((reach + 3.0f * page) * unit < TERRIMPI_SORTED_LIMIT))
         unit *= 0.5f;
-    if (!((reach + 3.0f * (float)d->page_quads) * unit < TERRIMPI_SORTED_LIMIT))
+    if (unit < 8.0f || !(reach < 1024.0f * page))
         return 0;
     for (k = 0; k < 2; k++) {
-        s->unit[k] = (terrimp_sorted_int)terrimpi_max(spacing[k] / larger * unit + 0.5f, 1.0f);
-        s->eye[k] = (terrimp_sorted_int)terrimpi_sorted_floor(eye[2 * k] * (float)s->unit[k]);
+        float size = (k == 0 ? d->field.spacing_x : d->field.spacing_z) / larger * unit;
+        s->unit[k] = (terrimp_sorted_int)terrimpi_max(size + 0.5f, 1.0f);
+        s->eye[k] = (terrimp_sorted_int)terrimpi_round_down(eye[2 * k] * (float)s->unit[k]);
     }
     rise = terrimpi_max(terrimpi_max(eye[1] - d->high, d->low - eye[1]), 0.0f) / larger * unit;
     s->limit = (terrimp_sorted_int)(TERRIMPI_SORTED_LIMIT - unit);
@@ -13469,25 +13440,25 @@ static void terrimpi_sorted_arrange(terrimp_sorted *s, const terrimp_camera *cam
 TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
                                                 const terrimp_camera *camera)
 {
+    const terrimp_heightfield *f;
     terrimp_camera c;
     terrimpi_sorted_hull hull;
-    float eye[3];
+    float eye[3], quads;
     int k;
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
     sorted->depth = -1;
     sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     TERRIMPI_REFUSE(c.orthographic || c.z_far > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
-    for (k = 0; k < 3; k++) {
-        const terrimp_heightfield *f = &sorted->desc.field;
-        float quads = (float)sorted->desc.page_quads;
-        eye[k] = k == 1 ? c.eye[1] : k == 0 ? (c.eye[0] - f->origin_x) / f->spacing_x
-                                            : (c.eye[2] - f->origin_z) / f->spacing_z;
-        if (k == 1)
-            continue;
-        TERRIMPI_REFUSE(!(terrimpi_abs(eye[k]) < 8388608.0f), TERRIMP_E_RANGE);
-        sorted->eye_page[k / 2] = terrimpi_sorted_floor(eye[k] / quads);
-        eye[k] -= (float)sorted->eye_page[k / 2] * quads;
+    f = &sorted->desc.field;
+    quads = (float)sorted->desc.page_quads;
+    eye[0] = (c.eye[0] - f->origin_x) / f->spacing_x;
+    eye[1] = c.eye[1];
+    eye[2] = (c.eye[2] - f->origin_z) / f->spacing_z;
+    for (k = 0; k < 2; k++) {
+        TERRIMPI_REFUSE(!(terrimpi_abs(eye[2 * k]) < 8388608.0f), TERRIMP_E_RANGE);
+        sorted->eye_page[k] = terrimpi_round_down(eye[2 * k] / quads);
+        eye[2 * k] -= (float)sorted->eye_page[k] * quads;
     }
     terrimpi_sorted_hull_frustum(&sorted->desc, &c, terrimpi_sorted_z_far(&sorted->desc, &c), eye,
                                  &hull);
@@ -13771,7 +13742,7 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
                                                uint32_t *circles)
 {
     terrimpi_sorted_net net;
-    uint32_t count = index_count / 3u, i;
+    uint32_t count = index_count / 3u, turn, i;
     TERRIMPI_REFUSE(!xyz || !eye || !indices || !scratch, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(eye), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(index_count % 3u != 0 || index_count > 65535u || vertex_count > 65535u,
@@ -13789,15 +13760,11 @@ TERRIMP_API terrimp_result terrimp_sorted_mesh(const float *xyz, uint32_t vertex
     net.circles = 0;
     memcpy(net.corners, indices, index_count * sizeof *indices);
     terrimpi_sorted_net_begin(&net, vertex_count, count);
-    for (i = 0; i < count; i++)
-        if (net.seen[i] == TERRIMPI_SORTED_WALL && !terrimpi_sorted_faces(&net, i))
-            terrimpi_sorted_write_triangle(&net, i);
-    for (i = 0; i < count; i++)
-        if (net.seen[i] == 0)
-            terrimpi_sorted_write_triangle(&net, i);
-    for (i = 0; i < count; i++)
-        if (net.seen[i] == TERRIMPI_SORTED_WALL)
-            terrimpi_sorted_write_triangle(&net, i);
+    for (turn = 0; turn < 3; turn++) /* walls that face away, the surface, the other walls */
+        for (i = 0; i < count; i++)
+            if (net.seen[i] == (turn == 1 ? 0 : TERRIMPI_SORTED_WALL) &&
+                (turn > 0 || !terrimpi_sorted_faces(&net, i)))
+                terrimpi_sorted_write_triangle(&net, i);
     if (circles)
         *circles = net.circles;
     return TERRIMP_OK;
@@ -15499,14 +15466,16 @@ static void terrimpi_raise_triangle(const terrimpi_raise *r, const uint16_t *t, 
     terrimpi_simp_find_span(v, &span);
     terrimpi_raise_plane(v, h[0], h[1], h[2], &gx, &gz);
     limit = lowering ? 3.001f * terrimpi_largest(to) : 0.0f;
-    for (z = span.low; z < span.high; z++)
-        for (x = span.left[z]; x < span.right[z]; x++) {
-            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
-            float miss = r->miss[z * (int32_t)r->cols + x], over = h[0] + dx * gx + dz * gz - miss;
+    for (z = span.low; z < span.high; z++) {
+        const float *row = r->miss + z * (int32_t)r->cols;
+        float dx = (float)(span.left[z] - v[0].x), dz = (float)(z - v[0].z), rise = dz * gz;
+        for (x = span.left[z]; x < span.right[z]; x++, dx += 1.0f) {
+            float miss = row[x], over = h[0] + dx * gx + rise - miss, w[3], hold = 0.0f, wanted;
             if (over >= limit)
                 continue;
-            for (k = 0; k < 3; k++)
-                w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
+            w[0] = 1.0f + dx * slope_x[0] + dz * slope_z[0];
+            w[1] = dx * slope_x[1] + dz * slope_z[1];
+            w[2] = dx * slope_x[2] + dz * slope_z[2];
             if (lowering) {
                 over = terrimpi_max(over, 0.0f);
                 terrimpi_raise_down(w[0], 3.0f, over, &to[0]);
@@ -15521,6 +15490,7 @@ static void terrimpi_raise_triangle(const terrimpi_raise *r, const uint16_t *t, 
             for (k = 0; k < 3; k++)
                 terrimpi_raise_up(w[k], wanted, &to[k]);
         }
+    }
     for (k = 0; k < 3; k++)
         change[t[k]] = to[k];
 }
@@ -17172,6 +17142,7 @@ typedef struct terrimpi_paging {
     const terrimp_pages_desc *desc; /* resolved */
     terrimp_terrain whole;          /* nothing but its numbers */
     terrimpi_pages_head head;       /* of the file, but for what is known at the end */
+    uint32_t block_count;
     uint32_t level;                 /* of the whole: of the part's level 0 */
     uint32_t x, z;                  /* the part's first column and row in the whole, in its steps */
     terrimp_terrain *part;
@@ -17277,18 +17248,11 @@ static terrimp_rect terrimpi_paging_end(const terrimpi_paging *w)
                          ((w->whole.desc.field.depth - 2u) >> level) + 2u);
 }
 
-/* Whether there is anything above the blocks. */
-static int terrimpi_paging_has_end(const terrimpi_paging *w)
-{
-    return w->desc->block_level + 1u < w->whole.tree.level_count;
-}
-
 static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terrimp_pages_desc *d,
                                             terrimpi_paging *w)
 {
-    uint32_t count;
-    TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &count));
     memset(w, 0, sizeof *w);
+    TERRIMPI_TRY(terrimp_pages_desc_resolve(desc, d, &w->block_count));
     w->desc = d;
     w->whole.desc = d->terrain;
     terrimpi_terrain_count(&w->whole);
@@ -17310,11 +17274,11 @@ TERRIMP_API terrimp_result terrimp_pages_place(const terrimp_pages_desc *desc, u
     terrimp_pages_desc d;
     terrimpi_paging w;
     const terrimp_quadtree *t = &w.whole.tree;
-    uint32_t all, page_bytes;
+    uint32_t page_bytes;
     TERRIMPI_REFUSE(!offset || !bytes, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
-    all = t->level_x[d.block_level] * t->level_z[d.block_level];
-    TERRIMPI_REFUSE(first_block > all || block_count > all - first_block, TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(first_block > w.block_count || block_count > w.block_count - first_block,
+                    TERRIMP_E_RANGE);
     page_bytes = terrimpi_page_bytes(&w.whole);
     *offset = TERRIMP_PAGES_HEADER_BYTES +
               terrimpi_page_first(t, d.block_level, first_block) * page_bytes;
@@ -17328,17 +17292,15 @@ TERRIMP_API size_t terrimp_pages_scratch_bytes(const terrimp_pages_desc *desc)
     terrimp_terrain_desc part;
     terrimpi_paging w;
     terrimp_rect r, read;
-    size_t block, end = 1;
+    size_t block, end;
     if (terrimpi_paging_begin(desc, &d, &w) != TERRIMP_OK)
         return 0;
     r = terrimpi_paging_of(&w, 0, &read); /* the last of two blocks has the larger window */
     r.width = terrimpi_min_u32(w.whole.desc.field.width, 2u * r.width);
     r.height = terrimpi_min_u32(w.whole.desc.field.depth, 2u * r.height);
     block = terrimpi_paging_layout(&w, 0, &r, NULL, &part);
-    if (terrimpi_paging_has_end(&w)) {
-        r = terrimpi_paging_end(&w);
-        end = terrimpi_paging_layout(&w, d.block_level, &r, NULL, &part);
-    }
+    r = terrimpi_paging_end(&w);
+    end = terrimpi_paging_layout(&w, d.block_level, &r, NULL, &part);
     return block == 0 || end == 0 ? 0 : block > end ? block : end;
 }
 
@@ -17488,7 +17450,7 @@ TERRIMP_API terrimp_result terrimp_pages_build_block(const terrimp_pages_desc *d
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
     x = block % w.whole.tree.level_x[d.block_level];
     z = block / w.whole.tree.level_x[d.block_level];
-    TERRIMPI_REFUSE(z >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(block >= w.block_count, TERRIMP_E_RANGE);
     r = terrimpi_paging_of(&w, block, &read);
     TERRIMPI_TRY(terrimpi_paging_open(&w, 0, &r, scratch, bytes));
     size = (uint32_t)terrimpi_field_sample_bytes(d.terrain.field.format);
@@ -17526,8 +17488,8 @@ TERRIMP_API terrimp_result terrimp_pages_check_block(const terrimp_pages_desc *d
     terrimp_node n;
     uint32_t across;
     TERRIMPI_TRY(terrimpi_paging_begin(desc, &d, &w));
+    TERRIMPI_REFUSE(block >= w.block_count, TERRIMP_E_RANGE);
     across = w.whole.tree.level_x[d.block_level];
-    TERRIMPI_REFUSE(block / across >= w.whole.tree.level_z[d.block_level], TERRIMP_E_RANGE);
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, terrimpi_page_bytes(&w.whole)));
     n = terrimpi_tree_at(&w.whole.tree, d.block_level, block % across, block / across);
     return terrimpi_paging_load(&w, &n, (unsigned char *)scratch, &head);
