@@ -15466,14 +15466,16 @@ static void terrimpi_raise_triangle(const terrimpi_raise *r, const uint16_t *t, 
     terrimpi_simp_find_span(v, &span);
     terrimpi_raise_plane(v, h[0], h[1], h[2], &gx, &gz);
     limit = lowering ? 3.001f * terrimpi_largest(to) : 0.0f;
-    for (z = span.low; z < span.high; z++)
-        for (x = span.left[z]; x < span.right[z]; x++) {
-            float dx = (float)(x - v[0].x), dz = (float)(z - v[0].z), w[3], hold = 0.0f, wanted;
-            float miss = r->miss[z * (int32_t)r->cols + x], over = h[0] + dx * gx + dz * gz - miss;
+    for (z = span.low; z < span.high; z++) {
+        const float *row = r->miss + z * (int32_t)r->cols;
+        float dx = (float)(span.left[z] - v[0].x), dz = (float)(z - v[0].z), rise = dz * gz;
+        for (x = span.left[z]; x < span.right[z]; x++, dx += 1.0f) {
+            float miss = row[x], over = h[0] + dx * gx + rise - miss, w[3], hold = 0.0f, wanted;
             if (over >= limit)
                 continue;
-            for (k = 0; k < 3; k++)
-                w[k] = (k == 0 ? 1.0f : 0.0f) + dx * slope_x[k] + dz * slope_z[k];
+            w[0] = 1.0f + dx * slope_x[0] + dz * slope_z[0];
+            w[1] = dx * slope_x[1] + dz * slope_z[1];
+            w[2] = dx * slope_x[2] + dz * slope_z[2];
             if (lowering) {
                 over = terrimpi_max(over, 0.0f);
                 terrimpi_raise_down(w[0], 3.0f, over, &to[0]);
@@ -15488,6 +15490,7 @@ static void terrimpi_raise_triangle(const terrimpi_raise *r, const uint16_t *t, 
             for (k = 0; k < 3; k++)
                 terrimpi_raise_up(w[k], wanted, &to[k]);
         }
+    }
     for (k = 0; k < 3; k++)
         change[t[k]] = to[k];
 }

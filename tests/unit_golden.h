@@ -117,6 +117,7 @@ static void golden_prepare(land *l, uint32_t width, uint32_t depth, int format, 
 {
     uint32_t x, z;
     land_prepare(l, width, depth, format, LAND_FLAT);
+    l->desc.triangle_budget = 0;
     l->desc.chunk_quads = chunk;
     for (z = 0; z < depth; z++)
         for (x = 0; x < width; x++) {

@@ -92,7 +92,7 @@ static void paged_prepare(paged_land *p, uint32_t width, uint32_t depth, int for
     memset(p, 0, sizeof *p);
     land_prepare(&p->l, width, depth, format, shape);
     p->l.desc.chunk_quads = chunk_quads;
-    p->l.desc.triangle_budget = width > 256u ? 40u : 0u; /* many nodes are built, so small meshes */
+    p->l.desc.triangle_budget = 40; /* smaller ones still: many nodes are built twice */
     p->l.desc.height_low = -126.0f;
     p->l.desc.height_high = 257.0f;
     p->last = UINT32_MAX;

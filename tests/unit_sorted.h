@@ -596,7 +596,7 @@ static void views_in_painters_order_need_no_depth_buffer(void)
     static land l;
     int turn;
     memset(&h, 0, sizeof h);
-    for (turn = 0; turn < 12; turn++) {
+    for (turn = 0; turn < (int)check_rounds(8, 12); turn++) {
         terrimp_view_desc d;
         order_land(&l, turn);
         if (!land_build(&l))
@@ -627,7 +627,7 @@ static void views_of_tiles_need_no_depth_buffer(void)
     static land l;
     int is_long = getenv("TERRIMP_LONG") != NULL, frames = is_long ? 125 : 2, i, k, mode, wrap;
     for (i = 0; i < (is_long ? 4 : 1); i++)
-        for (k = 0; k < 4 && sorted_read_tile(tiles[i]); k++) { /* crops of the tile */
+        for (k = 0; k < (is_long ? 4 : 2) && sorted_read_tile(tiles[i]); k++) { /* its crops */
             int first_x = k % 2 * 700, first_z = k / 2 * 700, x, z;
             for (wrap = 0; wrap < 2; wrap++) {
                 land_prepare(&l, CROP, CROP, TERRIMP_FORMAT_F32, LAND_FLAT);
@@ -676,7 +676,7 @@ static void pictures_are_made_in_painters_order(void)
     int turn;
     memset(&h, 0, sizeof h);
     h.screen.hides_back = 1;
-    for (turn = 0; turn < 16; turn++) {
+    for (turn = 0; turn < (int)check_rounds(12, 16); turn++) {
         terrimp_view_desc d;
         order_land(&l, turn);
         l.desc.chunk_quads = turn % 2 ? 8 : 16;
@@ -1041,6 +1041,7 @@ static void views_keep_to_their_cost(void)
     for (turn = 0; turn < 2; turn++) {
         land_prepare(&l, 257, 193, TERRIMP_FORMAT_F32, LAND_HILLS);
         l.desc.field.height_scale = 0.125f;
+        l.desc.triangle_budget = 40;
         l.desc.chunk_quads = turn ? 8 : 16;
         if (!land_build(&l))
             return;

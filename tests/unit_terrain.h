@@ -60,6 +60,7 @@ static void land_prepare(land *l, uint32_t width, uint32_t depth, int format, la
     l->desc.field.width = width;
     l->desc.field.depth = depth;
     l->desc.field.format = format;
+    l->desc.triangle_budget = 48; /* smaller meshes than by default are built in half the time */
     if (format == TERRIMP_FORMAT_U16 || format == TERRIMP_FORMAT_S16)
         l->desc.field.height_scale = 1.0f / 256.0f;
     for (z = 0; z < depth; z++)
