@@ -9,7 +9,7 @@
 
 enum { FLIGHT_SCENES = 8 }; /* of 288 frames */
 
-enum { FLIGHT_SPOT = 8 }; /* pixels of a frame */
+enum { FLIGHT_SPOT = 3 }; /* pixels of a frame */
 
 /* What is asked of a frame. Where the eye is over the ground: no hole, and no skyline torn off.
    From elsewhere no floor can be drawn, and a texel at the edge of a step may let the sky through,
