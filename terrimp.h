@@ -11790,7 +11790,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
-/* Whether all pages are here that a capture draws. Those that are not are wanted, and it is late. */
+/* Whether all pages are here that a capture draws; those that are not are wanted: that is late. */
 static int terrimpi_capture_has_pages(const terrimp_quadtree *t, const terrimpi_capture_draw *draws,
                                       uint32_t count, float urgency, uint32_t *late)
 {
