@@ -11790,18 +11790,17 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
 #endif
 }
 
-/* Whether all pages are here that a capture draws; those that are not are wanted. */
-static int terrimpi_view_has_pages(terrimp_view *v, const terrimpi_capture_draw *draws,
-                                   uint32_t count, float urgency)
+/* Whether all pages are here that a capture draws; those that are not are wanted: that is late. */
+static int terrimpi_capture_has_pages(const terrimp_quadtree *t, const terrimpi_capture_draw *draws,
+                                      uint32_t count, float urgency, uint32_t *late)
 {
-    const terrimp_quadtree *t = &v->terrain->tree;
     int reason = urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE, all = 1;
     uint32_t i;
     for (i = 0; i < count && t->pages; i++) {
         terrimp_node node = terrimpi_tree_node(t, draws[i].node);
         all &= t->pages->calls->want(t, &node, reason, terrimpi_min(urgency, 2.0f));
     }
-    v->late += all ? 0u : 1u;
+    *late += all ? 0u : 1u;
     return all;
 }
 
@@ -11877,7 +11876,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
     count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_view_has_pages(v, v->capture_draws, count, c->urgency) || room == 0)
+    if (!terrimpi_capture_has_pages(&v->terrain->tree, v->capture_draws, count, c->urgency,
+                                    &v->late) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
@@ -12073,7 +12073,8 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     int has_pages;
     count = terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
     has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
-                terrimpi_view_has_pages(v, v->capture_draws, count, 2.0f);
+                terrimpi_capture_has_pages(&v->terrain->tree, v->capture_draws, count, 2.0f,
+                                           &v->late);
     if (!has_pages ||
         terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
@@ -12168,9 +12169,8 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
 }
 
 /* The rest of the statistics. */
-static void terrimpi_view_count_frame(terrimp_view *v)
+static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
 {
-    terrimp_stats *s = &v->stats;
     const terrimp_camera *c = &v->frame.camera;
     float tan_x, tan_y, first, last;
     uint32_t i;
@@ -12296,7 +12296,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
-    terrimpi_view_count_frame(view);
+    terrimpi_view_count_frame(view, &view->stats);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
@@ -12350,7 +12350,7 @@ static void terrimpi_view_list_again(terrimp_view *v)
     s->texels_used = 0;
     s->worst_angle_rad = s->worst_parallax_px = 0.0f;
     terrimpi_view_list(v);
-    terrimpi_view_count_frame(v);
+    terrimpi_view_count_frame(v, &v->stats);
 }
 
 /* Makes a picture, or a piece of one. */
