@@ -488,8 +488,25 @@ static uint32_t skirt_points(const land *l, uint32_t node, int axis, uint32_t li
     return count;
 }
 
-/* Nothing can be seen between a mesh and what is drawn beside it: no sample of a border is over the
-   mesh, and none is below its skirt. */
+/* The highest that ground of levels up to that of quads so long is drawn at place i of a border,
+   along x or z. */
+static float ground_top(const land *l, uint32_t along_x, uint32_t line, uint32_t first,
+                        uint32_t last, uint32_t longest, uint32_t i)
+{
+    float top = along_x ? land_sample(l, i, line) : land_sample(l, line, i);
+    uint32_t step;
+    for (step = 2; step <= longest; step *= 2u) {
+        uint32_t a = i - (i - first) % step, b = a + step < last ? a + step : last;
+        float from = along_x ? land_sample(l, a, line) : land_sample(l, line, a);
+        float to = along_x ? land_sample(l, b, line) : land_sample(l, line, b);
+        if (b > a)
+            top = fmaxf(top, from + (to - from) * (float)(i - a) / (float)(b - a));
+    }
+    return top;
+}
+
+/* Nothing can be seen between a mesh and what is drawn beside it: no ground along a border, coarser
+   by one level, or with chunks of 64 by two, is over the mesh; no sample is below its skirt. */
 static void check_seams(const land *l, uint32_t node)
 {
     static float above[1024][2], below[1024][2];
@@ -504,7 +521,10 @@ static void check_seams(const land *l, uint32_t node)
         for (i = first[1u - k]; i <= last[1u - k]; i++) {
             float at = k ? land_x(l, i) : land_z(l, i);
             float sample = k ? land_sample(l, i, line) : land_sample(l, line, i);
-            CHECK(l->terrain->desc.proud == 0.0f || height_along(above, n, at) >= sample - slack);
+            float top = ground_top(l, k, line, first[1u - k], last[1u - k],
+                                   (l->info.chunk_quads >= 64u ? 4u : 2u)
+                                       << land_place(l, node).level, i);
+            CHECK(l->terrain->desc.proud == 0.0f || height_along(above, n, at) >= top - slack);
             CHECK(m == 0 || height_along(below, m, at) <= sample + slack);
         }
     }
