@@ -8979,15 +8979,19 @@ static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node,
     p->wants[last].bytes = p->page_bytes;
     p->wants[last].reason = reason;
     p->wants[last].urgency = urgency;
-    for (i = 0; i < last && p->wants[i].node != node->number; i++)
-        worst = terrimpi_want_after(p->wants, i, worst) ? i : worst;
-    if (i < last && !terrimpi_want_after(p->wants, i, last))
-        return 0;
-    worst = i < last ? i : worst;
-    if (i == last && last < p->want_limit)
+    for (i = 0; i < last && p->wants[i].node != node->number; i++) {}
+    if (i < last) {
+        if (!terrimpi_want_after(p->wants, i, last))
+            return 0;
+        p->wants[i] = p->wants[last];
+    } else if (last < p->want_limit) {
         p->want_count++;
-    else if (terrimpi_want_after(p->wants, worst, last))
-        p->wants[worst] = p->wants[last];
+    } else {
+        for (i = 0; i < last; i++)
+            worst = terrimpi_want_after(p->wants, i, worst) ? i : worst;
+        if (terrimpi_want_after(p->wants, worst, last))
+            p->wants[worst] = p->wants[last];
+    }
     return 1;
 }
 
