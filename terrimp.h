@@ -633,7 +633,8 @@ typedef struct terrimp_geomip_draw {
 
 /* Working memory of one node in one view. */
 typedef struct terrimp_geomip_mark {
-    float measure;  /* square of error over tolerance: from 1 on the node is split */
+    float measure;  /* square of error over tolerance: from 1 on the node is split; below 0: it
+                       would be, but pages are missing */
     uint32_t next;  /* in the list of its level */
     uint32_t frame; /* when it was written */
 } terrimp_geomip_mark;
@@ -1448,8 +1449,8 @@ TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain
 /* The first meeting of a ray and a terrain, in pages or not, as terrimp_heightfield_raycast.
 
    hit         out; x and z count in samples of the terrain. NULL: not wanted
-   level       out: of the ground that was met, or when nothing was, the coarsest that was asked.
-               NULL: only level 0 will do, else E_PAGE */
+   level       out: of the coarsest ground that was asked on the way; 0: all is exact. NULL: only
+               that will do, else E_PAGE */
 TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrain,
                                                    const float origin[3], const float direction[3],
                                                    float max_distance, terrimp_ray_hit *hit,
@@ -5241,7 +5242,8 @@ static void terrimpi_mip_mark_errors(terrimpi_mip_frame *f)
     while (terrimpi_tree_next(&walk, &v)) {
         const terrimp_geomip_mark *mark = &f->view->marks[v.node.number];
         float measure = v.node.level == 0 ? 0.0f : terrimpi_mip_split_ratio(f, &v.node, &v.planes);
-        if (mark->frame == f->view->frame - 1u && mark->measure >= 1.0f && worth >= 1.0f)
+        if (mark->frame == f->view->frame - 1u && terrimpi_abs(mark->measure) >= 1.0f &&
+            worth >= 1.0f)
             measure *= stay * stay;
         if (measure < worth)
             continue;
@@ -9123,7 +9125,7 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
             if (terrimpi_page_divides(t, &node, &need) &&
                 (late == 0 || terrimpi_page_has_around(mip, &node)))
                 continue;
-            mark->measure = 0.0f;
+            mark->measure = -mark->measure;
             late++;
             t->tree.pages->strays = 1;
         }
@@ -9384,7 +9386,7 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
     terrimpi_tree_walk walk;
     terrimpi_tree_visit v;
     float way[3], reach = max_distance;
-    uint32_t of = 0, coarsest = 0;
+    uint32_t coarsest = 0;
     int is_met = 0;
     TERRIMPI_REFUSE(!terrain || !origin || !direction, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrain->built, TERRIMP_E_STATE);
@@ -9431,13 +9433,12 @@ TERRIMP_API terrimp_result terrimp_terrain_raycast(const terrimp_terrain *terrai
             continue;
         is_met = 1;
         best = found;
-        of = v.node.level;
         reach = found.distance;
-        best.x = (v.node.x * tree->chunk_quads + found.x) << of;
-        best.z = (v.node.z * tree->chunk_quads + found.z) << of;
+        best.x = (v.node.x * tree->chunk_quads + found.x) << v.node.level;
+        best.z = (v.node.z * tree->chunk_quads + found.z) << v.node.level;
     }
     if (level)
-        *level = is_met ? of : coarsest;
+        *level = coarsest;
     if (hit && is_met)
         *hit = best;
     return is_met ? TERRIMP_OK : TERRIMP_E_MISS;
@@ -10806,6 +10807,7 @@ typedef struct terrimpi_region {
     uint16_t candidate_count;            /* none: ground is all it can be */
     uint8_t fits;                        /* there are some, and a camera fits round each */
     uint8_t kind;                        /* that shows it */
+    uint8_t late;                        /* its ground is coarser, since pages are missing */
     float pixels;                        /* that the candidates cover, about */
 } terrimpi_region;
 
@@ -11323,6 +11325,7 @@ static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_
         terrimp_node node = terrimpi_tree_node(tree, nodes[i].number);
         if (nodes[i].cuts & TERRIMPI_CULL_GROUND)
             terrimpi_view_add_ground(&v->ground, mip, &node);
+        region->late |= (uint8_t)(mip && terrimpi_mip_ratio_of(mip, node.number) < 0.0f);
         if (!(nodes[i].cuts & TERRIMPI_CULL_IMPOSTOR))
             continue;
         if (v->candidate_count < v->desc.max_impostors) {
@@ -11743,7 +11746,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     int before = v->kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
-    int is_known = 1;
+    int is_known = !region->late;
     terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);

@@ -705,6 +705,8 @@ static void pages_answer_heights_and_rays(void)
             }
         } else if (result == TERRIMP_OK && true_result == TERRIMP_OK && level == 0) {
             CHECK(fabsf(hit.distance - truth.distance) < 1e-3f * truth.distance);
+        } else if (level == 0) {
+            CHECK(result == true_result);
         }
     }
     paged_free(&p);
@@ -1018,6 +1020,33 @@ static void paged_show(const land *l, const terrimp_camera *camera, paged_frame 
             frame->impostors[frame->impostor_count++] = frame->impostors[i];
 }
 
+/* A low camera from where a hider hides something; NULL: sets, after their cell there is built. With
+   wide cells all may be seen from anywhere. */
+static terrimp_camera paged_low_camera(const land *l, terrimp_hider *hider, terrimp_sets *sets,
+                                       const float *walls)
+{
+    terrimp_camera camera;
+    terrimp_stats stats;
+    uint32_t tries = 0;
+    do {
+        terrimp_view *view;
+        terrimp_node below;
+        camera = paged_camera(l, 1);
+        CHECK(terrimp_heightfield_height(&l->desc.field, camera.eye[0], camera.eye[2],
+                                         &camera.eye[1]) == TERRIMP_OK);
+        camera.eye[1] += hider ? 8.0f : 1.0f;
+        camera.z_near = 0.01f;
+        CHECK(terrimp_quadtree_find(&l->terrain->tree, 0, camera.eye[0], camera.eye[2], &below) ==
+              TERRIMP_OK);
+        CHECK(terrimp_sets_build_cell(sets, walls, below.number, NULL) == TERRIMP_OK);
+        view = paged_view(l->terrain, TERRIMP_MODE_GEOMIP, 0.0f, hider ? hider : &sets->hider);
+        CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_view_get_stats(view, &stats) == TERRIMP_OK);
+        terrimp_view_destroy(view);
+    } while (stats.hidden == 0 && ++tries < 20u);
+    return camera;
+}
+
 /* Whatever the order in which pages come: in the end the eye sees what it sees of memory, in all
    modes; with a horizon, that and what would be hidden by ground that is not here; with visible
    sets, which are built of memory, that alone. */
@@ -1043,16 +1072,12 @@ static void pages_settle_to_what_memory_shows(void)
         terrimp_camera camera = paged_camera(&p->l, turn);
         terrimp_stats stats[2] = {{0}, {0}};
         paged_host host;
-        terrimp_node below;
         uint32_t frame, quiet = 0, i, k;
-        if (turn % 3u == 1u) { /* low, where there is something to hide */
-            CHECK(terrimp_heightfield_height(&p->l.desc.field, camera.eye[0], camera.eye[2],
-                                             &camera.eye[1]) == TERRIMP_OK);
-            camera.eye[1] += 1.0f;
-            camera.z_near = 0.01f;
-            CHECK(terrimp_quadtree_find(&p->l.terrain->tree, 0, camera.eye[0], camera.eye[2],
-                                        &below) == TERRIMP_OK);
-            CHECK(terrimp_sets_build_cell(&sets[0], walls, below.number, NULL) == TERRIMP_OK);
+        if (hides) {
+            CHECK(terrimp_horizon_init(&horizons[0], &p->l.terrain->tree, walls) == TERRIMP_OK);
+            CHECK(terrimp_sets_init(&sets[0], &p->l.terrain->tree) == TERRIMP_OK);
+            camera = paged_low_camera(&p->l, turn % 3u == 1u ? NULL : &horizons[0].hider, &sets[0],
+                                      walls);
         }
         memset(&host, 0, sizeof host);
         free(p->memory);
@@ -1072,7 +1097,8 @@ static void pages_settle_to_what_memory_shows(void)
             terrimp_result result;
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             result = terrimp_view_update(views[1], &camera);
-            CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && frame < 50u));
+            CHECK(result == (paged_is_here(p, p->info.node_count - 1u) ? TERRIMP_OK
+                                                                       : TERRIMP_E_PAGE));
             if (paged_serve(&host) || result != TERRIMP_OK)
                 quiet = 0;
             if (result != TERRIMP_OK)
@@ -1094,9 +1120,8 @@ static void pages_settle_to_what_memory_shows(void)
         for (frame = 0; frame < 2u && mode % 2 == 1; frame++)
             paged_show(&p->l, &camera, &frames[frame]);
         hidden[turn % 3u / 2u] += stats[1].hidden;
-        CHECK(stats[1].hidden == stats[0].hidden ||
-              (turn % 3u == 2u && stats[1].hidden < stats[0].hidden));
-        if (stats[1].hidden == stats[0].hidden) { /* else a sample that would hide is not here */
+        if (turn % 3u < 2u) { /* else a sample that would hide may not be here */
+            CHECK(stats[1].hidden == stats[0].hidden);
             CHECK(frames[0].ground_count == frames[1].ground_count);
             CHECK(frames[0].impostor_count == frames[1].impostor_count);
             CHECK(mode % 2 == 1 || stats[0].triangles == stats[1].triangles);
@@ -1131,14 +1156,14 @@ static void pages_settle_to_what_memory_shows(void)
 static void pages_morph_as_memory_does(void)
 {
     static paged_frame frames[2];
-    uint32_t turn;
+    uint32_t turn, morphs = 0;
     for (turn = 0; turn < 4u && check_bad == 0; turn++) {
         paged_land p;
         terrimp_view *views[2];
         terrimp_geomip_vertex *vertices[2];
         terrimp_view_desc desc;
-        uint32_t node, count, morphs = 0, i;
-        float ratio = turn == 1u ? 2.0f : random_float(1.1f, 2.0f);
+        uint32_t node, count, i;
+        float ratio = turn == 1u ? 2.0f : random_float(turn ? 1.1f : 1.5f, 2.0f);
         paged_prepare(&p, turn ? random_range(60, 110) : 257u,
                       turn ? random_range(60, 110) : 257u, TERRIMP_FORMAT_U16,
                       turn == 1u ? LAND_NOISE : LAND_HILLS, 8, turn < 2u ? 0u : 2u);
@@ -1184,7 +1209,7 @@ static void pages_morph_as_memory_does(void)
                 morphs += a->morph > 0.01f && a->morph < 0.99f;
             }
         }
-        CHECK(morphs > 0 || turn > 0u);
+        CHECK(morphs > 0 || turn < 1u);
         for (i = 0; i < 2u; i++) {
             free(vertices[i]);
             terrimp_view_destroy(views[i]);
@@ -1230,7 +1255,8 @@ static void pages_fly_without_holes(void)
                 camera = paged_camera(&p->l, turn);
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             result = terrimp_view_update(view, &camera);
-            CHECK(result == TERRIMP_OK || (result == TERRIMP_E_PAGE && i < 40u));
+            CHECK(result == (paged_is_here(p, p->info.node_count - 1u) ? TERRIMP_OK
+                                                                       : TERRIMP_E_PAGE));
             paged_serve(&host);
             host.at_rest = rests ? host.times + p->l.info.node_count : NULL;
             for (k = 0; k < p->l.info.node_count && i % 100u == 99u; k++) {
@@ -1295,23 +1321,53 @@ static void pages_asked_for_are_in_use(void)
     p->memory = NULL;
 }
 
+/* Of the pages that are here, which have been asked for from one place, when little was known: the
+   last frame uses all that are in sight, but for the children of such ones, since a guess is too
+   fine by one level at most; and of ground, which is all that a frame uses unless it makes
+   pictures, none is out of sight by the root's heights. Returns how many are in use. */
+static uint32_t paged_check_reads(const paged_land *p, const terrimp_camera *camera, int mode)
+{
+    const struct terrimp_pages *pages = p->opened->tree.pages;
+    const terrimp_quadtree *tree = &p->opened->tree;
+    uint32_t i, used = 0;
+    terrimp_frustum frustum;
+    terrimp_box box, root;
+    CHECK(terrimp_camera_frustum(camera, &frustum) == TERRIMP_OK);
+    CHECK(terrimp_terrain_get_box(p->opened, tree->node_count - 1u, &root) == TERRIMP_OK);
+    for (i = 0; i < pages->slot_count; i++) {
+        uint32_t node = pages->slots[i].node;
+        if (node == tree->node_count)
+            continue;
+        CHECK(terrimp_geomip_box(tree, node, &box) == TERRIMP_OK);
+        if (terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
+            CHECK(pages->slots[i].used == pages->frame ||
+                  terrimpi_page_above(tree, node)->used == pages->frame);
+        box.min[1] = root.min[1];
+        box.max[1] = root.max[1];
+        CHECK(pages->slots[i].used == pages->frame || mode != TERRIMP_MODE_GEOMIP ||
+              terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE);
+        used += pages->slots[i].used == pages->frame;
+    }
+    return used;
+}
+
 /* A far jump: what the eye needs is asked for at once and not one level after the other, so all of
-   it is here after half as many rounds, and one for each list that is full; and little else has
-   come. */
+   it is here after half as many rounds, and one for each list that is full; and of eight jumps
+   together little else has come. */
 static void pages_of_a_jump_come_at_once(void)
 {
     paged_land *p = paged_wide();
-    uint32_t turn;
+    uint32_t turn, all_reads = 0, all_used = 0;
     for (turn = 0; turn < 8u && check_bad == 0; turn++) {
         static terrimp_want wants[512];
         terrimp_view *view;
         terrimp_camera camera = paged_camera(&p->l, turn / 2u);
-        uint32_t count = 1, rounds = 0, reads = 0, used = 0, i;
+        uint32_t count = 1, rounds = 0, reads = 0, i;
+        int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
         free(p->memory);
         paged_open(p, PAGED_ALL);
         CHECK(paged_fetch(p, p->l.info.node_count - 1u) == TERRIMP_OK);
-        view = paged_view(p->opened, turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO, 0.0f,
-                          NULL);
+        view = paged_view(p->opened, mode, 0.0f, NULL);
         while (count > 0 && rounds < 20u) {
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
@@ -1321,12 +1377,12 @@ static void pages_of_a_jump_come_at_once(void)
             reads += count;
             rounds += count > 0;
         }
-        for (i = 0; i < p->opened->tree.pages->slot_count; i++)
-            used += p->opened->tree.pages->slots[i].used == p->opened->tree.pages->frame;
         CHECK(rounds <= p->opened->tree.level_count / 2u + reads / TERRIMPI_PAGE_WANTS);
-        CHECK(reads * 5u <= used * 6u + 100u);
+        all_reads += reads;
+        all_used += paged_check_reads(p, &camera, mode);
         terrimp_view_destroy(view);
     }
+    CHECK(all_reads * 2u <= all_used * 3u);
     free(p->memory);
     p->memory = NULL;
 }
@@ -1336,7 +1392,7 @@ static void pages_of_a_jump_come_at_once(void)
 static void pages_are_wanted_by_all_views(void)
 {
     paged_land *p = paged_wide();
-    uint32_t turn, i, k, whole = 0;
+    uint32_t turn, i, k, whole = 0, both = 0;
     for (turn = 0; turn < 6u && check_bad == 0; turn++) {
         static terrimp_want wants[3][600];
         terrimp_view *views[2];
@@ -1371,12 +1427,12 @@ static void pages_are_wanted_by_all_views(void)
                 for (at = 0; k == 1u && at < count[0]; at++)
                     shared -= wants[0][at].node == w->node;
             }
-        CHECK(count[0] > 0 && count[1] > 0);
+        both += count[0] > 0 && count[1] > 0; /* from some places hardly anything is in sight */
         CHECK(count[2] == TERRIMPI_PAGE_WANTS || count[2] == count[0] + shared);
         for (i = 0; i < 2u; i++)
             terrimp_view_destroy(views[i]);
     }
-    CHECK(whole > 1u);
+    CHECK(whole > 1u && both > 0);
     free(p->memory);
     p->memory = NULL;
 }
