@@ -1736,7 +1736,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                not above 0, or not finite: the cost stays */
 TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
-/* The statistics of the last update. */
+/* The statistics of the last update, counted when they are asked for: E_STATE also after invalidate,
+   touch and drop, until the next update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when textures were lost. */
@@ -10830,6 +10831,7 @@ struct terrimp_view {
     const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
                                                wraps */
     uint32_t region_count, candidate_count, job_count, draw_count;
+    uint32_t kind_count[TERRIMPI_VIEW_KIND_COUNT]; /* draws of each kind */
     terrimpi_cache cache;
     terrimpi_cull cull;
     uint8_t *kind_of;              /* [node_count] that showed the region */
@@ -10851,7 +10853,7 @@ struct terrimp_view {
     float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
-    terrimp_stats stats;
+    terrimp_stats stats;           /* as far as they are not counted when they are asked for */
     terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
@@ -12134,6 +12136,7 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
     v->stats.hidden = v->cull.hidden_count;
+    v->stats.late = v->late;
     v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
 }
 
@@ -12142,80 +12145,20 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_view_list(terrimp_view *v)
 {
-    uint32_t i, impostors = 0;
+    uint32_t i;
     v->draw_count = 0;
     for (i = 0; i < v->region_count; i++) {
         int kind = v->regions[i].kind;
         while (!terrimpi_view_kinds[kind].list(v, &v->regions[i]))
             kind--;
     }
+    memset(v->kind_count, 0, sizeof v->kind_count);
     for (i = 0; i < v->draw_count; i++)
-        impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
-    if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+        v->kind_count[v->draws[i].kind]++;
+    if ((v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
             terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
-}
-
-/* What a draw adds to the statistics. */
-static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
-                                     terrimp_stats *s)
-{
-    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
-        terrimp_pattern pattern;
-        terrimpi_view_ground_pattern(v, draw->index, &pattern);
-        s->ground++;
-        s->draws++;
-        s->triangles += pattern.triangle_count;
-    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
-        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
-        terrimp_mesh_info mesh;
-        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
-        s->impostors++;
-        s->impostors_by_level[p->node.level]++;
-        s->draws += p->layers_now;
-        s->triangles += mesh.index_count / 3u * p->layers_now;
-        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
-        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
-    } else {
-        s->draws++;
-        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
-    }
-}
-
-/* The rest of the statistics. */
-static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
-{
-    const terrimp_camera *c = &v->frame.camera;
-    float tan_x, tan_y, first, last;
-    uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        terrimpi_view_count_draw(v, &v->draws[i], s);
-    s->visible = v->region_count;
-    s->late = v->late;
-    s->evictions = v->cache.evictions;
-    s->atlas_failures = v->cache.failures;
-    for (i = 0; i < v->region_count; i++) {
-        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
-        terrimp_box box;
-        terrimpi_terrain_node_box(v->terrain, &node, &box);
-        first = v->regions[i].closest;
-        last = terrimp_box_farthest(&box, c->eye);
-        if (c->orthographic) {
-            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
-            first -= c->reach;
-        }
-        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
-        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
-    }
-    /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(c, &tan_x, &tan_y);
-    if (!c->orthographic)
-        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
-    for (i = 0; i < v->desc.atlas_count; i++)
-        s->texels_used += v->cache.atlases[i].texels_used;
-    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
-                     s->texels_used;
 }
 
 /* The next frame for a camera. It follows the eye's motion; a jump is none. */
@@ -12311,7 +12254,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
-    terrimpi_view_count_frame(view, &view->stats);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
@@ -12354,18 +12296,13 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
 /* Lists the frame without the pictures that could not be made. */
 static void terrimpi_view_list_again(terrimp_view *v)
 {
-    terrimp_stats *s = &v->stats;
     uint32_t i;
     for (i = 0; i < v->draw_count; i++)
         if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
             v->cache.pictures[v->draws[i].index].listed = 0;
     terrimpi_view_lose(v);
-    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
-    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
-    s->texels_used = 0;
-    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    v->stats.waiting = 0;
     terrimpi_view_list(v);
-    terrimpi_view_count_frame(v, &v->stats);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -12400,8 +12337,9 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     int kind;
     TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
-    if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
-        (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
+    if ((view->kind_count[TERRIMPI_VIEW_KIND_GROUND] + view->job_count > 0 &&
+         !callbacks->draw_ground) ||
+        (view->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
     view->capturing = 1;
@@ -12420,11 +12358,72 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     return TERRIMP_OK;
 }
 
+/* What a draw adds to the statistics. */
+static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                     terrimp_stats *s)
+{
+    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
+        terrimp_pattern pattern;
+        terrimpi_view_ground_pattern(v, draw->index, &pattern);
+        s->draws++;
+        s->triangles += pattern.triangle_count;
+    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
+        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
+        terrimp_mesh_info mesh;
+        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
+        s->impostors_by_level[p->node.level]++;
+        s->draws += p->layers_now;
+        s->triangles += mesh.index_count / 3u * p->layers_now;
+        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
+        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
+    } else {
+        s->draws++;
+        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
+    }
+}
+
+/* The statistics that the frame itself has no use for. */
+static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
+{
+    const terrimp_camera *c = &v->frame.camera;
+    float tan_x, tan_y, first, last;
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        terrimpi_view_count_draw(v, &v->draws[i], s);
+    s->ground = v->kind_count[TERRIMPI_VIEW_KIND_GROUND];
+    s->impostors = v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR];
+    s->visible = v->region_count;
+    s->evictions = v->cache.evictions;
+    s->atlas_failures = v->cache.failures;
+    for (i = 0; i < v->region_count; i++) {
+        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
+        terrimp_box box;
+        terrimpi_terrain_node_box(v->terrain, &node, &box);
+        first = v->regions[i].closest;
+        last = terrimp_box_farthest(&box, c->eye);
+        if (c->orthographic) {
+            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
+            first -= c->reach;
+        }
+        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
+        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
+    }
+    /* A point at that distance in the corner of the screen has the smallest depth. */
+    terrimpi_camera_tangents(c, &tan_x, &tan_y);
+    if (!c->orthographic)
+        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
+    for (i = 0; i < v->desc.atlas_count; i++)
+        s->texels_used += v->cache.atlases[i].texels_used;
+    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+                     s->texels_used;
+}
+
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats)
 {
     TERRIMPI_REFUSE(!view || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
     *stats = view->stats;
+    terrimpi_view_count_frame(view, stats);
     return TERRIMP_OK;
 }
 

@@ -1758,6 +1758,7 @@ static void what_was_forgotten_since_the_update_is_not_drawn(void)
             flight_forget(f);
             flight_clear(f);
             CHECK(terrimp_view_render(f->view, &callbacks) == TERRIMP_E_STATE);
+            CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_E_STATE);
             CHECK(f->item_count == 0 && f->capture_count == 0);
             CHECK(rest(f, &camera) < REST_FRAMES);
             CHECK(f->impostor_count > 3);
