@@ -1493,6 +1493,11 @@ typedef struct terrimp_capture_command {
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
 
+/* What only some hosts want of a view, in their settings: a linker leaves out what no host asks
+   for. */
+typedef struct terrimp_endless terrimp_endless;
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
+
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
     TERRIMP_MODE_DEFAULT = 0, /* same as AUTO */
@@ -1564,11 +1569,12 @@ typedef struct terrimp_view_desc {
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
     int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
                                can have the terrain's own depth instead of the coarse mesh's */
-    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
-                               repetitions along each axis, with the eye's in the middle. The
-                               field's quads are multiples of chunk_quads; nodes are drawn up to the
-                               level at which its chunks are no multiple of theirs. It takes 44
-                               bytes more for each node that it has by that. No hider then
+    const terrimp_endless *endless; /* (required for a terrain whose field wraps)
+                               terrimp_view_endless(): it is drawn without end. Its quads are
+                               multiples of chunk_quads; nodes are drawn up to the level at which
+                               its chunks are no multiple of theirs. No hider then */
+    uint32_t wrap_tiles;    /* as so many repetitions along each axis, with the eye's in the middle;
+                               each takes 44 bytes for each node
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
@@ -1699,8 +1705,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
-              before, or 0; exact_depth only if the view was made with it
+              atlas_count, max_impostors, max_ground, max_captures, endless and wrap_tiles are those
+              of before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1736,8 +1742,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                not above 0, or not finite: the cost stays */
 TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
-/* The statistics of the last update, counted when they are asked for: E_STATE also after invalidate,
-   touch and drop, until the next update. */
+/* The statistics of the last update, counted when they are asked for. Errors: E_STATE also after
+   invalidate, touch and drop, until the next update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when textures were lost. */
@@ -6591,6 +6597,7 @@ struct terrimp_terrain {
     uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
                                               which a node is a repetition. NULL: itself */
     uint32_t tiles;                        /* then: repetitions along each axis */
+    const terrimp_endless *endless;
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6830,15 +6837,23 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
     return t->range_low + t->range_step * (float)steps;
 }
 
-static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+/* What a view does with a terrain that wraps: see terrimp_view_endless. */
+struct terrimp_endless {
+    int (*fits)(const terrimp_terrain *built, const terrimp_view_desc *desc);
+    void (*begin)(terrimp_view *v, terrimp_terrain *t);
+    void (*layout)(terrimp_view *v, terrimpi_arena *l);
+    void (*fill)(terrimp_terrain *t, const terrimp_terrain *built);
+    void (*enter)(terrimp_view *v, terrimp_camera *camera, float middle[2]);
+    terrimp_node (*place)(const terrimp_terrain *t, const terrimp_node *node,
+                          const float middle[2], float offset[2]);
+};
+
+/* The node whose vertices the host has for a node, and what these are moved by in its world.
+   `middle` is where the repetition in the middle is. */
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node,
+                                        const float middle[2], float offset[2])
 {
-    terrimp_node n = *node;
-    n.number = terrimpi_real_node(t, n.number);
-    if (t->real) {
-        n.x %= t->tree.level_x[n.level] / t->tiles;
-        n.z %= t->tree.level_z[n.level] / t->tiles;
-    }
-    return n;
+    return t->real ? t->endless->place(t, node, middle, offset) : *node;
 }
 
 /* Vertex i of a node's mesh. */
@@ -9331,19 +9346,29 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
 
 /* ---- heights and rays ---- */
 
+/* The height of the finest ground that is here; *f is that, and *level its level. */
+static terrimp_result terrimpi_terrain_ground(const terrimp_terrain *t, float x, float z,
+                                              terrimp_heightfield *f, float *height,
+                                              uint32_t *level)
+{
+    *level = 0;
+    *f = t->desc.field;
+    if (t->tree.pages)
+        TERRIMPI_TRY(t->tree.pages->calls->at(&t->tree, x, z, f, level));
+    return terrimp_heightfield_height(f, x, z, height);
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
                                                   float *height, float normal[3], uint32_t *level)
 {
     terrimp_heightfield f;
-    uint32_t found = 0;
+    uint32_t found;
+    float y;
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
                                              height));
-    f = terrain->desc.field;
-    if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
-        TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
-    }
-    TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
+    TERRIMPI_TRY(terrimpi_terrain_ground(terrain, x, z, &f, &y, &found));
+    TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
+    *height = y;
     if (normal)
         TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
     if (level)
@@ -9728,21 +9753,6 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
-   the one in the middle is. */
-static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
-                                 const float middle[2], float offset[2])
-{
-    const terrimp_heightfield *field = &t->desc.field;
-    uint32_t quads = t->desc.chunk_quads << node->level;
-    if (!t->real)
-        return;
-    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
-                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
-    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
-                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
-}
-
 /* Rows of all columns of a node: a picture can be cut after each. */
 static uint32_t terrimpi_capture_rows(const terrimp_terrain *t)
 {
@@ -9794,7 +9804,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
     uint32_t rows = terrimpi_capture_rows(t), i;
-    terrimp_node place = terrimpi_real_place(t, &plan->node);
+    terrimp_node place;
+    memset(&ground, 0, sizeof ground);
+    place = terrimpi_real_place(t, &plan->node, middle, ground.offset);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
@@ -9810,7 +9822,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
     command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
-    memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (i = from / rows; i * rows < to; i++) {
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
@@ -9818,8 +9829,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         uint32_t last = terrimpi_min_u32(to - i * rows, rows);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        terrimpi_tile_offset(t, &node, middle, ground.offset);
-        place = terrimpi_real_place(t, &node);
+        place = terrimpi_real_place(t, &node, middle, ground.offset);
         ground.node = place.number;
         ground.x = place.x;
         ground.z = place.z;
@@ -10058,6 +10068,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     TERRIMPI_DEFAULT(d.wrap_tiles, 3);
+    TERRIMPI_REFUSE(terrain->desc.field.wrap && (!d.endless || !d.endless->fits(terrain, &d)),
+                    TERRIMP_E_RANGE);
     chunks = terrain->tree.level_first[1];
     if (terrain->desc.field.wrap && !terrain->real)
         chunks *= d.wrap_tiles * d.wrap_tiles;
@@ -10067,17 +10079,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size) ||
-                    !terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
-                    TERRIMP_E_RANGE);
-    if (terrain->desc.field.wrap) {
-        const terrimp_heightfield *f = &terrain->desc.field;
-        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
-                        (f->width - 1u) % terrain->desc.chunk_quads ||
-                        (f->depth - 1u) % terrain->desc.chunk_quads ||
-                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
-                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
-    }
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -10117,6 +10119,8 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, endless),
+        TERRIMPI_TROUBLE(terrimp_view_desc, wrap_tiles),
         TERRIMPI_TROUBLE(terrimp_view_desc, hider),
         TERRIMPI_TROUBLE(terrimp_view_desc, joined),
         TERRIMPI_TROUBLE(terrimp_view_desc, costs)
@@ -10125,6 +10129,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     if (!terrain || !desc)
         return "the descriptor";
     memset(&good, 0, sizeof good);
+    good.endless = terrimp_view_endless();
     bad = *desc;
     return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
                             terrimpi_view_try, terrain);
@@ -10662,12 +10667,13 @@ static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
     terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_box box;
     float ground;
-    uint32_t level; /* of the finest ground that is here */
+    uint32_t level;
+    terrimp_heightfield here;
     terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
     terrimpi_terrain_node_box(f->terrain, &root, &box);
-    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    result = terrimpi_terrain_ground(f->terrain, eye[0], eye[2], &here, &ground, &level);
     if (result == TERRIMP_E_MISS)
         return terrimpi_view_inside(f, &box, eye);
     return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
@@ -10861,50 +10867,6 @@ struct terrimp_view {
 #endif
 };
 
-/* ---- a terrain without end ---- */
-
-/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
-   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
-   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
-   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
-static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
-                                 terrimp_terrain *t)
-{
-    terrimp_heightfield field = terrain->desc.field;
-    v->terrain = v->built = terrain;
-    v->tiled = NULL;
-    if (!field.wrap)
-        return;
-    v->terrain = v->tiled = t;
-    *t = *terrain;
-    t->tiles = v->desc.wrap_tiles;
-    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
-    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
-    field.width = (field.width - 1u) * t->tiles + 1u;
-    field.depth = (field.depth - 1u) * t->tiles + 1u;
-    field.row_bytes = 0; /* no sample is read through it */
-    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
-}
-
-static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
-{
-    const terrimp_quadtree *from = &real->tree;
-    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
-    terrimp_node root = terrimpi_tree_root(from);
-    terrimpi_mesh none = real->meshes[root.number];
-    terrimp_geomip_node split = from->nodes[root.number];
-    none.counts = 0;
-    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
-    for (i = 0; i < t->tree.node_count; i++) {
-        terrimp_node n = terrimpi_tree_node(&t->tree, i);
-        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
-        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
-                                              n.z % from->level_z[n.level]).number : root.number;
-        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
-        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
-    }
-}
-
 /* ---- memory ---- */
 
 static terrimp_live_atlas_desc terrimpi_view_atlas_desc(const terrimp_view_desc *d)
@@ -10975,19 +10937,19 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->draws = (terrimpi_view_draw *)terrimpi_take(
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
         sizeof *v->draws);
-    if (v->tiled) {
-        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
-        terrimp_terrain made = *v->tiled;
-        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
-        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
-        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
-        if (t) {
-            *t = made;
-            terrimpi_tiled_fill(t, v->built);
-            v->terrain = v->tiled = t;
-        }
-    }
+    if (v->tiled)
+        v->desc.endless->layout(v, &l);
     return l.ok && slots ? l.bytes : 0;
+}
+
+/* What is drawn: the terrain, or in its place `tiled`, to be laid out. */
+static void terrimpi_view_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                terrimp_terrain *tiled)
+{
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
+    if (terrain->desc.field.wrap)
+        v->desc.endless->begin(v, tiled);
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -10996,7 +10958,7 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -11018,7 +10980,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -11048,11 +11010,14 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
     TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
+    if (!d.endless)
+        d.endless = has->endless;
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
                     d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
-                    (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
+                    d.endless != has->endless || (d.exact_depth && !view->cache.places),
+                    TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
     return TERRIMP_OK;
@@ -11086,6 +11051,88 @@ static void terrimpi_view_cancel(terrimp_view *v)
         v->jobs[0] = v->jobs[v->open - 1u];
         v->open = 1;
     }
+}
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static int terrimpi_tiled_fits(const terrimp_terrain *built, const terrimp_view_desc *d)
+{
+    uint32_t cols = built->desc.field.width - 1u, rows = built->desc.field.depth - 1u;
+    return terrimpi_within_u32(d->wrap_tiles, 3, 15) && d->wrap_tiles % 2u == 1u && !d->hider &&
+           !built->tree.pages && cols % built->desc.chunk_quads == 0 &&
+           rows % built->desc.chunk_quads == 0 && cols * d->wrap_tiles < TERRIMP_MAX_DIM &&
+           rows * d->wrap_tiles < TERRIMP_MAX_DIM;
+}
+
+static void terrimpi_tiled_begin(terrimp_view *v, terrimp_terrain *t)
+{
+    terrimp_heightfield field = v->built->desc.field;
+    v->terrain = v->tiled = t;
+    *t = *v->built;
+    t->tiles = v->desc.wrap_tiles;
+    t->endless = v->desc.endless;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
+
+static void terrimpi_tiled_layout(terrimp_view *v, terrimpi_arena *l)
+{
+    size_t nodes = v->tiled->tree.node_count;
+    terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *t);
+    terrimp_terrain made = *v->tiled;
+    made.real = (uint32_t *)terrimpi_take(l, nodes, sizeof *made.real);
+    made.meshes = (terrimpi_mesh *)terrimpi_take(l, nodes, sizeof *made.meshes);
+    made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(l, nodes, sizeof *made.tree.nodes);
+    if (!t)
+        return;
+    *t = made;
+    terrimpi_tiled_fill(t, v->built);
+    v->terrain = v->tiled = t;
+}
+
+static terrimp_node terrimpi_tiled_place(const terrimp_terrain *t, const terrimp_node *node,
+                                         const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t across = t->tree.level_x[node->level] / t->tiles;
+    uint32_t along = t->tree.level_z[node->level] / t->tiles;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    terrimp_node n = *node;
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+    n.number = t->real[n.number];
+    n.x %= across;
+    n.z %= along;
+    return n;
 }
 
 /* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
@@ -11149,20 +11196,34 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     }
 }
 
-/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
-   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
-static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
-                                 int32_t went[2])
+/* Takes a camera into the tile in the middle, and what is known of nodes by as many tiles as it has
+   gone since the frame before, by the shorter way. Of the step of the eye what is left are world
+   units without tiles. */
+static void terrimpi_tiled_enter(terrimp_view *v, terrimp_camera *camera, float middle[2])
 {
     const terrimp_heightfield *field = &v->terrain->desc.field;
+    int32_t went[2];
     int k;
-    for (k = 0; k < 2 && v->terrain->real; k++) {
+    for (k = 0; k < 2; k++) {
         float period = terrimpi_field_period(field, k), step;
         middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
         step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
         went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
+    if (went[0] || went[1])
+        terrimpi_tiled_move(v, went[0], went[1]);
 }
+
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void)
+{
+    static const terrimp_endless calls = {
+        terrimpi_tiled_fits, terrimpi_tiled_begin, terrimpi_tiled_layout, terrimpi_tiled_fill,
+        terrimpi_tiled_enter, terrimpi_tiled_place
+    };
+    return &calls;
+}
+
+/* ---- what a host says of pictures and light ---- */
 
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
@@ -11227,8 +11288,8 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
-    if (view->terrain->real)
-        terrimpi_tiled_fill(view->tiled, view->built);
+    if (view->tiled)
+        view->desc.endless->fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
         for (k = 0; k < tiles * tiles; k++)
             if (terrimpi_cache_shows(p, tree->chunk_quads,
@@ -11619,12 +11680,12 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
+    terrimp_node place;
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &ground->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11641,14 +11702,14 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
+    terrimp_node place;
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     float eye[3];
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &picture->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11695,7 +11756,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
                                               v->built->tree.level_x[0], draw->index / tiles *
                                               v->built->tree.level_z[0]);
-        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+        terrimpi_real_place(v->terrain, &first, v->frame.middle, command.offset);
     }
     callbacks->draw_floor(callbacks->user, &command);
 }
@@ -12155,7 +12216,8 @@ static void terrimpi_view_list(terrimp_view *v)
     memset(v->kind_count, 0, sizeof v->kind_count);
     for (i = 0; i < v->draw_count; i++)
         v->kind_count[v->draws[i].kind]++;
-    if ((v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+    if ((v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
+         (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
             terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
@@ -12227,12 +12289,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
     float reuse, middle[2] = {0.0f, 0.0f};
-    int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
-    terrimpi_tiled_enter(view, &resolved, middle, went);
-    if (went[0] || went[1])
-        terrimpi_tiled_move(view, went[0], went[1]);
+    if (view->tiled)
+        view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
     if (view->terrain->tree.pages) {
