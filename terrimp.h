@@ -2421,7 +2421,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 
    In a block, and in a terrain of one block, all is what building in memory makes of it. Above the
    blocks, ground and meshes are made of every 2^block_level-th sample, and their errors are those
-   against these, and what the blocks miss added. */
+   against these, and what the blocks miss added: those of ground are no less than of memory. */
 typedef struct terrimp_pages_desc {
     terrimp_terrain_desc terrain; /* (required) but its samples, which are without voids;
                                      height_low and height_high have to be given */
@@ -6598,6 +6598,8 @@ struct terrimp_terrain {
                                               which a node is a repetition. NULL: itself */
     uint32_t tiles;                        /* then: repetitions along each axis */
     const terrimp_endless *endless;
+    uint32_t coarse, cut_x, cut_z;         /* while pages above blocks are made: it is of every
+                                              2^coarse-th sample, the last ones closer by so many */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6745,6 +6747,7 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 typedef struct terrimpi_terrain_tile {
     uint32_t level, x, z, span_x, span_z;
     uint32_t cols, rows;
+    uint32_t coarse, cut_x, cut_z; /* as those of the terrain, of its own last column and row */
 } terrimpi_terrain_tile;
 
 static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, uint32_t node)
@@ -6759,6 +6762,9 @@ static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, 
     p.span_z = terrimpi_tree_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
     p.cols = ((p.span_x - 1u) >> p.level) + 2u;
     p.rows = ((p.span_z - 1u) >> p.level) + 2u;
+    p.coarse = t->coarse;
+    p.cut_x = p.x + p.span_x + 1u == t->tree.field.width ? t->cut_x : 0u;
+    p.cut_z = p.z + p.span_z + 1u == t->tree.field.depth ? t->cut_z : 0u;
     return p;
 }
 
@@ -7000,6 +7006,8 @@ static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_ter
     uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
     terrimpi_terrain_touched out;
+    if (t->tree.pages && level > t->tree.pages->block_level)
+        margin += side / 2u; /* errors are of whole nodes beside it, see terrimpi_paging_build */
     terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
                                    t->tree.level_x[level], &out.x0, &out.x1);
     terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
@@ -16361,7 +16369,10 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
     float line[TERRIMP_MAX_TILE_DIM];
     terrimp_simplify_desc desc;
     terrimpi_simp_last_spacing squeeze;
-    int side, even = (p->span_x | p->span_z) % (1u << p->level) == 0;
+    int side;
+    squeeze.step = 1 << (p->level + p->coarse);
+    squeeze.last_x = (int32_t)((p->span_x << p->coarse) - p->cut_x);
+    squeeze.last_z = (int32_t)((p->span_z << p->coarse) - p->cut_z);
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
@@ -16375,10 +16386,9 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
                                              &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
-    squeeze.step = 1 << p->level;
-    squeeze.last_x = (int32_t)p->span_x;
-    squeeze.last_z = (int32_t)p->span_z;
-    return terrimpi_simp_run(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
+    return terrimpi_simp_run(&desc,
+                             (squeeze.last_x | squeeze.last_z) % squeeze.step ? &squeeze : NULL,
+                             build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
@@ -16710,7 +16720,7 @@ TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *fie
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_TRY(terrimp_heightfield_read(&f, samples->x, samples->y, samples->width,
                                           samples->height, 1, build.tile));
-    p.level = 0;
+    memset(&p, 0, sizeof p);
     p.x = samples->x;
     p.z = samples->y;
     p.cols = samples->width;
@@ -17389,7 +17399,65 @@ static terrimp_result terrimpi_paging_open(terrimpi_paging *w, uint32_t level,
                                       terrimpi_paging_layout(w, level, r, NULL, &part)));
     terrimpi_paging_layout(w, level, r, (unsigned char *)scratch, &part);
     TERRIMPI_TRY(terrimp_terrain_init(&part, w->part, w->part_bytes, &made));
+    if (level > 0) {
+        made->coarse = level;
+        made->cut_x = ((r->width - 1u) << level) + 1u - w->whole.desc.field.width;
+        made->cut_z = ((r->height - 1u) << level) + 1u - w->whole.desc.field.depth;
+    }
     return terrimp_terrain_build_begin(made);
+}
+
+/* How far the edge along which a finer neighbour cuts its quads across, in the corner that meets a
+   coarser side, is from the ground of the blocks where it crosses their diagonals: from the middle
+   of quad (i, j) of a level towards +x and -z, or the other way. */
+static float terrimpi_paging_across(const terrimp_quadtree *t, uint32_t level, uint32_t i,
+                                    uint32_t j, int on)
+{
+    const terrimp_heightfield *f = &t->field;
+    uint32_t half = 1u << level >> 1, k, x = (i << level) + half, z = (j << level) + half;
+    float from = terrimpi_field_sample(f, x, z), most = 0.0f;
+    float to = terrimpi_field_sample(f, on ? x + half : x - half, on ? z - half : z + half);
+    for (k = 0; k < half; k++) {
+        uint32_t a = on ? x + k : x - k - 1u, b = on ? z - k - 1u : z + k;
+        float middle = 0.5f * (terrimpi_field_sample(f, a, b) +
+                               terrimpi_field_sample(f, a + 1u, b + 1u));
+        float line = from + (to - from) * (((float)k + 0.5f) / (float)half);
+        most = terrimpi_max(most, terrimpi_abs(line - middle));
+    }
+    return most;
+}
+
+/* How far the ground of a node above the blocks, and what is drawn up to it, is from the blocks'
+   own at most, between the samples that both are made of. Two surfaces of triangles are farthest
+   apart at a vertex or where edges cross. Edges cross between samples when a neighbour cuts its
+   quads across; and in quads that are cut off at the far edge, where both stay within the range of
+   the samples. */
+static terrimp_result terrimpi_paging_between(const terrimpi_paging *w, const terrimp_node *n,
+                                              float *most)
+{
+    const terrimp_quadtree *t = &w->part->tree, *whole = &w->whole.tree;
+    uint32_t level = n->level, all = w->level + level, quads = t->chunk_quads, size = 1u << level;
+    uint32_t x = n->x * quads, z = n->z * quads, i, j;
+    for (j = z - (z > 0); j <= z + quads; j++)
+        for (i = x - (x > 0); i <= x + quads; i++) {
+            uint32_t wide = terrimpi_tree_col(whole, all, i + 1u);
+            uint32_t deep = terrimpi_tree_row(whole, all, j + 1u);
+            float low, high;
+            wide -= terrimpi_tree_col(whole, all, i);
+            deep -= terrimpi_tree_row(whole, all, j);
+            if (wide == 0 || deep == 0)
+                continue;
+            if (terrimpi_min_u32(wide, deep) >> all == 0) {
+                TERRIMPI_TRY(terrimpi_field_range(&t->field,
+                                                  terrimpi_rect(i << level, j << level, size + 1u,
+                                                                size + 1u), 0, &low, &high));
+                *most = terrimpi_max(*most, high - low);
+            } else if ((i < x || i == x + quads) != (j < z || j == z + quads)) {
+                int on = i < x || j == z + quads;
+                *most = terrimpi_max(*most, terrimpi_paging_across(t, level, i, j, on));
+            }
+        }
+    return TERRIMP_OK;
 }
 
 /* Builds a node of the part and makes it hold those below it. */
@@ -17399,20 +17467,26 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     terrimp_geomip_node *ground = &t->tree.nodes[n->number];
     terrimpi_mesh *mesh = &t->meshes[n->number];
     float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
-    terrimp_node child;
+    float around = 0.0f; /* what the blocks miss in the node and where neighbours meet it */
+    terrimp_node child, beyond;
     uint32_t i;
+    int side;
     TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
     w->held[n->number] = *missed = *squares = 0.0f;
-    for (i = 0; i < 4u; i++) {
+    for (i = 0; i < 4u && w->level > 0; i++) {
         if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
         *missed = terrimpi_max(*missed, w->missed[child.number]);
         *squares += w->squares[child.number];
         count += 1.0f;
+        for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+            if (terrimpi_tree_beyond(&t->tree, &child, side, &beyond))
+                around = terrimpi_max(around, w->missed[beyond.number]);
     }
     if (w->level > 0) {
         *squares /= count;
-        ground->error += *missed;
+        TERRIMPI_TRY(terrimpi_paging_between(w, n, &ground->error));
+        ground->error += terrimpi_max(*missed, around);
         ground->rms = TERRIMP_SQRTF(ground->rms * ground->rms + *squares);
         mesh->error += *missed;
         mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
