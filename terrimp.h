@@ -1497,6 +1497,8 @@ typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camer
    for. */
 typedef struct terrimp_endless terrimp_endless;
 TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
+typedef struct terrimp_exact_depth terrimp_exact_depth;
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void);
 
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
@@ -1567,8 +1569,9 @@ typedef struct terrimp_view_desc {
                                or after that, so that the load of frames is even */
     int sorted;             /* nonzero: draws come in painter's order, for hosts without a depth
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
-    int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
-                               can have the terrain's own depth instead of the coarse mesh's */
+    const terrimp_exact_depth *exact_depth; /* terrimp_view_exact_depth(): impostor commands carry a
+                               place_matrix, so that their pixels can have the terrain's own depth
+                               instead of the coarse mesh's [Default NULL -> they do not] */
     const terrimp_endless *endless; /* (required for a terrain whose field wraps)
                                terrimp_view_endless(): it is drawn without end. Its quads are
                                multiples of chunk_quads; nodes are drawn up to the level at which
@@ -10145,6 +10148,20 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
 
 #endif /* TERRIMP_NO_TROUBLE */
 
+/* Place matrices: those of a picture, and the same relative to an eye. */
+struct terrimp_exact_depth {
+    void (*make)(const terrimp_capture *c, const terrimp_rect *slot, uint32_t atlas_width,
+                 uint32_t atlas_height, float matrix[16]);
+    void (*from)(float matrix[16], const float from[3], const float eye[3]);
+};
+
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void)
+{
+    static const terrimp_exact_depth calls = {terrimpi_impostor_place_matrix,
+                                              terrimpi_impostor_place_from};
+    return &calls;
+}
+
 /* ---- the pictures: a cache ---- */
 
 /* A slot of an atlas. */
@@ -10182,7 +10199,8 @@ typedef struct terrimpi_cache_places {
 typedef struct terrimpi_cache {
     terrimp_live_atlas *atlases; /* [atlas_count] */
     terrimpi_cache_picture *pictures;  /* [capacity] */
-    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted */
+    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted; else made with `exact` */
+    const terrimp_exact_depth *exact;
     uint16_t *of_node;           /* [node_count] */
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
@@ -10923,7 +10941,8 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
     c->pictures = (terrimpi_cache_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
     c->places = NULL;
-    if (v->desc.exact_depth)
+    c->exact = v->desc.exact_depth;
+    if (c->exact)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
@@ -11743,7 +11762,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_impostor_place_from(command.place_matrix, eye, v->frame.camera.eye);
+            v->cache.exact->from(command.place_matrix, eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
@@ -12356,8 +12375,8 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
                                          p->texture_matrix[i]);
         camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
         if (v->cache.places)
-            terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                           v->cache.places[p - v->cache.pictures].matrix[i]);
+            v->cache.exact->make(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                 v->cache.places[p - v->cache.pictures].matrix[i]);
     }
 }
 

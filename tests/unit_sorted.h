@@ -930,7 +930,7 @@ static void views_that_wrap_repeat_after_a_period(void)
         d.sorted = 1;
         d.endless = terrimp_view_endless();
         d.wrap_tiles = 5;
-        d.exact_depth = turn % 2;
+        d.exact_depth = turn % 2 ? terrimp_view_exact_depth() : NULL;
         d.ground_tolerance_px = 0.1f;
         d.costs.capture = 5.0f;
         d.costs.triangle = 4.0f;
