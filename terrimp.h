@@ -1494,6 +1494,13 @@ typedef struct terrimp_capture_command {
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
 
+/* What only some hosts want of a view, in their settings: a linker leaves out what no host asks
+   for. */
+typedef struct terrimp_endless terrimp_endless;
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
+typedef struct terrimp_exact_depth terrimp_exact_depth;
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void);
+
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
     TERRIMP_MODE_DEFAULT = 0, /* same as AUTO */
@@ -1563,13 +1570,15 @@ typedef struct terrimp_view_desc {
                                or after that, so that the load of frames is even */
     int sorted;             /* nonzero: draws come in painter's order, for hosts without a depth
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
-    int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
-                               can have the terrain's own depth instead of the coarse mesh's */
-    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
-                               repetitions along each axis, with the eye's in the middle. The
-                               field's quads are multiples of chunk_quads; nodes are drawn up to the
-                               level at which its chunks are no multiple of theirs. It takes 44
-                               bytes more for each node that it has by that. No hider then
+    const terrimp_exact_depth *exact_depth; /* terrimp_view_exact_depth(): impostor commands carry a
+                               place_matrix, so that their pixels can have the terrain's own depth
+                               instead of the coarse mesh's [Default NULL -> they do not] */
+    const terrimp_endless *endless; /* (required for a terrain whose field wraps)
+                               terrimp_view_endless(): it is drawn without end. Its quads are
+                               multiples of chunk_quads; nodes are drawn up to the level at which
+                               its chunks are no multiple of theirs. No hider then */
+    uint32_t wrap_tiles;    /* as so many repetitions along each axis, with the eye's in the middle;
+                               each takes 44 bytes for each node
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
@@ -1700,8 +1709,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
-              before, or 0; exact_depth only if the view was made with it
+              atlas_count, max_impostors, max_ground, max_captures, endless and wrap_tiles are those
+              of before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1737,7 +1746,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                not above 0, or not finite: the cost stays */
 TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
-/* The statistics of the last update. */
+/* The statistics of the last update, counted when they are asked for. Errors: E_STATE also after
+   invalidate, touch and drop, until the next update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when textures were lost. */
@@ -6592,6 +6602,7 @@ struct terrimp_terrain {
     uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
                                               which a node is a repetition. NULL: itself */
     uint32_t tiles;                        /* then: repetitions along each axis */
+    const terrimp_endless *endless;
     uint32_t coarse, cut_x, cut_z;         /* while pages above blocks are made: it is of every
                                               2^coarse-th sample, the last ones closer by so many */
     terrimp_terrain_desc desc; /* resolved */
@@ -6837,15 +6848,23 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
     return t->range_low + t->range_step * (float)steps;
 }
 
-static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+/* What a view does with a terrain that wraps: see terrimp_view_endless. */
+struct terrimp_endless {
+    int (*fits)(const terrimp_terrain *built, const terrimp_view_desc *desc);
+    void (*begin)(terrimp_view *v, terrimp_terrain *t);
+    void (*layout)(terrimp_view *v, terrimpi_arena *l);
+    void (*fill)(terrimp_terrain *t, const terrimp_terrain *built);
+    void (*enter)(terrimp_view *v, terrimp_camera *camera, float middle[2]);
+    terrimp_node (*place)(const terrimp_terrain *t, const terrimp_node *node,
+                          const float middle[2], float offset[2]);
+};
+
+/* The node whose vertices the host has for a node, and what these are moved by in its world.
+   `middle` is where the repetition in the middle is. */
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node,
+                                        const float middle[2], float offset[2])
 {
-    terrimp_node n = *node;
-    n.number = terrimpi_real_node(t, n.number);
-    if (t->real) {
-        n.x %= t->tree.level_x[n.level] / t->tiles;
-        n.z %= t->tree.level_z[n.level] / t->tiles;
-    }
-    return n;
+    return t->real ? t->endless->place(t, node, middle, offset) : *node;
 }
 
 /* Vertex i of a node's mesh. */
@@ -9340,19 +9359,29 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
 
 /* ---- heights and rays ---- */
 
+/* The height of the finest ground that is here; *f is that, and *level its level. */
+static terrimp_result terrimpi_terrain_ground(const terrimp_terrain *t, float x, float z,
+                                              terrimp_heightfield *f, float *height,
+                                              uint32_t *level)
+{
+    *level = 0;
+    *f = t->desc.field;
+    if (t->tree.pages)
+        TERRIMPI_TRY(t->tree.pages->calls->at(&t->tree, x, z, f, level));
+    return terrimp_heightfield_height(f, x, z, height);
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
                                                   float *height, float normal[3], uint32_t *level)
 {
     terrimp_heightfield f;
-    uint32_t found = 0;
+    uint32_t found;
+    float y;
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
                                              height));
-    f = terrain->desc.field;
-    if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
-        TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
-    }
-    TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
+    TERRIMPI_TRY(terrimpi_terrain_ground(terrain, x, z, &f, &y, &found));
+    TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
+    *height = y;
     if (normal)
         TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
     if (level)
@@ -9736,21 +9765,6 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
-   the one in the middle is. */
-static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
-                                 const float middle[2], float offset[2])
-{
-    const terrimp_heightfield *field = &t->desc.field;
-    uint32_t quads = t->desc.chunk_quads << node->level;
-    if (!t->real)
-        return;
-    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
-                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
-    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
-                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
-}
-
 /* Rows of all columns of a node: a picture can be cut after each. */
 static uint32_t terrimpi_capture_rows(const terrimp_terrain *t)
 {
@@ -9802,7 +9816,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
     uint32_t rows = terrimpi_capture_rows(t), i;
-    terrimp_node place = terrimpi_real_place(t, &plan->node);
+    terrimp_node place;
+    memset(&ground, 0, sizeof ground);
+    place = terrimpi_real_place(t, &plan->node, middle, ground.offset);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
@@ -9818,7 +9834,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
     command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
-    memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (i = from / rows; i * rows < to; i++) {
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
@@ -9826,8 +9841,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         uint32_t last = terrimpi_min_u32(to - i * rows, rows);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        terrimpi_tile_offset(t, &node, middle, ground.offset);
-        place = terrimpi_real_place(t, &node);
+        place = terrimpi_real_place(t, &node, middle, ground.offset);
         ground.node = place.number;
         ground.x = place.x;
         ground.z = place.z;
@@ -10066,6 +10080,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     TERRIMPI_DEFAULT(d.wrap_tiles, 3);
+    TERRIMPI_REFUSE(terrain->desc.field.wrap && (!d.endless || !d.endless->fits(terrain, &d)),
+                    TERRIMP_E_RANGE);
     chunks = terrain->tree.level_first[1];
     if (terrain->desc.field.wrap && !terrain->real)
         chunks *= d.wrap_tiles * d.wrap_tiles;
@@ -10075,17 +10091,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size) ||
-                    !terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
-                    TERRIMP_E_RANGE);
-    if (terrain->desc.field.wrap) {
-        const terrimp_heightfield *f = &terrain->desc.field;
-        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
-                        (f->width - 1u) % terrain->desc.chunk_quads ||
-                        (f->depth - 1u) % terrain->desc.chunk_quads ||
-                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
-                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
-    }
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -10125,6 +10131,8 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, endless),
+        TERRIMPI_TROUBLE(terrimp_view_desc, wrap_tiles),
         TERRIMPI_TROUBLE(terrimp_view_desc, hider),
         TERRIMPI_TROUBLE(terrimp_view_desc, joined),
         TERRIMPI_TROUBLE(terrimp_view_desc, costs)
@@ -10133,12 +10141,27 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     if (!terrain || !desc)
         return "the descriptor";
     memset(&good, 0, sizeof good);
+    good.endless = terrimp_view_endless();
     bad = *desc;
     return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
                             terrimpi_view_try, terrain);
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
+
+/* Place matrices: those of a picture, and the same relative to an eye. */
+struct terrimp_exact_depth {
+    void (*make)(const terrimp_capture *c, const terrimp_rect *slot, uint32_t atlas_width,
+                 uint32_t atlas_height, float matrix[16]);
+    void (*from)(float matrix[16], const float from[3], const float eye[3]);
+};
+
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void)
+{
+    static const terrimp_exact_depth calls = {terrimpi_impostor_place_matrix,
+                                              terrimpi_impostor_place_from};
+    return &calls;
+}
 
 /* ---- the pictures: a cache ---- */
 
@@ -10177,7 +10200,8 @@ typedef struct terrimpi_cache_places {
 typedef struct terrimpi_cache {
     terrimp_live_atlas *atlases; /* [atlas_count] */
     terrimpi_cache_picture *pictures;  /* [capacity] */
-    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted */
+    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted; else made with `exact` */
+    const terrimp_exact_depth *exact;
     uint16_t *of_node;           /* [node_count] */
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
@@ -10670,12 +10694,13 @@ static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
     terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_box box;
     float ground;
-    uint32_t level; /* of the finest ground that is here */
+    uint32_t level;
+    terrimp_heightfield here;
     terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
     terrimpi_terrain_node_box(f->terrain, &root, &box);
-    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    result = terrimpi_terrain_ground(f->terrain, eye[0], eye[2], &here, &ground, &level);
     if (result == TERRIMP_E_MISS)
         return terrimpi_view_inside(f, &box, eye);
     return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
@@ -10840,6 +10865,7 @@ struct terrimp_view {
     const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
                                                wraps */
     uint32_t region_count, candidate_count, job_count, draw_count;
+    uint32_t kind_count[TERRIMPI_VIEW_KIND_COUNT]; /* draws of each kind */
     terrimpi_cache cache;
     terrimpi_cull cull;
     uint8_t *kind_of;              /* [node_count] that showed the region */
@@ -10861,57 +10887,13 @@ struct terrimp_view {
     float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
-    terrimp_stats stats;
+    terrimp_stats stats;           /* as far as they are not counted when they are asked for */
     terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
-
-/* ---- a terrain without end ---- */
-
-/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
-   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
-   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
-   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
-static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
-                                 terrimp_terrain *t)
-{
-    terrimp_heightfield field = terrain->desc.field;
-    v->terrain = v->built = terrain;
-    v->tiled = NULL;
-    if (!field.wrap)
-        return;
-    v->terrain = v->tiled = t;
-    *t = *terrain;
-    t->tiles = v->desc.wrap_tiles;
-    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
-    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
-    field.width = (field.width - 1u) * t->tiles + 1u;
-    field.depth = (field.depth - 1u) * t->tiles + 1u;
-    field.row_bytes = 0; /* no sample is read through it */
-    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
-}
-
-static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
-{
-    const terrimp_quadtree *from = &real->tree;
-    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
-    terrimp_node root = terrimpi_tree_root(from);
-    terrimpi_mesh none = real->meshes[root.number];
-    terrimp_geomip_node split = from->nodes[root.number];
-    none.counts = 0;
-    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
-    for (i = 0; i < t->tree.node_count; i++) {
-        terrimp_node n = terrimpi_tree_node(&t->tree, i);
-        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
-        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
-                                              n.z % from->level_z[n.level]).number : root.number;
-        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
-        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
-    }
-}
 
 /* ---- memory ---- */
 
@@ -10961,7 +10943,8 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
     c->pictures = (terrimpi_cache_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
     c->places = NULL;
-    if (v->desc.exact_depth)
+    c->exact = v->desc.exact_depth;
+    if (c->exact)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
@@ -10983,19 +10966,19 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->draws = (terrimpi_view_draw *)terrimpi_take(
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
         sizeof *v->draws);
-    if (v->tiled) {
-        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
-        terrimp_terrain made = *v->tiled;
-        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
-        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
-        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
-        if (t) {
-            *t = made;
-            terrimpi_tiled_fill(t, v->built);
-            v->terrain = v->tiled = t;
-        }
-    }
+    if (v->tiled)
+        v->desc.endless->layout(v, &l);
     return l.ok && slots ? l.bytes : 0;
+}
+
+/* What is drawn: the terrain, or in its place `tiled`, to be laid out. */
+static void terrimpi_view_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                terrimp_terrain *tiled)
+{
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
+    if (terrain->desc.field.wrap)
+        v->desc.endless->begin(v, tiled);
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -11004,7 +10987,7 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -11026,7 +11009,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -11056,11 +11039,14 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
     TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
+    if (!d.endless)
+        d.endless = has->endless;
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
                     d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
-                    (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
+                    d.endless != has->endless || (d.exact_depth && !view->cache.places),
+                    TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
     return TERRIMP_OK;
@@ -11094,6 +11080,88 @@ static void terrimpi_view_cancel(terrimp_view *v)
         v->jobs[0] = v->jobs[v->open - 1u];
         v->open = 1;
     }
+}
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static int terrimpi_tiled_fits(const terrimp_terrain *built, const terrimp_view_desc *d)
+{
+    uint32_t cols = built->desc.field.width - 1u, rows = built->desc.field.depth - 1u;
+    return terrimpi_within_u32(d->wrap_tiles, 3, 15) && d->wrap_tiles % 2u == 1u && !d->hider &&
+           !built->tree.pages && cols % built->desc.chunk_quads == 0 &&
+           rows % built->desc.chunk_quads == 0 && cols * d->wrap_tiles < TERRIMP_MAX_DIM &&
+           rows * d->wrap_tiles < TERRIMP_MAX_DIM;
+}
+
+static void terrimpi_tiled_begin(terrimp_view *v, terrimp_terrain *t)
+{
+    terrimp_heightfield field = v->built->desc.field;
+    v->terrain = v->tiled = t;
+    *t = *v->built;
+    t->tiles = v->desc.wrap_tiles;
+    t->endless = v->desc.endless;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
+
+static void terrimpi_tiled_layout(terrimp_view *v, terrimpi_arena *l)
+{
+    size_t nodes = v->tiled->tree.node_count;
+    terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *t);
+    terrimp_terrain made = *v->tiled;
+    made.real = (uint32_t *)terrimpi_take(l, nodes, sizeof *made.real);
+    made.meshes = (terrimpi_mesh *)terrimpi_take(l, nodes, sizeof *made.meshes);
+    made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(l, nodes, sizeof *made.tree.nodes);
+    if (!t)
+        return;
+    *t = made;
+    terrimpi_tiled_fill(t, v->built);
+    v->terrain = v->tiled = t;
+}
+
+static terrimp_node terrimpi_tiled_place(const terrimp_terrain *t, const terrimp_node *node,
+                                         const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t across = t->tree.level_x[node->level] / t->tiles;
+    uint32_t along = t->tree.level_z[node->level] / t->tiles;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    terrimp_node n = *node;
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+    n.number = t->real[n.number];
+    n.x %= across;
+    n.z %= along;
+    return n;
 }
 
 /* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
@@ -11157,20 +11225,34 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     }
 }
 
-/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
-   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
-static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
-                                 int32_t went[2])
+/* Takes a camera into the tile in the middle, and what is known of nodes by as many tiles as it has
+   gone since the frame before, by the shorter way. Of the step of the eye what is left are world
+   units without tiles. */
+static void terrimpi_tiled_enter(terrimp_view *v, terrimp_camera *camera, float middle[2])
 {
     const terrimp_heightfield *field = &v->terrain->desc.field;
+    int32_t went[2];
     int k;
-    for (k = 0; k < 2 && v->terrain->real; k++) {
+    for (k = 0; k < 2; k++) {
         float period = terrimpi_field_period(field, k), step;
         middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
         step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
         went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
+    if (went[0] || went[1])
+        terrimpi_tiled_move(v, went[0], went[1]);
 }
+
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void)
+{
+    static const terrimp_endless calls = {
+        terrimpi_tiled_fits, terrimpi_tiled_begin, terrimpi_tiled_layout, terrimpi_tiled_fill,
+        terrimpi_tiled_enter, terrimpi_tiled_place
+    };
+    return &calls;
+}
+
+/* ---- what a host says of pictures and light ---- */
 
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
@@ -11235,8 +11317,8 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
-    if (view->terrain->real)
-        terrimpi_tiled_fill(view->tiled, view->built);
+    if (view->tiled)
+        view->desc.endless->fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
         for (k = 0; k < tiles * tiles; k++)
             if (terrimpi_cache_shows(p, tree->chunk_quads,
@@ -11628,12 +11710,12 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
+    terrimp_node place;
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &ground->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11650,14 +11732,14 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
+    terrimp_node place;
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     float eye[3];
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &picture->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11683,7 +11765,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_impostor_place_from(command.place_matrix, eye, v->frame.camera.eye);
+            v->cache.exact->from(command.place_matrix, eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
@@ -11704,7 +11786,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
                                               v->built->tree.level_x[0], draw->index / tiles *
                                               v->built->tree.level_z[0]);
-        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+        terrimpi_real_place(v->terrain, &first, v->frame.middle, command.offset);
     }
     callbacks->draw_floor(callbacks->user, &command);
 }
@@ -12145,6 +12227,7 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
     v->stats.hidden = v->cull.hidden_count;
+    v->stats.late = v->late;
     v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
 }
 
@@ -12153,80 +12236,21 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_view_list(terrimp_view *v)
 {
-    uint32_t i, impostors = 0;
+    uint32_t i;
     v->draw_count = 0;
     for (i = 0; i < v->region_count; i++) {
         int kind = v->regions[i].kind;
         while (!terrimpi_view_kinds[kind].list(v, &v->regions[i]))
             kind--;
     }
+    memset(v->kind_count, 0, sizeof v->kind_count);
     for (i = 0; i < v->draw_count; i++)
-        impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
-    if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+        v->kind_count[v->draws[i].kind]++;
+    if ((v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
+         (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
             terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
-}
-
-/* What a draw adds to the statistics. */
-static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
-                                     terrimp_stats *s)
-{
-    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
-        terrimp_pattern pattern;
-        terrimpi_view_ground_pattern(v, draw->index, &pattern);
-        s->ground++;
-        s->draws++;
-        s->triangles += pattern.triangle_count;
-    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
-        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
-        terrimp_mesh_info mesh;
-        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
-        s->impostors++;
-        s->impostors_by_level[p->node.level]++;
-        s->draws += p->layers_now;
-        s->triangles += mesh.index_count / 3u * p->layers_now;
-        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
-        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
-    } else {
-        s->draws++;
-        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
-    }
-}
-
-/* The rest of the statistics. */
-static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
-{
-    const terrimp_camera *c = &v->frame.camera;
-    float tan_x, tan_y, first, last;
-    uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        terrimpi_view_count_draw(v, &v->draws[i], s);
-    s->visible = v->region_count;
-    s->late = v->late;
-    s->evictions = v->cache.evictions;
-    s->atlas_failures = v->cache.failures;
-    for (i = 0; i < v->region_count; i++) {
-        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
-        terrimp_box box;
-        terrimpi_terrain_node_box(v->terrain, &node, &box);
-        first = v->regions[i].closest;
-        last = terrimp_box_farthest(&box, c->eye);
-        if (c->orthographic) {
-            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
-            first -= c->reach;
-        }
-        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
-        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
-    }
-    /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(c, &tan_x, &tan_y);
-    if (!c->orthographic)
-        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
-    for (i = 0; i < v->desc.atlas_count; i++)
-        s->texels_used += v->cache.atlases[i].texels_used;
-    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
-                     s->texels_used;
 }
 
 /* The next frame for a camera. It follows the eye's motion; a jump is none. */
@@ -12295,12 +12319,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
     float reuse, middle[2] = {0.0f, 0.0f};
-    int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
-    terrimpi_tiled_enter(view, &resolved, middle, went);
-    if (went[0] || went[1])
-        terrimpi_tiled_move(view, went[0], went[1]);
+    if (view->tiled)
+        view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
     if (view->terrain->tree.pages) {
@@ -12322,7 +12344,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
-    terrimpi_view_count_frame(view, &view->stats);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
@@ -12357,26 +12378,21 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
                                          p->texture_matrix[i]);
         camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
         if (v->cache.places)
-            terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                           v->cache.places[p - v->cache.pictures].matrix[i]);
+            v->cache.exact->make(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                 v->cache.places[p - v->cache.pictures].matrix[i]);
     }
 }
 
 /* Lists the frame without the pictures that could not be made. */
 static void terrimpi_view_list_again(terrimp_view *v)
 {
-    terrimp_stats *s = &v->stats;
     uint32_t i;
     for (i = 0; i < v->draw_count; i++)
         if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
             v->cache.pictures[v->draws[i].index].listed = 0;
     terrimpi_view_lose(v);
-    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
-    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
-    s->texels_used = 0;
-    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    v->stats.waiting = 0;
     terrimpi_view_list(v);
-    terrimpi_view_count_frame(v, &v->stats);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -12411,8 +12427,9 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     int kind;
     TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
-    if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
-        (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
+    if ((view->kind_count[TERRIMPI_VIEW_KIND_GROUND] + view->job_count > 0 &&
+         !callbacks->draw_ground) ||
+        (view->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
     view->capturing = 1;
@@ -12431,11 +12448,72 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     return TERRIMP_OK;
 }
 
+/* What a draw adds to the statistics. */
+static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                     terrimp_stats *s)
+{
+    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
+        terrimp_pattern pattern;
+        terrimpi_view_ground_pattern(v, draw->index, &pattern);
+        s->draws++;
+        s->triangles += pattern.triangle_count;
+    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
+        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
+        terrimp_mesh_info mesh;
+        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
+        s->impostors_by_level[p->node.level]++;
+        s->draws += p->layers_now;
+        s->triangles += mesh.index_count / 3u * p->layers_now;
+        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
+        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
+    } else {
+        s->draws++;
+        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
+    }
+}
+
+/* The statistics that the frame itself has no use for. */
+static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
+{
+    const terrimp_camera *c = &v->frame.camera;
+    float tan_x, tan_y, first, last;
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        terrimpi_view_count_draw(v, &v->draws[i], s);
+    s->ground = v->kind_count[TERRIMPI_VIEW_KIND_GROUND];
+    s->impostors = v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR];
+    s->visible = v->region_count;
+    s->evictions = v->cache.evictions;
+    s->atlas_failures = v->cache.failures;
+    for (i = 0; i < v->region_count; i++) {
+        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
+        terrimp_box box;
+        terrimpi_terrain_node_box(v->terrain, &node, &box);
+        first = v->regions[i].closest;
+        last = terrimp_box_farthest(&box, c->eye);
+        if (c->orthographic) {
+            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
+            first -= c->reach;
+        }
+        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
+        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
+    }
+    /* A point at that distance in the corner of the screen has the smallest depth. */
+    terrimpi_camera_tangents(c, &tan_x, &tan_y);
+    if (!c->orthographic)
+        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
+    for (i = 0; i < v->desc.atlas_count; i++)
+        s->texels_used += v->cache.atlases[i].texels_used;
+    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+                     s->texels_used;
+}
+
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats)
 {
     TERRIMPI_REFUSE(!view || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
     *stats = view->stats;
+    terrimpi_view_count_frame(view, stats);
     return TERRIMP_OK;
 }
 
