@@ -10412,10 +10412,10 @@ static int terrimpi_cull_hides(terrimpi_cull *cull, const terrimpi_frame *f,
 }
 
 /* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
-   that has a picture keeps its place for a little longer. Where pages of its children are missing
-   it has to, with TERRIMPI_CULL_SHORT. */
+   that has a picture keeps its place for a little longer. Where smaller ones may be and pages of its
+   children are missing it has to, with TERRIMPI_CULL_SHORT. */
 static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *node, float closest,
-                                  int has_picture)
+                                  int has_picture, int smallest)
 {
     const terrimp_heightfield *field = &f->terrain->desc.field;
     terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f, 0.0f};
@@ -10437,7 +10437,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
-    return !pages || pages->calls->divides(f->terrain, node, &need) ? 0 : 1 + TERRIMPI_CULL_SHORT;
+    return smallest || !pages || pages->calls->divides(f->terrain, node, &need)
+               ? 0 : 1 + TERRIMPI_CULL_SHORT;
 }
 
 /* Whether the ground cut runs at a node; mip is NULL when ground is drawn at full resolution. */
@@ -10478,7 +10479,7 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
                               const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
                               float closest, int *done)
 {
-    int cuts = 0, impostor;
+    int cuts = 0, impostor, smallest;
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
@@ -10488,13 +10489,15 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
     }
     if (*done & TERRIMPI_CULL_IMPOSTOR)
         return cuts;
-    impostor = terrimpi_cull_impostor(f, node, closest, cache->of_node[node->number] !=
-                                                            TERRIMPI_CACHE_NO_PICTURE);
+    smallest = *done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER &&
+               (f->desc->tolerance_px <= TERRIMPI_VIEW_SMALL ||
+                terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u);
+    impostor = terrimpi_cull_impostor(
+        f, node, closest, cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE,
+        smallest && (!mip || terrimpi_mip_ratio_of(mip, node->number) >= 0.0f));
     if (impostor)
         cuts |= TERRIMPI_CULL_IMPOSTOR | (impostor & TERRIMPI_CULL_SHORT);
-    if (impostor || (*done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER &&
-                     (f->desc->tolerance_px <= TERRIMPI_VIEW_SMALL ||
-                      terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u)))
+    if (impostor || smallest)
         *done |= TERRIMPI_CULL_IMPOSTOR;
     return cuts;
 }
