@@ -2212,7 +2212,7 @@ static void sorted_bears_odd_cameras(void)
     }
 }
 
-static void sorted_tests(void)
+static inline void sorted_tests(void)
 {
     RUN(sorted_needs_no_depth_buffer);
     RUN(views_in_painters_order_need_no_depth_buffer);
