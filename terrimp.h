@@ -1493,6 +1493,13 @@ typedef struct terrimp_capture_command {
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
 
+/* What only some hosts want of a view, in their settings: a linker leaves out what no host asks
+   for. */
+typedef struct terrimp_endless terrimp_endless;
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
+typedef struct terrimp_exact_depth terrimp_exact_depth;
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void);
+
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
     TERRIMP_MODE_DEFAULT = 0, /* same as AUTO */
@@ -1562,13 +1569,15 @@ typedef struct terrimp_view_desc {
                                or after that, so that the load of frames is even */
     int sorted;             /* nonzero: draws come in painter's order, for hosts without a depth
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
-    int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
-                               can have the terrain's own depth instead of the coarse mesh's */
-    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
-                               repetitions along each axis, with the eye's in the middle. The
-                               field's quads are multiples of chunk_quads; nodes are drawn up to the
-                               level at which its chunks are no multiple of theirs. It takes 44
-                               bytes more for each node that it has by that. No hider then
+    const terrimp_exact_depth *exact_depth; /* terrimp_view_exact_depth(): impostor commands carry a
+                               place_matrix, so that their pixels can have the terrain's own depth
+                               instead of the coarse mesh's [Default NULL -> they do not] */
+    const terrimp_endless *endless; /* (required for a terrain whose field wraps)
+                               terrimp_view_endless(): it is drawn without end. Its quads are
+                               multiples of chunk_quads; nodes are drawn up to the level at which
+                               its chunks are no multiple of theirs. No hider then */
+    uint32_t wrap_tiles;    /* as so many repetitions along each axis, with the eye's in the middle;
+                               each takes 44 bytes for each node
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
@@ -1699,8 +1708,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
-              before, or 0; exact_depth only if the view was made with it
+              atlas_count, max_impostors, max_ground, max_captures, endless and wrap_tiles are those
+              of before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1736,7 +1745,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                not above 0, or not finite: the cost stays */
 TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
-/* The statistics of the last update. */
+/* The statistics of the last update, counted when they are asked for. Errors: E_STATE also after
+   invalidate, touch and drop, until the next update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when textures were lost. */
@@ -2414,7 +2424,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 
    In a block, and in a terrain of one block, all is what building in memory makes of it. Above the
    blocks, ground and meshes are made of every 2^block_level-th sample, and their errors are those
-   against these, and what the blocks miss added. */
+   against these, and what the blocks miss added: those of ground are no less than of memory. */
 typedef struct terrimp_pages_desc {
     terrimp_terrain_desc terrain; /* (required) but its samples, which are without voids;
                                      height_low and height_high have to be given */
@@ -6590,6 +6600,9 @@ struct terrimp_terrain {
     uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
                                               which a node is a repetition. NULL: itself */
     uint32_t tiles;                        /* then: repetitions along each axis */
+    const terrimp_endless *endless;
+    uint32_t coarse, cut_x, cut_z;         /* while pages above blocks are made: it is of every
+                                              2^coarse-th sample, the last ones closer by so many */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6737,6 +6750,7 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 typedef struct terrimpi_terrain_tile {
     uint32_t level, x, z, span_x, span_z;
     uint32_t cols, rows;
+    uint32_t coarse, cut_x, cut_z; /* as those of the terrain, of its own last column and row */
 } terrimpi_terrain_tile;
 
 static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, uint32_t node)
@@ -6751,6 +6765,9 @@ static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, 
     p.span_z = terrimpi_tree_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
     p.cols = ((p.span_x - 1u) >> p.level) + 2u;
     p.rows = ((p.span_z - 1u) >> p.level) + 2u;
+    p.coarse = t->coarse;
+    p.cut_x = p.x + p.span_x + 1u == t->tree.field.width ? t->cut_x : 0u;
+    p.cut_z = p.z + p.span_z + 1u == t->tree.field.depth ? t->cut_z : 0u;
     return p;
 }
 
@@ -6829,15 +6846,23 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
     return t->range_low + t->range_step * (float)steps;
 }
 
-static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+/* What a view does with a terrain that wraps: see terrimp_view_endless. */
+struct terrimp_endless {
+    int (*fits)(const terrimp_terrain *built, const terrimp_view_desc *desc);
+    void (*begin)(terrimp_view *v, terrimp_terrain *t);
+    void (*layout)(terrimp_view *v, terrimpi_arena *l);
+    void (*fill)(terrimp_terrain *t, const terrimp_terrain *built);
+    void (*enter)(terrimp_view *v, terrimp_camera *camera, float middle[2]);
+    terrimp_node (*place)(const terrimp_terrain *t, const terrimp_node *node,
+                          const float middle[2], float offset[2]);
+};
+
+/* The node whose vertices the host has for a node, and what these are moved by in its world.
+   `middle` is where the repetition in the middle is. */
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node,
+                                        const float middle[2], float offset[2])
 {
-    terrimp_node n = *node;
-    n.number = terrimpi_real_node(t, n.number);
-    if (t->real) {
-        n.x %= t->tree.level_x[n.level] / t->tiles;
-        n.z %= t->tree.level_z[n.level] / t->tiles;
-    }
-    return n;
+    return t->real ? t->endless->place(t, node, middle, offset) : *node;
 }
 
 /* Vertex i of a node's mesh. */
@@ -6984,6 +7009,8 @@ static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_ter
     uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
     terrimpi_terrain_touched out;
+    if (t->tree.pages && level > t->tree.pages->block_level)
+        margin += side / 2u; /* errors are of whole nodes beside it, see terrimpi_paging_build */
     terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
                                    t->tree.level_x[level], &out.x0, &out.x1);
     terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
@@ -9330,19 +9357,29 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
 
 /* ---- heights and rays ---- */
 
+/* The height of the finest ground that is here; *f is that, and *level its level. */
+static terrimp_result terrimpi_terrain_ground(const terrimp_terrain *t, float x, float z,
+                                              terrimp_heightfield *f, float *height,
+                                              uint32_t *level)
+{
+    *level = 0;
+    *f = t->desc.field;
+    if (t->tree.pages)
+        TERRIMPI_TRY(t->tree.pages->calls->at(&t->tree, x, z, f, level));
+    return terrimp_heightfield_height(f, x, z, height);
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
                                                   float *height, float normal[3], uint32_t *level)
 {
     terrimp_heightfield f;
-    uint32_t found = 0;
+    uint32_t found;
+    float y;
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
                                              height));
-    f = terrain->desc.field;
-    if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
-        TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
-    }
-    TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
+    TERRIMPI_TRY(terrimpi_terrain_ground(terrain, x, z, &f, &y, &found));
+    TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
+    *height = y;
     if (normal)
         TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
     if (level)
@@ -9727,21 +9764,6 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
-   the one in the middle is. */
-static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
-                                 const float middle[2], float offset[2])
-{
-    const terrimp_heightfield *field = &t->desc.field;
-    uint32_t quads = t->desc.chunk_quads << node->level;
-    if (!t->real)
-        return;
-    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
-                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
-    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
-                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
-}
-
 /* Rows of all columns of a node: a picture can be cut after each. */
 static uint32_t terrimpi_capture_rows(const terrimp_terrain *t)
 {
@@ -9793,7 +9815,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
     uint32_t rows = terrimpi_capture_rows(t), i;
-    terrimp_node place = terrimpi_real_place(t, &plan->node);
+    terrimp_node place;
+    memset(&ground, 0, sizeof ground);
+    place = terrimpi_real_place(t, &plan->node, middle, ground.offset);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
@@ -9809,7 +9833,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
     command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
-    memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (i = from / rows; i * rows < to; i++) {
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
@@ -9817,8 +9840,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         uint32_t last = terrimpi_min_u32(to - i * rows, rows);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        terrimpi_tile_offset(t, &node, middle, ground.offset);
-        place = terrimpi_real_place(t, &node);
+        place = terrimpi_real_place(t, &node, middle, ground.offset);
         ground.node = place.number;
         ground.x = place.x;
         ground.z = place.z;
@@ -10057,6 +10079,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     TERRIMPI_DEFAULT(d.wrap_tiles, 3);
+    TERRIMPI_REFUSE(terrain->desc.field.wrap && (!d.endless || !d.endless->fits(terrain, &d)),
+                    TERRIMP_E_RANGE);
     chunks = terrain->tree.level_first[1];
     if (terrain->desc.field.wrap && !terrain->real)
         chunks *= d.wrap_tiles * d.wrap_tiles;
@@ -10066,17 +10090,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size) ||
-                    !terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
-                    TERRIMP_E_RANGE);
-    if (terrain->desc.field.wrap) {
-        const terrimp_heightfield *f = &terrain->desc.field;
-        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
-                        (f->width - 1u) % terrain->desc.chunk_quads ||
-                        (f->depth - 1u) % terrain->desc.chunk_quads ||
-                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
-                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
-    }
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -10116,6 +10130,8 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, endless),
+        TERRIMPI_TROUBLE(terrimp_view_desc, wrap_tiles),
         TERRIMPI_TROUBLE(terrimp_view_desc, hider),
         TERRIMPI_TROUBLE(terrimp_view_desc, joined),
         TERRIMPI_TROUBLE(terrimp_view_desc, costs)
@@ -10124,12 +10140,27 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     if (!terrain || !desc)
         return "the descriptor";
     memset(&good, 0, sizeof good);
+    good.endless = terrimp_view_endless();
     bad = *desc;
     return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
                             terrimpi_view_try, terrain);
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
+
+/* Place matrices: those of a picture, and the same relative to an eye. */
+struct terrimp_exact_depth {
+    void (*make)(const terrimp_capture *c, const terrimp_rect *slot, uint32_t atlas_width,
+                 uint32_t atlas_height, float matrix[16]);
+    void (*from)(float matrix[16], const float from[3], const float eye[3]);
+};
+
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void)
+{
+    static const terrimp_exact_depth calls = {terrimpi_impostor_place_matrix,
+                                              terrimpi_impostor_place_from};
+    return &calls;
+}
 
 /* ---- the pictures: a cache ---- */
 
@@ -10168,7 +10199,8 @@ typedef struct terrimpi_cache_places {
 typedef struct terrimpi_cache {
     terrimp_live_atlas *atlases; /* [atlas_count] */
     terrimpi_cache_picture *pictures;  /* [capacity] */
-    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted */
+    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted; else made with `exact` */
+    const terrimp_exact_depth *exact;
     uint16_t *of_node;           /* [node_count] */
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
@@ -10661,12 +10693,13 @@ static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
     terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_box box;
     float ground;
-    uint32_t level; /* of the finest ground that is here */
+    uint32_t level;
+    terrimp_heightfield here;
     terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
     terrimpi_terrain_node_box(f->terrain, &root, &box);
-    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    result = terrimpi_terrain_ground(f->terrain, eye[0], eye[2], &here, &ground, &level);
     if (result == TERRIMP_E_MISS)
         return terrimpi_view_inside(f, &box, eye);
     return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
@@ -10830,6 +10863,7 @@ struct terrimp_view {
     const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
                                                wraps */
     uint32_t region_count, candidate_count, job_count, draw_count;
+    uint32_t kind_count[TERRIMPI_VIEW_KIND_COUNT]; /* draws of each kind */
     terrimpi_cache cache;
     terrimpi_cull cull;
     uint8_t *kind_of;              /* [node_count] that showed the region */
@@ -10851,57 +10885,13 @@ struct terrimp_view {
     float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
-    terrimp_stats stats;
+    terrimp_stats stats;           /* as far as they are not counted when they are asked for */
     terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
-
-/* ---- a terrain without end ---- */
-
-/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
-   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
-   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
-   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
-static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
-                                 terrimp_terrain *t)
-{
-    terrimp_heightfield field = terrain->desc.field;
-    v->terrain = v->built = terrain;
-    v->tiled = NULL;
-    if (!field.wrap)
-        return;
-    v->terrain = v->tiled = t;
-    *t = *terrain;
-    t->tiles = v->desc.wrap_tiles;
-    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
-    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
-    field.width = (field.width - 1u) * t->tiles + 1u;
-    field.depth = (field.depth - 1u) * t->tiles + 1u;
-    field.row_bytes = 0; /* no sample is read through it */
-    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
-}
-
-static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
-{
-    const terrimp_quadtree *from = &real->tree;
-    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
-    terrimp_node root = terrimpi_tree_root(from);
-    terrimpi_mesh none = real->meshes[root.number];
-    terrimp_geomip_node split = from->nodes[root.number];
-    none.counts = 0;
-    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
-    for (i = 0; i < t->tree.node_count; i++) {
-        terrimp_node n = terrimpi_tree_node(&t->tree, i);
-        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
-        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
-                                              n.z % from->level_z[n.level]).number : root.number;
-        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
-        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
-    }
-}
 
 /* ---- memory ---- */
 
@@ -10951,7 +10941,8 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
     c->pictures = (terrimpi_cache_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
     c->places = NULL;
-    if (v->desc.exact_depth)
+    c->exact = v->desc.exact_depth;
+    if (c->exact)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
@@ -10973,19 +10964,19 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->draws = (terrimpi_view_draw *)terrimpi_take(
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
         sizeof *v->draws);
-    if (v->tiled) {
-        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
-        terrimp_terrain made = *v->tiled;
-        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
-        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
-        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
-        if (t) {
-            *t = made;
-            terrimpi_tiled_fill(t, v->built);
-            v->terrain = v->tiled = t;
-        }
-    }
+    if (v->tiled)
+        v->desc.endless->layout(v, &l);
     return l.ok && slots ? l.bytes : 0;
+}
+
+/* What is drawn: the terrain, or in its place `tiled`, to be laid out. */
+static void terrimpi_view_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                terrimp_terrain *tiled)
+{
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
+    if (terrain->desc.field.wrap)
+        v->desc.endless->begin(v, tiled);
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -10994,7 +10985,7 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -11016,7 +11007,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -11046,11 +11037,14 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
     TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
+    if (!d.endless)
+        d.endless = has->endless;
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
                     d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
-                    (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
+                    d.endless != has->endless || (d.exact_depth && !view->cache.places),
+                    TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
     return TERRIMP_OK;
@@ -11084,6 +11078,88 @@ static void terrimpi_view_cancel(terrimp_view *v)
         v->jobs[0] = v->jobs[v->open - 1u];
         v->open = 1;
     }
+}
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static int terrimpi_tiled_fits(const terrimp_terrain *built, const terrimp_view_desc *d)
+{
+    uint32_t cols = built->desc.field.width - 1u, rows = built->desc.field.depth - 1u;
+    return terrimpi_within_u32(d->wrap_tiles, 3, 15) && d->wrap_tiles % 2u == 1u && !d->hider &&
+           !built->tree.pages && cols % built->desc.chunk_quads == 0 &&
+           rows % built->desc.chunk_quads == 0 && cols * d->wrap_tiles < TERRIMP_MAX_DIM &&
+           rows * d->wrap_tiles < TERRIMP_MAX_DIM;
+}
+
+static void terrimpi_tiled_begin(terrimp_view *v, terrimp_terrain *t)
+{
+    terrimp_heightfield field = v->built->desc.field;
+    v->terrain = v->tiled = t;
+    *t = *v->built;
+    t->tiles = v->desc.wrap_tiles;
+    t->endless = v->desc.endless;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
+
+static void terrimpi_tiled_layout(terrimp_view *v, terrimpi_arena *l)
+{
+    size_t nodes = v->tiled->tree.node_count;
+    terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *t);
+    terrimp_terrain made = *v->tiled;
+    made.real = (uint32_t *)terrimpi_take(l, nodes, sizeof *made.real);
+    made.meshes = (terrimpi_mesh *)terrimpi_take(l, nodes, sizeof *made.meshes);
+    made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(l, nodes, sizeof *made.tree.nodes);
+    if (!t)
+        return;
+    *t = made;
+    terrimpi_tiled_fill(t, v->built);
+    v->terrain = v->tiled = t;
+}
+
+static terrimp_node terrimpi_tiled_place(const terrimp_terrain *t, const terrimp_node *node,
+                                         const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t across = t->tree.level_x[node->level] / t->tiles;
+    uint32_t along = t->tree.level_z[node->level] / t->tiles;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    terrimp_node n = *node;
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+    n.number = t->real[n.number];
+    n.x %= across;
+    n.z %= along;
+    return n;
 }
 
 /* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
@@ -11147,20 +11223,34 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     }
 }
 
-/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
-   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
-static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
-                                 int32_t went[2])
+/* Takes a camera into the tile in the middle, and what is known of nodes by as many tiles as it has
+   gone since the frame before, by the shorter way. Of the step of the eye what is left are world
+   units without tiles. */
+static void terrimpi_tiled_enter(terrimp_view *v, terrimp_camera *camera, float middle[2])
 {
     const terrimp_heightfield *field = &v->terrain->desc.field;
+    int32_t went[2];
     int k;
-    for (k = 0; k < 2 && v->terrain->real; k++) {
+    for (k = 0; k < 2; k++) {
         float period = terrimpi_field_period(field, k), step;
         middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
         step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
         went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
+    if (went[0] || went[1])
+        terrimpi_tiled_move(v, went[0], went[1]);
 }
+
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void)
+{
+    static const terrimp_endless calls = {
+        terrimpi_tiled_fits, terrimpi_tiled_begin, terrimpi_tiled_layout, terrimpi_tiled_fill,
+        terrimpi_tiled_enter, terrimpi_tiled_place
+    };
+    return &calls;
+}
+
+/* ---- what a host says of pictures and light ---- */
 
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
@@ -11225,8 +11315,8 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
     terrimpi_view_cancel(view);
     view->outdated = 1;
-    if (view->terrain->real)
-        terrimpi_tiled_fill(view->tiled, view->built);
+    if (view->tiled)
+        view->desc.endless->fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
         for (k = 0; k < tiles * tiles; k++)
             if (terrimpi_cache_shows(p, tree->chunk_quads,
@@ -11617,12 +11707,12 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
+    terrimp_node place;
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &ground->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11639,14 +11729,14 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
+    terrimp_node place;
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     float eye[3];
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &picture->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11672,7 +11762,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_impostor_place_from(command.place_matrix, eye, v->frame.camera.eye);
+            v->cache.exact->from(command.place_matrix, eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
@@ -11693,7 +11783,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
                                               v->built->tree.level_x[0], draw->index / tiles *
                                               v->built->tree.level_z[0]);
-        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+        terrimpi_real_place(v->terrain, &first, v->frame.middle, command.offset);
     }
     callbacks->draw_floor(callbacks->user, &command);
 }
@@ -12134,6 +12224,7 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
     v->stats.hidden = v->cull.hidden_count;
+    v->stats.late = v->late;
     v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
 }
 
@@ -12142,80 +12233,21 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_view_list(terrimp_view *v)
 {
-    uint32_t i, impostors = 0;
+    uint32_t i;
     v->draw_count = 0;
     for (i = 0; i < v->region_count; i++) {
         int kind = v->regions[i].kind;
         while (!terrimpi_view_kinds[kind].list(v, &v->regions[i]))
             kind--;
     }
+    memset(v->kind_count, 0, sizeof v->kind_count);
     for (i = 0; i < v->draw_count; i++)
-        impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
-    if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+        v->kind_count[v->draws[i].kind]++;
+    if ((v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
+         (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
             terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
-}
-
-/* What a draw adds to the statistics. */
-static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
-                                     terrimp_stats *s)
-{
-    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
-        terrimp_pattern pattern;
-        terrimpi_view_ground_pattern(v, draw->index, &pattern);
-        s->ground++;
-        s->draws++;
-        s->triangles += pattern.triangle_count;
-    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
-        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
-        terrimp_mesh_info mesh;
-        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
-        s->impostors++;
-        s->impostors_by_level[p->node.level]++;
-        s->draws += p->layers_now;
-        s->triangles += mesh.index_count / 3u * p->layers_now;
-        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
-        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
-    } else {
-        s->draws++;
-        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
-    }
-}
-
-/* The rest of the statistics. */
-static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
-{
-    const terrimp_camera *c = &v->frame.camera;
-    float tan_x, tan_y, first, last;
-    uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        terrimpi_view_count_draw(v, &v->draws[i], s);
-    s->visible = v->region_count;
-    s->late = v->late;
-    s->evictions = v->cache.evictions;
-    s->atlas_failures = v->cache.failures;
-    for (i = 0; i < v->region_count; i++) {
-        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
-        terrimp_box box;
-        terrimpi_terrain_node_box(v->terrain, &node, &box);
-        first = v->regions[i].closest;
-        last = terrimp_box_farthest(&box, c->eye);
-        if (c->orthographic) {
-            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
-            first -= c->reach;
-        }
-        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
-        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
-    }
-    /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(c, &tan_x, &tan_y);
-    if (!c->orthographic)
-        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
-    for (i = 0; i < v->desc.atlas_count; i++)
-        s->texels_used += v->cache.atlases[i].texels_used;
-    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
-                     s->texels_used;
 }
 
 /* The next frame for a camera. It follows the eye's motion; a jump is none. */
@@ -12284,12 +12316,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
     float reuse, middle[2] = {0.0f, 0.0f};
-    int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
-    terrimpi_tiled_enter(view, &resolved, middle, went);
-    if (went[0] || went[1])
-        terrimpi_tiled_move(view, went[0], went[1]);
+    if (view->tiled)
+        view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
     if (view->terrain->tree.pages) {
@@ -12311,7 +12341,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
-    terrimpi_view_count_frame(view, &view->stats);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
@@ -12346,26 +12375,21 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
                                          p->texture_matrix[i]);
         camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
         if (v->cache.places)
-            terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                           v->cache.places[p - v->cache.pictures].matrix[i]);
+            v->cache.exact->make(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                 v->cache.places[p - v->cache.pictures].matrix[i]);
     }
 }
 
 /* Lists the frame without the pictures that could not be made. */
 static void terrimpi_view_list_again(terrimp_view *v)
 {
-    terrimp_stats *s = &v->stats;
     uint32_t i;
     for (i = 0; i < v->draw_count; i++)
         if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
             v->cache.pictures[v->draws[i].index].listed = 0;
     terrimpi_view_lose(v);
-    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
-    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
-    s->texels_used = 0;
-    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    v->stats.waiting = 0;
     terrimpi_view_list(v);
-    terrimpi_view_count_frame(v, &v->stats);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -12400,8 +12424,9 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     int kind;
     TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
-    if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
-        (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
+    if ((view->kind_count[TERRIMPI_VIEW_KIND_GROUND] + view->job_count > 0 &&
+         !callbacks->draw_ground) ||
+        (view->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 && !callbacks->draw_impostor) ||
         (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
     view->capturing = 1;
@@ -12420,11 +12445,72 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     return TERRIMP_OK;
 }
 
+/* What a draw adds to the statistics. */
+static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                     terrimp_stats *s)
+{
+    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
+        terrimp_pattern pattern;
+        terrimpi_view_ground_pattern(v, draw->index, &pattern);
+        s->draws++;
+        s->triangles += pattern.triangle_count;
+    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
+        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
+        terrimp_mesh_info mesh;
+        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
+        s->impostors_by_level[p->node.level]++;
+        s->draws += p->layers_now;
+        s->triangles += mesh.index_count / 3u * p->layers_now;
+        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
+        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
+    } else {
+        s->draws++;
+        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
+    }
+}
+
+/* The statistics that the frame itself has no use for. */
+static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
+{
+    const terrimp_camera *c = &v->frame.camera;
+    float tan_x, tan_y, first, last;
+    uint32_t i;
+    for (i = 0; i < v->draw_count; i++)
+        terrimpi_view_count_draw(v, &v->draws[i], s);
+    s->ground = v->kind_count[TERRIMPI_VIEW_KIND_GROUND];
+    s->impostors = v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR];
+    s->visible = v->region_count;
+    s->evictions = v->cache.evictions;
+    s->atlas_failures = v->cache.failures;
+    for (i = 0; i < v->region_count; i++) {
+        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
+        terrimp_box box;
+        terrimpi_terrain_node_box(v->terrain, &node, &box);
+        first = v->regions[i].closest;
+        last = terrimp_box_farthest(&box, c->eye);
+        if (c->orthographic) {
+            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
+            first -= c->reach;
+        }
+        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
+        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
+    }
+    /* A point at that distance in the corner of the screen has the smallest depth. */
+    terrimpi_camera_tangents(c, &tan_x, &tan_y);
+    if (!c->orthographic)
+        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
+    for (i = 0; i < v->desc.atlas_count; i++)
+        s->texels_used += v->cache.atlases[i].texels_used;
+    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+                     s->texels_used;
+}
+
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats)
 {
     TERRIMPI_REFUSE(!view || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
     *stats = view->stats;
+    terrimpi_view_count_frame(view, stats);
     return TERRIMP_OK;
 }
 
@@ -16302,7 +16388,10 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
     float line[TERRIMP_MAX_TILE_DIM];
     terrimp_simplify_desc desc;
     terrimpi_simp_last_spacing squeeze;
-    int side, even = (p->span_x | p->span_z) % (1u << p->level) == 0;
+    int side;
+    squeeze.step = 1 << (p->level + p->coarse);
+    squeeze.last_x = (int32_t)((p->span_x << p->coarse) - p->cut_x);
+    squeeze.last_z = (int32_t)((p->span_z << p->coarse) - p->cut_z);
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
@@ -16316,10 +16405,9 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
                                              &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
-    squeeze.step = 1 << p->level;
-    squeeze.last_x = (int32_t)p->span_x;
-    squeeze.last_z = (int32_t)p->span_z;
-    return terrimpi_simp_run(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
+    return terrimpi_simp_run(&desc,
+                             (squeeze.last_x | squeeze.last_z) % squeeze.step ? &squeeze : NULL,
+                             build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
@@ -16651,7 +16739,7 @@ TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *fie
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_TRY(terrimp_heightfield_read(&f, samples->x, samples->y, samples->width,
                                           samples->height, 1, build.tile));
-    p.level = 0;
+    memset(&p, 0, sizeof p);
     p.x = samples->x;
     p.z = samples->y;
     p.cols = samples->width;
@@ -17330,7 +17418,65 @@ static terrimp_result terrimpi_paging_open(terrimpi_paging *w, uint32_t level,
                                       terrimpi_paging_layout(w, level, r, NULL, &part)));
     terrimpi_paging_layout(w, level, r, (unsigned char *)scratch, &part);
     TERRIMPI_TRY(terrimp_terrain_init(&part, w->part, w->part_bytes, &made));
+    if (level > 0) {
+        made->coarse = level;
+        made->cut_x = ((r->width - 1u) << level) + 1u - w->whole.desc.field.width;
+        made->cut_z = ((r->height - 1u) << level) + 1u - w->whole.desc.field.depth;
+    }
     return terrimp_terrain_build_begin(made);
+}
+
+/* How far the edge along which a finer neighbour cuts its quads across, in the corner that meets a
+   coarser side, is from the ground of the blocks where it crosses their diagonals: from the middle
+   of quad (i, j) of a level towards +x and -z, or the other way. */
+static float terrimpi_paging_across(const terrimp_quadtree *t, uint32_t level, uint32_t i,
+                                    uint32_t j, int on)
+{
+    const terrimp_heightfield *f = &t->field;
+    uint32_t half = 1u << level >> 1, k, x = (i << level) + half, z = (j << level) + half;
+    float from = terrimpi_field_sample(f, x, z), most = 0.0f;
+    float to = terrimpi_field_sample(f, on ? x + half : x - half, on ? z - half : z + half);
+    for (k = 0; k < half; k++) {
+        uint32_t a = on ? x + k : x - k - 1u, b = on ? z - k - 1u : z + k;
+        float middle = 0.5f * (terrimpi_field_sample(f, a, b) +
+                               terrimpi_field_sample(f, a + 1u, b + 1u));
+        float line = from + (to - from) * (((float)k + 0.5f) / (float)half);
+        most = terrimpi_max(most, terrimpi_abs(line - middle));
+    }
+    return most;
+}
+
+/* How far the ground of a node above the blocks, and what is drawn up to it, is from the blocks'
+   own at most, between the samples that both are made of. Two surfaces of triangles are farthest
+   apart at a vertex or where edges cross. Edges cross between samples when a neighbour cuts its
+   quads across; and in quads that are cut off at the far edge, where both stay within the range of
+   the samples. */
+static terrimp_result terrimpi_paging_between(const terrimpi_paging *w, const terrimp_node *n,
+                                              float *most)
+{
+    const terrimp_quadtree *t = &w->part->tree, *whole = &w->whole.tree;
+    uint32_t level = n->level, all = w->level + level, quads = t->chunk_quads, size = 1u << level;
+    uint32_t x = n->x * quads, z = n->z * quads, i, j;
+    for (j = z - (z > 0); j <= z + quads; j++)
+        for (i = x - (x > 0); i <= x + quads; i++) {
+            uint32_t wide = terrimpi_tree_col(whole, all, i + 1u);
+            uint32_t deep = terrimpi_tree_row(whole, all, j + 1u);
+            float low, high;
+            wide -= terrimpi_tree_col(whole, all, i);
+            deep -= terrimpi_tree_row(whole, all, j);
+            if (wide == 0 || deep == 0)
+                continue;
+            if (terrimpi_min_u32(wide, deep) >> all == 0) {
+                TERRIMPI_TRY(terrimpi_field_range(&t->field,
+                                                  terrimpi_rect(i << level, j << level, size + 1u,
+                                                                size + 1u), 0, &low, &high));
+                *most = terrimpi_max(*most, high - low);
+            } else if ((i < x || i == x + quads) != (j < z || j == z + quads)) {
+                int on = i < x || j == z + quads;
+                *most = terrimpi_max(*most, terrimpi_paging_across(t, level, i, j, on));
+            }
+        }
+    return TERRIMP_OK;
 }
 
 /* Builds a node of the part and makes it hold those below it. */
@@ -17340,20 +17486,26 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     terrimp_geomip_node *ground = &t->tree.nodes[n->number];
     terrimpi_mesh *mesh = &t->meshes[n->number];
     float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
-    terrimp_node child;
+    float around = 0.0f; /* what the blocks miss in the node and where neighbours meet it */
+    terrimp_node child, beyond;
     uint32_t i;
+    int side;
     TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
     w->held[n->number] = *missed = *squares = 0.0f;
-    for (i = 0; i < 4u; i++) {
+    for (i = 0; i < 4u && w->level > 0; i++) {
         if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
         *missed = terrimpi_max(*missed, w->missed[child.number]);
         *squares += w->squares[child.number];
         count += 1.0f;
+        for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+            if (terrimpi_tree_beyond(&t->tree, &child, side, &beyond))
+                around = terrimpi_max(around, w->missed[beyond.number]);
     }
     if (w->level > 0) {
         *squares /= count;
-        ground->error += *missed;
+        TERRIMPI_TRY(terrimpi_paging_between(w, n, &ground->error));
+        ground->error += terrimpi_max(*missed, around);
         ground->rms = TERRIMP_SQRTF(ground->rms * ground->rms + *squares);
         mesh->error += *missed;
         mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);
