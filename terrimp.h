@@ -1499,6 +1499,8 @@ typedef struct terrimp_endless terrimp_endless;
 TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
 typedef struct terrimp_exact_depth terrimp_exact_depth;
 TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void);
+typedef struct terrimp_cost_limit terrimp_cost_limit;
+TERRIMP_API const terrimp_cost_limit *terrimp_view_cost_limit(void);
 
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
@@ -1579,10 +1581,12 @@ typedef struct terrimp_view_desc {
     uint32_t wrap_tiles;    /* as so many repetitions along each axis, with the eye's in the middle;
                                each takes 44 bytes for each node
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
+    const terrimp_cost_limit *cost_limit; /* (required for max_cost) terrimp_view_cost_limit() */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
                                they fit, and made finer again when that is predicted to fit, too;
-                               captures are made in pieces that leave no frame dearer
+                               captures are made in pieces, of single rows of quads if need be,
+                               that leave no frame dearer
                                [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
@@ -9497,7 +9501,15 @@ typedef struct terrimpi_capture_plan {
     uint32_t layer_count;
     uint32_t source;        /* level of the ground that is drawn */
     uint32_t border;        /* its width: see terrimpi_terrain_apron_quads */
+    const terrimp_cost_limit *limit; /* for pieces that end within a node; NULL: none does */
 } terrimpi_capture_plan;
+
+/* What only max_cost needs. */
+struct terrimp_cost_limit {
+    void (*draw_rows)(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                      const terrimp_node *node, uint32_t from, uint32_t to,
+                      terrimp_ground_command *ground, const terrimp_callbacks *callbacks);
+};
 
 /* Ground of the source level: a whole node, or the part of one that lies in the border. */
 typedef struct terrimpi_capture_draw {
@@ -9802,6 +9814,12 @@ static void terrimpi_capture_draw_rows(const terrimp_terrain *t, const terrimpi_
     }
 }
 
+TERRIMP_API const terrimp_cost_limit *terrimp_view_cost_limit(void)
+{
+    static const terrimp_cost_limit calls = {terrimpi_capture_draw_rows};
+    return &calls;
+}
+
 /* Makes a slice of a layer, from the row `from` of all its draws on, up to `to`: the host's
    commands. `middle` is added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
@@ -9847,7 +9865,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         ground.first_index = draws[i].first_index;
         ground.index_count = draws[i].index_count;
         if (last - first < rows)
-            terrimpi_capture_draw_rows(t, plan, &node, first, last, &ground, callbacks);
+            plan->limit->draw_rows(t, plan, &node, first, last, &ground, callbacks);
         else
             callbacks->draw_ground(callbacks->user, &ground);
     }
@@ -10090,6 +10108,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
+                    (d.max_cost > 0.0f && !d.cost_limit) ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
@@ -10130,6 +10149,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_cost),
         TERRIMPI_TROUBLE(terrimp_view_desc, endless),
         TERRIMPI_TROUBLE(terrimp_view_desc, wrap_tiles),
         TERRIMPI_TROUBLE(terrimp_view_desc, hider),
@@ -11998,6 +12018,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         return 0;
     plan->node = c->node;
     plan->layer_count = 1;
+    plan->limit = f->desc->cost_limit;
     terrimpi_terrain_node_box(f->terrain, &c->node, &plan->box);
     terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, plan->eye);
     memcpy(origin, plan->eye, sizeof origin);
@@ -12063,7 +12084,7 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
         const terrimpi_capture_draw *draw = &v->capture_draws[job->to / rows];
         uint32_t count = rows - job->to % rows;
         if (used + draw->triangle_count * count / rows > triangles) {
-            if (v->desc.max_cost > 0.0f && draw->first_index == 0)
+            if (v->desc.max_cost > 0.0f && job->plan.limit && draw->first_index == 0)
                 count = (terrimpi_max_u32(triangles, used) - used) * rows / draw->triangle_count;
             else if (used > 0)
                 break;
