@@ -176,8 +176,8 @@
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 39 KB of code at -Os on
-       a Cortex-M4, 36 KB without the three options that follow it above, if its linker drops
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 36 KB of code at -Os on
+       a Cortex-M4, 33 KB without the three options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -1493,6 +1493,15 @@ typedef struct terrimp_capture_command {
 
 typedef struct terrimp_view terrimp_view; /* the pictures and lists of one camera */
 
+/* What only some hosts want of a view, in their settings: a linker leaves out what no host asks
+   for. */
+typedef struct terrimp_endless terrimp_endless;
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
+typedef struct terrimp_exact_depth terrimp_exact_depth;
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void);
+typedef struct terrimp_cost_limit terrimp_cost_limit;
+TERRIMP_API const terrimp_cost_limit *terrimp_view_cost_limit(void);
+
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
     TERRIMP_MODE_DEFAULT = 0, /* same as AUTO */
@@ -1562,18 +1571,22 @@ typedef struct terrimp_view_desc {
                                or after that, so that the load of frames is even */
     int sorted;             /* nonzero: draws come in painter's order, for hosts without a depth
                                buffer: see terrimp_sorted_ground and terrimp_sorted_mesh */
-    int exact_depth;        /* nonzero: impostor commands carry a place_matrix, so that their pixels
-                               can have the terrain's own depth instead of the coarse mesh's */
-    uint32_t wrap_tiles;    /* a terrain whose field wraps is drawn without end: as so many
-                               repetitions along each axis, with the eye's in the middle. The
-                               field's quads are multiples of chunk_quads; nodes are drawn up to the
-                               level at which its chunks are no multiple of theirs. It takes 44
-                               bytes more for each node that it has by that. No hider then
+    const terrimp_exact_depth *exact_depth; /* terrimp_view_exact_depth(): impostor commands carry a
+                               place_matrix, so that their pixels can have the terrain's own depth
+                               instead of the coarse mesh's [Default NULL -> they do not] */
+    const terrimp_endless *endless; /* (required for a terrain whose field wraps)
+                               terrimp_view_endless(): it is drawn without end. Its quads are
+                               multiples of chunk_quads; nodes are drawn up to the level at which
+                               its chunks are no multiple of theirs. No hider then */
+    uint32_t wrap_tiles;    /* as so many repetitions along each axis, with the eye's in the middle;
+                               each takes 44 bytes for each node
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
+    const terrimp_cost_limit *cost_limit; /* (required for max_cost) terrimp_view_cost_limit() */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
                                they fit, and made finer again when that is predicted to fit, too;
-                               captures are made in pieces that leave no frame dearer
+                               captures are made in pieces, of single rows of quads if need be,
+                               that leave no frame dearer
                                [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
@@ -1699,8 +1712,8 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
 /* Changes settings from the next update on. Pictures that are good enough by the new ones stay.
 
    desc       as for terrimp_view_init, but for what the view has memory for: atlas_size,
-              atlas_count, max_impostors, max_ground, max_captures and wrap_tiles are those of
-              before, or 0; exact_depth only if the view was made with it
+              atlas_count, max_impostors, max_ground, max_captures, endless and wrap_tiles are those
+              of before, or 0; exact_depth only if the view was made with it
    Errors     those of terrimp_view_desc_resolve; E_RANGE when one of these is another: nothing
               changes */
 TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_view_desc *desc);
@@ -1736,7 +1749,8 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                not above 0, or not finite: the cost stays */
 TERRIMP_API float terrimp_view_pace(float cost, float ms, float target_ms);
 
-/* The statistics of the last update. */
+/* The statistics of the last update, counted when they are asked for. Errors: E_STATE also after
+   invalidate, touch and drop, until the next update. */
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats);
 
 /* Forgets every picture, for instance when textures were lost. */
@@ -2414,7 +2428,7 @@ TERRIMP_API terrimp_result terrimp_bake_write(const terrimp_terrain *terrain, vo
 
    In a block, and in a terrain of one block, all is what building in memory makes of it. Above the
    blocks, ground and meshes are made of every 2^block_level-th sample, and their errors are those
-   against these, and what the blocks miss added. */
+   against these, and what the blocks miss added: those of ground are no less than of memory. */
 typedef struct terrimp_pages_desc {
     terrimp_terrain_desc terrain; /* (required) but its samples, which are without voids;
                                      height_low and height_high have to be given */
@@ -6590,6 +6604,9 @@ struct terrimp_terrain {
     uint32_t *real;                        /* [node_count] of a view of one that wraps: the node of
                                               which a node is a repetition. NULL: itself */
     uint32_t tiles;                        /* then: repetitions along each axis */
+    const terrimp_endless *endless;
+    uint32_t coarse, cut_x, cut_z;         /* while pages above blocks are made: it is of every
+                                              2^coarse-th sample, the last ones closer by so many */
     terrimp_terrain_desc desc; /* resolved */
     terrimp_quadtree tree;
 #ifndef TERRIMP_NO_MALLOC
@@ -6737,6 +6754,7 @@ static size_t terrimpi_terrain_layout(terrimp_terrain *t, unsigned char *base)
 typedef struct terrimpi_terrain_tile {
     uint32_t level, x, z, span_x, span_z;
     uint32_t cols, rows;
+    uint32_t coarse, cut_x, cut_z; /* as those of the terrain, of its own last column and row */
 } terrimpi_terrain_tile;
 
 static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, uint32_t node)
@@ -6751,6 +6769,9 @@ static terrimpi_terrain_tile terrimpi_terrain_tile_of(const terrimp_terrain *t, 
     p.span_z = terrimpi_tree_row(&t->tree, p.level, (place.z + 1u) * quads) - p.z;
     p.cols = ((p.span_x - 1u) >> p.level) + 2u;
     p.rows = ((p.span_z - 1u) >> p.level) + 2u;
+    p.coarse = t->coarse;
+    p.cut_x = p.x + p.span_x + 1u == t->tree.field.width ? t->cut_x : 0u;
+    p.cut_z = p.z + p.span_z + 1u == t->tree.field.depth ? t->cut_z : 0u;
     return p;
 }
 
@@ -6829,15 +6850,23 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
     return t->range_low + t->range_step * (float)steps;
 }
 
-static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node)
+/* What a view does with a terrain that wraps: see terrimp_view_endless. */
+struct terrimp_endless {
+    int (*fits)(const terrimp_terrain *built, const terrimp_view_desc *desc);
+    void (*begin)(terrimp_view *v, terrimp_terrain *t);
+    void (*layout)(terrimp_view *v, terrimpi_arena *l);
+    void (*fill)(terrimp_terrain *t, const terrimp_terrain *built);
+    void (*enter)(terrimp_view *v, terrimp_camera *camera, float middle[2]);
+    terrimp_node (*place)(const terrimp_terrain *t, const terrimp_node *node,
+                          const float middle[2], float offset[2]);
+};
+
+/* The node whose vertices the host has for a node, and what these are moved by in its world.
+   `middle` is where the repetition in the middle is. */
+static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_node *node,
+                                        const float middle[2], float offset[2])
 {
-    terrimp_node n = *node;
-    n.number = terrimpi_real_node(t, n.number);
-    if (t->real) {
-        n.x %= t->tree.level_x[n.level] / t->tiles;
-        n.z %= t->tree.level_z[n.level] / t->tiles;
-    }
-    return n;
+    return t->real ? t->endless->place(t, node, middle, offset) : *node;
 }
 
 /* Vertex i of a node's mesh. */
@@ -6984,6 +7013,8 @@ static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_ter
     uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
     terrimpi_terrain_touched out;
+    if (t->tree.pages && level > t->tree.pages->block_level)
+        margin += side / 2u; /* errors are of whole nodes beside it, see terrimpi_paging_build */
     terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
                                    t->tree.level_x[level], &out.x0, &out.x1);
     terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
@@ -9330,19 +9361,29 @@ TERRIMP_API terrimp_result terrimp_pages_renew(terrimp_terrain *terrain, const v
 
 /* ---- heights and rays ---- */
 
+/* The height of the finest ground that is here; *f is that, and *level its level. */
+static terrimp_result terrimpi_terrain_ground(const terrimp_terrain *t, float x, float z,
+                                              terrimp_heightfield *f, float *height,
+                                              uint32_t *level)
+{
+    *level = 0;
+    *f = t->desc.field;
+    if (t->tree.pages)
+        TERRIMPI_TRY(t->tree.pages->calls->at(&t->tree, x, z, f, level));
+    return terrimp_heightfield_height(f, x, z, height);
+}
+
 TERRIMP_API terrimp_result terrimp_terrain_height(const terrimp_terrain *terrain, float x, float z,
                                                   float *height, float normal[3], uint32_t *level)
 {
     terrimp_heightfield f;
-    uint32_t found = 0;
+    uint32_t found;
+    float y;
     TERRIMPI_TRY(terrimpi_terrain_check_node(terrain, terrain ? terrain->tree.node_count - 1u : 0u,
                                              height));
-    f = terrain->desc.field;
-    if (terrain->tree.pages) {
-        TERRIMPI_TRY(terrain->tree.pages->calls->at(&terrain->tree, x, z, &f, &found));
-        TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
-    }
-    TERRIMPI_TRY(terrimp_heightfield_height(&f, x, z, height));
+    TERRIMPI_TRY(terrimpi_terrain_ground(terrain, x, z, &f, &y, &found));
+    TERRIMPI_REFUSE(found > 0 && !level, TERRIMP_E_PAGE);
+    *height = y;
     if (normal)
         TERRIMPI_TRY(terrimp_heightfield_normal(&f, x, z, normal));
     if (level)
@@ -9460,7 +9501,15 @@ typedef struct terrimpi_capture_plan {
     uint32_t layer_count;
     uint32_t source;        /* level of the ground that is drawn */
     uint32_t border;        /* its width: see terrimpi_terrain_apron_quads */
+    const terrimp_cost_limit *limit; /* for pieces that end within a node; NULL: none does */
 } terrimpi_capture_plan;
+
+/* What only max_cost needs. */
+struct terrimp_cost_limit {
+    void (*draw_rows)(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                      const terrimp_node *node, uint32_t from, uint32_t to,
+                      terrimp_ground_command *ground, const terrimp_callbacks *callbacks);
+};
 
 /* Ground of the source level: a whole node, or the part of one that lies in the border. */
 typedef struct terrimpi_capture_draw {
@@ -9727,21 +9776,6 @@ static uint32_t terrimpi_capture_triangles(const terrimp_terrain *t,
     return triangles;
 }
 
-/* What the vertices of a node are moved by in the host's world: its repetition's place, and where
-   the one in the middle is. */
-static void terrimpi_tile_offset(const terrimp_terrain *t, const terrimp_node *node,
-                                 const float middle[2], float offset[2])
-{
-    const terrimp_heightfield *field = &t->desc.field;
-    uint32_t quads = t->desc.chunk_quads << node->level;
-    if (!t->real)
-        return;
-    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
-                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
-    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
-                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
-}
-
 /* Rows of all columns of a node: a picture can be cut after each. */
 static uint32_t terrimpi_capture_rows(const terrimp_terrain *t)
 {
@@ -9780,6 +9814,12 @@ static void terrimpi_capture_draw_rows(const terrimp_terrain *t, const terrimpi_
     }
 }
 
+TERRIMP_API const terrimp_cost_limit *terrimp_view_cost_limit(void)
+{
+    static const terrimp_cost_limit calls = {terrimpi_capture_draw_rows};
+    return &calls;
+}
+
 /* Makes a slice of a layer, from the row `from` of all its draws on, up to `to`: the host's
    commands. `middle` is added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
@@ -9793,7 +9833,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     terrimp_ground_command ground;
     float border = terrimpi_capture_reach(t, plan);
     uint32_t rows = terrimpi_capture_rows(t), i;
-    terrimp_node place = terrimpi_real_place(t, &plan->node);
+    terrimp_node place;
+    memset(&ground, 0, sizeof ground);
+    place = terrimpi_real_place(t, &plan->node, middle, ground.offset);
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
@@ -9809,7 +9851,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
     command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
-    memset(&ground, 0, sizeof ground);
     ground.level = plan->source;
     for (i = from / rows; i * rows < to; i++) {
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
@@ -9817,15 +9858,14 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         uint32_t last = terrimpi_min_u32(to - i * rows, rows);
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
-        terrimpi_tile_offset(t, &node, middle, ground.offset);
-        place = terrimpi_real_place(t, &node);
+        place = terrimpi_real_place(t, &node, middle, ground.offset);
         ground.node = place.number;
         ground.x = place.x;
         ground.z = place.z;
         ground.first_index = draws[i].first_index;
         ground.index_count = draws[i].index_count;
         if (last - first < rows)
-            terrimpi_capture_draw_rows(t, plan, &node, first, last, &ground, callbacks);
+            plan->limit->draw_rows(t, plan, &node, first, last, &ground, callbacks);
         else
             callbacks->draw_ground(callbacks->user, &ground);
     }
@@ -10055,6 +10095,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
     TERRIMPI_DEFAULT(d.max_impostors, 1024);
     TERRIMPI_DEFAULT(d.max_captures, 64);
     TERRIMPI_DEFAULT(d.wrap_tiles, 3);
+    TERRIMPI_REFUSE(terrain->desc.field.wrap && (!d.endless || !d.endless->fits(terrain, &d)),
+                    TERRIMP_E_RANGE);
     chunks = terrain->tree.level_first[1];
     if (terrain->desc.field.wrap && !terrain->real)
         chunks *= d.wrap_tiles * d.wrap_tiles;
@@ -10064,17 +10106,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size) ||
-                    !terrimpi_within_u32(d.wrap_tiles, 3, 15) || d.wrap_tiles % 2u == 0,
-                    TERRIMP_E_RANGE);
-    if (terrain->desc.field.wrap) {
-        const terrimp_heightfield *f = &terrain->desc.field;
-        TERRIMPI_REFUSE(d.hider || terrain->tree.pages ||
-                        (f->width - 1u) % terrain->desc.chunk_quads ||
-                        (f->depth - 1u) % terrain->desc.chunk_quads ||
-                        (f->width - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM ||
-                        (f->depth - 1u) * d.wrap_tiles >= TERRIMP_MAX_DIM, TERRIMP_E_RANGE);
-    }
+                    (d.max_cost > 0.0f && !d.cost_limit) ||
+                    !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
@@ -10114,6 +10147,9 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_cost),
+        TERRIMPI_TROUBLE(terrimp_view_desc, endless),
+        TERRIMPI_TROUBLE(terrimp_view_desc, wrap_tiles),
         TERRIMPI_TROUBLE(terrimp_view_desc, hider),
         TERRIMPI_TROUBLE(terrimp_view_desc, joined),
         TERRIMPI_TROUBLE(terrimp_view_desc, costs)
@@ -10122,12 +10158,27 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     if (!terrain || !desc)
         return "the descriptor";
     memset(&good, 0, sizeof good);
+    good.endless = terrimp_view_endless();
     bad = *desc;
     return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
                             terrimpi_view_try, terrain);
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
+
+/* Place matrices: those of a picture, and the same relative to an eye. */
+struct terrimp_exact_depth {
+    void (*make)(const terrimp_capture *c, const terrimp_rect *slot, uint32_t atlas_width,
+                 uint32_t atlas_height, float matrix[16]);
+    void (*from)(float matrix[16], const float from[3], const float eye[3]);
+};
+
+TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void)
+{
+    static const terrimp_exact_depth calls = {terrimpi_impostor_place_matrix,
+                                              terrimpi_impostor_place_from};
+    return &calls;
+}
 
 /* ---- the pictures: a cache ---- */
 
@@ -10166,7 +10217,8 @@ typedef struct terrimpi_cache_places {
 typedef struct terrimpi_cache {
     terrimp_live_atlas *atlases; /* [atlas_count] */
     terrimpi_cache_picture *pictures;  /* [capacity] */
-    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted */
+    terrimpi_cache_places *places;     /* [capacity] NULL: not wanted; else made with `exact` */
+    const terrimp_exact_depth *exact;
     uint16_t *of_node;           /* [node_count] */
     uint32_t atlas_count, capacity, node_count;
     uint32_t next;               /* where the search for a free picture goes on */
@@ -10658,12 +10710,13 @@ static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
     terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_box box;
     float ground;
-    uint32_t level; /* of the finest ground that is here */
+    uint32_t level;
+    terrimp_heightfield here;
     terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
     terrimpi_terrain_node_box(f->terrain, &root, &box);
-    result = terrimp_terrain_height(f->terrain, eye[0], eye[2], &ground, NULL, &level);
+    result = terrimpi_terrain_ground(f->terrain, eye[0], eye[2], &here, &ground, &level);
     if (result == TERRIMP_E_MISS)
         return terrimpi_view_inside(f, &box, eye);
     return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
@@ -10791,12 +10844,20 @@ typedef struct terrimpi_region {
     uint32_t node;
     float closest;
     uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
-    uint32_t first_candidate;
+    terrimpi_candidate *candidates;
     uint16_t candidate_count;            /* none: ground is all it can be */
     uint8_t fits;                        /* there are some, and a camera fits round each */
     uint8_t kind;                        /* that shows it */
     float pixels;                        /* that the candidates cover, about */
 } terrimpi_region;
+
+/* All of them, and what could be captured for them. */
+typedef struct terrimpi_regions {
+    terrimpi_region *items;         /* [max_ground + 1] front to back */
+    terrimpi_candidate *candidates; /* [max_impostors] by region */
+    uint32_t *queue;                /* [max_impostors] candidates to capture, most urgent first */
+    uint32_t count, candidate_count;
+} terrimpi_regions;
 
 /* What a kind would cost a region. */
 typedef struct terrimpi_region_offer {
@@ -10811,6 +10872,14 @@ typedef struct terrimpi_view_draw {
     float alpha;
 } terrimpi_view_draw;
 
+/* All of them. */
+typedef struct terrimpi_view_draws {
+    terrimpi_view_draw *items; /* [max_ground + max_impostors + 1] front to back */
+    uint32_t count;
+    uint32_t kind_count[TERRIMPI_VIEW_KIND_COUNT]; /* of each kind */
+    uint32_t waiting;          /* impostors that have no picture yet */
+} terrimpi_view_draws;
+
 /* A capture of this frame, or a piece of one. */
 typedef struct terrimpi_job {
     terrimpi_capture_plan plan;
@@ -10823,23 +10892,26 @@ typedef struct terrimpi_job {
     uint8_t expired;               /* since its first piece was made */
 } terrimpi_job;
 
+/* All of them; of one that is made in pieces the next one comes first in the next frame. */
+typedef struct terrimpi_jobs {
+    terrimpi_job *items; /* [max_captures] */
+    uint32_t count;
+    uint32_t open;       /* 1 + the job of which pieces are missing */
+} terrimpi_jobs;
+
 struct terrimp_view {
     const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
                                                wraps */
-    uint32_t region_count, candidate_count, job_count, draw_count;
     terrimpi_cache cache;
     terrimpi_cull cull;
     uint8_t *kind_of;              /* [node_count] that showed the region */
-    terrimpi_region *regions;      /* [max_ground + 1] front to back */
-    terrimpi_candidate *candidates; /* [max_impostors] by region */
-    uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
-    terrimpi_job *jobs;            /* [max_captures] */
-    terrimpi_view_draw *draws;          /* [max_ground + max_impostors + 1] front to back */
+    terrimpi_regions regions;
+    terrimpi_jobs jobs;
+    terrimpi_view_draws draws;
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
     uint32_t late;                 /* nodes and pictures that pages are missing for */
-    uint32_t open;                 /* 1 + the job of which pieces are missing */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
@@ -10848,57 +10920,13 @@ struct terrimp_view {
     float cost;                    /* of the frame before */
     terrimp_view_desc desc;        /* resolved */
     terrimpi_frame frame;
-    terrimp_stats stats;
+    terrimp_stats stats;           /* as far as they are not counted when they are asked for */
     terrimp_terrain *tiled;        /* repetitions of one that wraps: then `terrain` is this; NULL */
 #ifndef TERRIMP_NO_MALLOC
     terrimp_allocator allocator;
     size_t bytes;
 #endif
 };
-
-/* ---- a terrain without end ---- */
-
-/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
-   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
-   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
-   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
-static void terrimpi_tiled_begin(terrimp_view *v, const terrimp_terrain *terrain,
-                                 terrimp_terrain *t)
-{
-    terrimp_heightfield field = terrain->desc.field;
-    v->terrain = v->built = terrain;
-    v->tiled = NULL;
-    if (!field.wrap)
-        return;
-    v->terrain = v->tiled = t;
-    *t = *terrain;
-    t->tiles = v->desc.wrap_tiles;
-    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
-    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
-    field.width = (field.width - 1u) * t->tiles + 1u;
-    field.depth = (field.depth - 1u) * t->tiles + 1u;
-    field.row_bytes = 0; /* no sample is read through it */
-    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
-}
-
-static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
-{
-    const terrimp_quadtree *from = &real->tree;
-    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
-    terrimp_node root = terrimpi_tree_root(from);
-    terrimpi_mesh none = real->meshes[root.number];
-    terrimp_geomip_node split = from->nodes[root.number];
-    none.counts = 0;
-    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
-    for (i = 0; i < t->tree.node_count; i++) {
-        terrimp_node n = terrimpi_tree_node(&t->tree, i);
-        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
-        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
-                                              n.z % from->level_z[n.level]).number : root.number;
-        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
-        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
-    }
-}
 
 /* ---- memory ---- */
 
@@ -10931,6 +10959,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     terrimp_live_atlas_desc atlas = terrimpi_view_atlas_desc(&v->desc);
     terrimpi_arena l = terrimpi_arena_at(base);
     terrimpi_cache *c = &v->cache;
+    terrimpi_regions *r = &v->regions;
     terrimpi_arena captures;
     size_t scratch;
     uint32_t i;
@@ -10948,7 +10977,8 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     c->of_node = (uint16_t *)terrimpi_take(&l, nodes, sizeof *c->of_node);
     c->pictures = (terrimpi_cache_picture *)terrimpi_take(&l, impostors, sizeof *c->pictures);
     c->places = NULL;
-    if (v->desc.exact_depth)
+    c->exact = v->desc.exact_depth;
+    if (c->exact)
         c->places = (terrimpi_cache_places *)terrimpi_take(&l, impostors, sizeof *c->places);
     v->ground.marks = (terrimp_geomip_mark *)terrimpi_take(&l, nodes, sizeof *v->ground.marks);
     v->ground.distances = (float *)terrimpi_take(&l, v->terrain->tree.pages ? 0 : nodes,
@@ -10963,26 +10993,27 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
     terrimpi_view_layout_captures(v, &captures);
     v->kind_of = (uint8_t *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
-    v->regions = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *v->regions);
-    v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
-    v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
-    v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->draws = (terrimpi_view_draw *)terrimpi_take(
+    r->items = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *r->items);
+    r->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *r->candidates);
+    r->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *r->queue);
+    v->jobs.items = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures,
+                                                 sizeof *v->jobs.items);
+    v->draws.items = (terrimpi_view_draw *)terrimpi_take(
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
-        sizeof *v->draws);
-    if (v->tiled) {
-        terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(&l, 1, sizeof *t);
-        terrimp_terrain made = *v->tiled;
-        made.real = (uint32_t *)terrimpi_take(&l, nodes, sizeof *made.real);
-        made.meshes = (terrimpi_mesh *)terrimpi_take(&l, nodes, sizeof *made.meshes);
-        made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(&l, nodes, sizeof *made.tree.nodes);
-        if (t) {
-            *t = made;
-            terrimpi_tiled_fill(t, v->built);
-            v->terrain = v->tiled = t;
-        }
-    }
+        sizeof *v->draws.items);
+    if (v->tiled)
+        v->desc.endless->layout(v, &l);
     return l.ok && slots ? l.bytes : 0;
+}
+
+/* What is drawn: the terrain, or in its place `tiled`, to be laid out. */
+static void terrimpi_view_begin(terrimp_view *v, const terrimp_terrain *terrain,
+                                terrimp_terrain *tiled)
+{
+    v->terrain = v->built = terrain;
+    v->tiled = NULL;
+    if (terrain->desc.field.wrap)
+        v->desc.endless->begin(v, tiled);
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -10991,7 +11022,7 @@ TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terr
     terrimp_terrain tiled;
     if (terrimp_view_desc_resolve(terrain, desc, &v.desc) != TERRIMP_OK)
         return 0;
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     return terrimpi_view_layout(&v, NULL);
 }
 
@@ -11013,7 +11044,7 @@ TERRIMP_API terrimp_result terrimp_view_init(const terrimp_terrain *terrain,
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     memset(&v, 0, sizeof v);
     TERRIMPI_TRY(terrimp_view_desc_resolve(terrain, desc, &v.desc));
-    terrimpi_tiled_begin(&v, terrain, &tiled);
+    terrimpi_view_begin(&v, terrain, &tiled);
     needed = terrimpi_view_layout(&v, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
@@ -11043,11 +11074,14 @@ TERRIMP_API terrimp_result terrimp_view_set(terrimp_view *view, const terrimp_vi
     TERRIMPI_DEFAULT(d.max_ground, has->max_ground);
     TERRIMPI_DEFAULT(d.max_captures, has->max_captures);
     TERRIMPI_DEFAULT(d.wrap_tiles, has->wrap_tiles);
+    if (!d.endless)
+        d.endless = has->endless;
     TERRIMPI_TRY(terrimp_view_desc_resolve(view->terrain, &d, &d));
     TERRIMPI_REFUSE(d.atlas_size != has->atlas_size || d.atlas_count != has->atlas_count ||
                     d.max_impostors != has->max_impostors || d.max_ground != has->max_ground ||
                     d.max_captures != has->max_captures || d.wrap_tiles != has->wrap_tiles ||
-                    (d.exact_depth && !view->cache.places), TERRIMP_E_RANGE);
+                    d.endless != has->endless || (d.exact_depth && !view->cache.places),
+                    TERRIMP_E_RANGE);
     view->desc = d;
     terrimpi_view_set_ground(&view->desc, &view->ground);
     return TERRIMP_OK;
@@ -11066,21 +11100,103 @@ static void terrimpi_job_cancel(terrimpi_cache *cache, const terrimpi_job *job)
 
 /* Forgets the jobs of a frame that is not rendered, but for a picture that has been begun: that one
    becomes the first. */
-static void terrimpi_view_cancel(terrimp_view *v)
+static void terrimpi_jobs_cancel(terrimpi_cache *cache, terrimpi_jobs *jobs)
 {
     uint32_t i;
-    for (i = 0; i < v->job_count; i++) {
-        if (v->open == i + 1u && v->jobs[i].from > 0)
+    for (i = 0; i < jobs->count; i++) {
+        if (jobs->open == i + 1u && jobs->items[i].from > 0)
             continue;
-        terrimpi_job_cancel(&v->cache, &v->jobs[i]);
-        if (v->open == i + 1u)
-            v->open = 0;
+        terrimpi_job_cancel(cache, &jobs->items[i]);
+        if (jobs->open == i + 1u)
+            jobs->open = 0;
     }
-    v->job_count = 0;
-    if (v->open) {
-        v->jobs[0] = v->jobs[v->open - 1u];
-        v->open = 1;
+    jobs->count = 0;
+    if (jobs->open) {
+        jobs->items[0] = jobs->items[jobs->open - 1u];
+        jobs->open = 1;
     }
+}
+
+/* ---- a terrain without end ---- */
+
+/* One that wraps is drawn as a terrain of tiles x tiles repetitions around the eye's, with a tree
+   of its own; what is kept of nodes is copied into that. A node of it that is no repetition of a
+   whole node, because it is too large, is never fine enough to be drawn. The eye is always in the
+   tile in the middle: where it leaves it, pictures and marks move by a tile instead. */
+static int terrimpi_tiled_fits(const terrimp_terrain *built, const terrimp_view_desc *d)
+{
+    uint32_t cols = built->desc.field.width - 1u, rows = built->desc.field.depth - 1u;
+    return terrimpi_within_u32(d->wrap_tiles, 3, 15) && d->wrap_tiles % 2u == 1u && !d->hider &&
+           !built->tree.pages && cols % built->desc.chunk_quads == 0 &&
+           rows % built->desc.chunk_quads == 0 && cols * d->wrap_tiles < TERRIMP_MAX_DIM &&
+           rows * d->wrap_tiles < TERRIMP_MAX_DIM;
+}
+
+static void terrimpi_tiled_begin(terrimp_view *v, terrimp_terrain *t)
+{
+    terrimp_heightfield field = v->built->desc.field;
+    v->terrain = v->tiled = t;
+    *t = *v->built;
+    t->tiles = v->desc.wrap_tiles;
+    t->endless = v->desc.endless;
+    field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
+    field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
+    field.width = (field.width - 1u) * t->tiles + 1u;
+    field.depth = (field.depth - 1u) * t->tiles + 1u;
+    field.row_bytes = 0; /* no sample is read through it */
+    (void)terrimp_quadtree_init(&field, t->desc.chunk_quads, &t->tree);
+}
+
+static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
+{
+    const terrimp_quadtree *from = &real->tree;
+    uint32_t i, chunks = from->level_x[0] | from->level_z[0];
+    terrimp_node root = terrimpi_tree_root(from);
+    terrimpi_mesh none = real->meshes[root.number];
+    terrimp_geomip_node split = from->nodes[root.number];
+    none.counts = 0;
+    none.error = none.error_rms = split.error = split.rms = TERRIMPI_MIP_MOST;
+    for (i = 0; i < t->tree.node_count; i++) {
+        terrimp_node n = terrimpi_tree_node(&t->tree, i);
+        int whole = n.level < from->level_count && chunks % (1u << n.level) == 0;
+        t->real[i] = whole ? terrimpi_tree_at(from, n.level, n.x % from->level_x[n.level],
+                                              n.z % from->level_z[n.level]).number : root.number;
+        t->meshes[i] = whole ? real->meshes[t->real[i]] : none;
+        t->tree.nodes[i] = whole ? from->nodes[t->real[i]] : split;
+    }
+}
+
+static void terrimpi_tiled_layout(terrimp_view *v, terrimpi_arena *l)
+{
+    size_t nodes = v->tiled->tree.node_count;
+    terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *t);
+    terrimp_terrain made = *v->tiled;
+    made.real = (uint32_t *)terrimpi_take(l, nodes, sizeof *made.real);
+    made.meshes = (terrimpi_mesh *)terrimpi_take(l, nodes, sizeof *made.meshes);
+    made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(l, nodes, sizeof *made.tree.nodes);
+    if (!t)
+        return;
+    *t = made;
+    terrimpi_tiled_fill(t, v->built);
+    v->terrain = v->tiled = t;
+}
+
+static terrimp_node terrimpi_tiled_place(const terrimp_terrain *t, const terrimp_node *node,
+                                         const float middle[2], float offset[2])
+{
+    const terrimp_heightfield *field = &t->desc.field;
+    uint32_t across = t->tree.level_x[node->level] / t->tiles;
+    uint32_t along = t->tree.level_z[node->level] / t->tiles;
+    uint32_t quads = t->desc.chunk_quads << node->level;
+    terrimp_node n = *node;
+    offset[0] = middle[0] + terrimpi_field_period(field, 0) *
+                ((float)(node->x * quads / (field->width - 1u)) - (float)(t->tiles / 2u));
+    offset[1] = middle[1] + terrimpi_field_period(field, 1) *
+                ((float)(node->z * quads / (field->depth - 1u)) - (float)(t->tiles / 2u));
+    n.number = t->real[n.number];
+    n.x %= across;
+    n.z %= along;
+    return n;
 }
 
 /* Moves what is known of nodes by (x, z) tiles: what was at node n + tiles is at n. Returns the
@@ -11111,10 +11227,10 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     v->frame.eye[0] -= way[0];
     v->frame.eye[2] -= way[1];
     v->outdated = 1; /* its draws are of nodes that are elsewhere now */
-    terrimpi_view_cancel(v);
-    if (v->open)
-        terrimpi_job_cancel(&v->cache, &v->jobs[0]);
-    v->open = 0;
+    terrimpi_jobs_cancel(&v->cache, &v->jobs);
+    if (v->jobs.open)
+        terrimpi_job_cancel(&v->cache, &v->jobs.items[0]);
+    v->jobs.open = 0;
     for (k = 0; k < count; k++) { /* from which they come is later in this direction */
         terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
         uint32_t was = terrimpi_tiled_before(t, &n, x, z);
@@ -11144,65 +11260,82 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     }
 }
 
-/* Takes a camera into the tile in the middle; says how many tiles it has gone since the frame
-   before by the shorter way. Of the step of the eye what is left are world units without tiles. */
-static void terrimpi_tiled_enter(const terrimp_view *v, terrimp_camera *camera, float middle[2],
-                                 int32_t went[2])
+/* Takes a camera into the tile in the middle, and what is known of nodes by as many tiles as it has
+   gone since the frame before, by the shorter way. Of the step of the eye what is left are world
+   units without tiles. */
+static void terrimpi_tiled_enter(terrimp_view *v, terrimp_camera *camera, float middle[2])
 {
     const terrimp_heightfield *field = &v->terrain->desc.field;
+    int32_t went[2];
     int k;
-    for (k = 0; k < 2 && v->terrain->real; k++) {
+    for (k = 0; k < 2; k++) {
         float period = terrimpi_field_period(field, k), step;
         middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
         step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
         went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
     }
+    if (went[0] || went[1])
+        terrimpi_tiled_move(v, went[0], went[1]);
 }
+
+TERRIMP_API const terrimp_endless *terrimp_view_endless(void)
+{
+    static const terrimp_endless calls = {
+        terrimpi_tiled_fits, terrimpi_tiled_begin, terrimpi_tiled_layout, terrimpi_tiled_fill,
+        terrimpi_tiled_enter, terrimpi_tiled_place
+    };
+    return &calls;
+}
+
+/* ---- what a host says of pictures and light ---- */
 
 TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
 {
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
     terrimpi_motion_lose(&view->frame.motion);
-    view->job_count = view->open = 0;
+    view->jobs.count = view->jobs.open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
 }
 
 /* Forgets a picture, and what of it has been begun. */
-static void terrimpi_view_forget(terrimp_view *v, terrimpi_cache_picture *p)
+static void terrimpi_jobs_forget(terrimpi_cache *cache, terrimpi_jobs *jobs,
+                                 terrimpi_cache_picture *p)
 {
-    if (v->open && v->jobs[v->open - 1u].picture == p) {
-        terrimpi_job_cancel(&v->cache, &v->jobs[v->open - 1u]);
-        v->open = 0;
+    if (jobs->open && jobs->items[jobs->open - 1u].picture == p) {
+        terrimpi_job_cancel(cache, &jobs->items[jobs->open - 1u]);
+        jobs->open = 0;
     }
-    terrimpi_cache_drop(&v->cache, p);
+    terrimpi_cache_drop(cache, p);
 }
 
 /* The same for all that are lost. */
-static void terrimpi_view_lose(terrimp_view *v)
+static void terrimpi_jobs_lose(terrimpi_cache *cache, terrimpi_jobs *jobs)
 {
     terrimpi_cache_picture *p;
-    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+    for (p = cache->pictures; p < cache->pictures + cache->capacity; p++)
         if (p->lost)
-            terrimpi_view_forget(v, p);
+            terrimpi_jobs_forget(cache, jobs, p);
 }
 
 /* Marks the picture of a node, or all, as lost, else as expired. Pieces of one that is being made
    are older than that. */
 static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int lost)
 {
+    terrimpi_job *open;
     terrimpi_cache_picture *p;
     TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count,
                     TERRIMP_E_RANGE);
+    open = v->jobs.open ? &v->jobs.items[v->jobs.open - 1u] : NULL;
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
         if (p->seen == 0 || (node != TERRIMP_EVERY_NODE &&
                              terrimpi_real_node(v->terrain, p->node.number) != node))
             continue;
         *(lost ? &p->lost : &p->expired) = 1;
-        if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
-            v->jobs[v->open - 1u].expired = 1;
+        if (open && open->picture == p && open->from > 0)
+            open->expired = 1;
     }
     return TERRIMP_OK;
 }
@@ -11220,16 +11353,16 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
-    terrimpi_view_cancel(view);
+    terrimpi_jobs_cancel(&view->cache, &view->jobs);
     view->outdated = 1;
-    if (view->terrain->real)
-        terrimpi_tiled_fill(view->tiled, view->built);
+    if (view->tiled)
+        view->desc.endless->fill(view->tiled, view->built);
     for (p = view->cache.pictures; p < view->cache.pictures + view->cache.capacity; p++)
         for (k = 0; k < tiles * tiles; k++)
             if (terrimpi_cache_shows(p, tree->chunk_quads,
                                      x + k % tiles * (tree->field.width - 1u),
                                      z + k / tiles * (tree->field.depth - 1u), cols, rows))
-                terrimpi_view_forget(view, p);
+                terrimpi_jobs_forget(&view->cache, &view->jobs, p);
     return TERRIMP_OK;
 }
 
@@ -11239,9 +11372,9 @@ TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node)
     view->lost = view->capturing;
     if (view->capturing)
         return TERRIMP_OK;
-    terrimpi_view_cancel(view);
+    terrimpi_jobs_cancel(&view->cache, &view->jobs);
     view->outdated = 1;
-    terrimpi_view_lose(view);
+    terrimpi_jobs_lose(&view->cache, &view->jobs);
     return TERRIMP_OK;
 }
 
@@ -11297,52 +11430,54 @@ static void terrimpi_view_add_ground(terrimp_geomip_view *ground, terrimpi_mip_f
 
 /* Makes a region of the nodes [at, end) in sight, of which the first is in one of the cuts. What is
    in sight has ground. With too many impostors it has none. */
-static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_frame *mip)
+static void terrimpi_regions_add(const terrimpi_frame *f, const terrimpi_cull_node *nodes,
+                                 uint32_t at, terrimp_geomip_view *ground,
+                                 terrimpi_mip_frame *mip, terrimpi_regions *regions)
 {
-    const terrimp_quadtree *tree = &v->terrain->tree;
-    const terrimpi_cull_node *nodes = v->cull.nodes;
-    terrimpi_region *region = &v->regions[v->region_count];
-    uint32_t first = v->candidate_count, i, end;
+    terrimpi_region *region = &regions->items[regions->count];
+    uint32_t first = regions->candidate_count, i, end;
     memset(region, 0, sizeof *region);
     region->node = nodes[at].number;
     region->closest = nodes[at].closest;
-    region->first_ground = v->ground.draws_needed;
-    region->first_candidate = first;
+    region->first_ground = ground->draws_needed;
+    region->candidates = regions->candidates + first;
     for (i = at, end = nodes[at].end; i < end; i++) {
-        terrimp_node node = terrimpi_tree_node(tree, nodes[i].number);
+        terrimp_node node = terrimpi_tree_node(&f->terrain->tree, nodes[i].number);
         if (nodes[i].cuts & TERRIMPI_CULL_GROUND)
-            terrimpi_view_add_ground(&v->ground, mip, &node);
+            terrimpi_view_add_ground(ground, mip, &node);
         if (!(nodes[i].cuts & TERRIMPI_CULL_IMPOSTOR))
             continue;
-        if (v->candidate_count < v->desc.max_impostors) {
-            terrimpi_candidate *c = &v->candidates[v->candidate_count];
+        if (regions->candidate_count < f->desc->max_impostors) {
+            terrimpi_candidate *c = &regions->candidates[regions->candidate_count];
             memset(c, 0, sizeof *c);
             c->node = node;
             c->closest = nodes[i].closest;
             c->is_short = (nodes[i].cuts & TERRIMPI_CULL_SHORT) != 0;
         }
-        v->candidate_count++;
+        regions->candidate_count++;
     }
-    region->ground_count = v->ground.draws_needed - region->first_ground;
-    if (region->ground_count == 0 || v->candidate_count > v->desc.max_impostors)
-        v->candidate_count = first;
-    region->candidate_count = (uint16_t)(v->candidate_count - first);
-    v->region_count += region->ground_count > 0 ? 1u : 0u;
+    region->ground_count = ground->draws_needed - region->first_ground;
+    if (region->ground_count == 0 || regions->candidate_count > f->desc->max_impostors)
+        regions->candidate_count = first;
+    region->candidate_count = (uint16_t)(regions->candidate_count - first);
+    regions->count += region->ground_count > 0 ? 1u : 0u;
 }
 
-static void terrimpi_view_make_regions(terrimp_view *v, terrimpi_mip_frame *mip)
+static void terrimpi_regions_make(const terrimpi_frame *f, const terrimpi_cull *cull,
+                                  terrimp_geomip_view *ground, terrimpi_mip_frame *mip,
+                                  terrimpi_regions *regions)
 {
     uint32_t i = 0;
-    v->region_count = v->candidate_count = 0;
-    v->ground.draws_needed = v->ground.triangle_count = 0;
-    while (i < v->cull.count)
-        if (v->cull.nodes[i].cuts) {
-            terrimpi_view_add_region(v, i, mip);
-            i = v->cull.nodes[i].end;
+    regions->count = regions->candidate_count = 0;
+    ground->draws_needed = ground->triangle_count = 0;
+    while (i < cull->count)
+        if (cull->nodes[i].cuts) {
+            terrimpi_regions_add(f, cull->nodes, i, ground, mip, regions);
+            i = cull->nodes[i].end;
         } else {
             i++;
         }
-    v->ground.draw_count = v->ground.draws_needed;
+    ground->draw_count = ground->draws_needed;
 }
 
 /* Finds what is in sight and makes both cuts through it; where max_ground is too small, at a larger
@@ -11361,7 +11496,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     } else if (terrimpi_view_full(&v->desc)) {
         if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
             return TERRIMP_E_CAPACITY;
-        terrimpi_view_make_regions(v, NULL);
+        terrimpi_regions_make(f, &v->cull, &v->ground, NULL, &v->regions);
         return TERRIMP_OK;
     }
     for (;;) {
@@ -11379,7 +11514,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
             return TERRIMP_E_CAPACITY;
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
-    terrimpi_view_make_regions(v, mip.whole < 0.0f && v->late == 0 ? NULL : &mip);
+    terrimpi_regions_make(f, &v->cull, &v->ground,
+                          mip.whole < 0.0f && v->late == 0 ? NULL : &mip, &v->regions);
     if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
         float ahead[3];
         for (i = 0; i < 3u; i++)
@@ -11442,14 +11578,14 @@ static int terrimpi_candidate_ready(const terrimpi_candidate *c)
 /* Fills in a region's candidates and the pixels that they cover. Both kinds shade the same ones:
    what that costs alike is left out, or it would hide how much dearer the rest of one is. */
 static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cache *cache,
-                                    terrimpi_candidate *candidates, terrimpi_region *region)
+                                    terrimpi_region *region)
 {
     uint32_t i;
     region->fits = region->candidate_count > 0;
     region->pixels = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++) {
-        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &candidates[i]);
-        region->pixels += candidates[i].pixels;
+        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &region->candidates[i]);
+        region->pixels += region->candidates[i].pixels;
     }
 }
 
@@ -11468,7 +11604,7 @@ static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi
                                            terrimpi_region_offer *offer)
 {
     const terrimp_costs *costs = &v->desc.costs;
-    const terrimpi_candidate *c = &v->candidates[region->first_candidate];
+    const terrimpi_candidate *c = region->candidates;
     uint32_t i;
     offer->draw = offer->upkeep = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++, c++) {
@@ -11479,77 +11615,82 @@ static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi
     return region->fits;
 }
 
-static int terrimpi_view_ground_ready(const terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_ground_ready(const terrimpi_region *region)
 {
-    (void)v;
     (void)region;
     return 1;
 }
 
-static int terrimpi_view_impostor_ready(const terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_impostor_ready(const terrimpi_region *region)
 {
     uint32_t i;
     for (i = 0; i < region->candidate_count; i++)
-        if (!terrimpi_candidate_ready(&v->candidates[region->first_candidate + i]))
+        if (!terrimpi_candidate_ready(&region->candidates[i]))
             return 0;
     return 1;
 }
 
 /* ---- the draw list ---- */
 
-static void terrimpi_view_add(terrimp_view *v, int kind, uint32_t index)
+static void terrimpi_view_add(terrimpi_view_draws *list, int kind, uint32_t index)
 {
-    terrimpi_view_draw *draw = &v->draws[v->draw_count++];
+    terrimpi_view_draw *draw = &list->items[list->count++];
     draw->kind = kind;
     draw->index = index;
     draw->alpha = 1.0f;
 }
 
-static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_ground_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                                     const terrimpi_region *region, terrimpi_view_draws *list)
 {
     uint32_t i;
+    (void)f;
+    (void)cache;
     for (i = 0; i < region->ground_count; i++)
-        terrimpi_view_add(v, TERRIMPI_VIEW_KIND_GROUND, region->first_ground + i);
+        terrimpi_view_add(list, TERRIMPI_VIEW_KIND_GROUND, region->first_ground + i);
     return 1;
 }
 
 /* Lists a node's impostor, once, if it has a picture that is good. One that is drawn for several
    regions does not fade. */
-static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
+static int terrimpi_view_impostor_add(const terrimpi_frame *f, terrimpi_cache *cache,
+                                      const terrimp_node *node, terrimpi_view_draws *list)
 {
-    terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    const terrimp_quadtree *tree = &v->terrain->tree;
+    terrimpi_cache_picture *p = terrimpi_cache_find(cache, node->number);
+    const terrimp_quadtree *tree = &f->terrain->tree;
     if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
         return 0;
-    if (p->listed == v->frame.number) {
-        v->draws[p->draw].alpha = 1.0f;
+    if (p->listed == f->number) {
+        list->items[p->draw].alpha = 1.0f;
         return 1;
     }
-    terrimpi_view_judge(&v->frame, p);
+    terrimpi_view_judge(f, p);
     if (p->layers_now == 0 || p->urgency > TERRIMPI_VIEW_STALE)
         return 0;
-    p->listed = p->seen = v->frame.number;
-    p->draw = v->draw_count;
-    terrimpi_view_add(v, TERRIMPI_VIEW_KIND_IMPOSTOR, (uint32_t)(p - v->cache.pictures));
+    p->listed = p->seen = f->number;
+    p->draw = list->count;
+    terrimpi_view_add(list, TERRIMPI_VIEW_KIND_IMPOSTOR, (uint32_t)(p - cache->pictures));
     return 1;
 }
 
 /* Lists the impostors of a node's children; all or none of them has a picture. */
-static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_node *node)
+static int terrimpi_view_impostor_add_children(const terrimpi_frame *f, terrimpi_cache *cache,
+                                               const terrimp_node *node,
+                                               terrimpi_view_draws *list)
 {
     terrimp_node children[4];
     uint32_t i, count;
     if (node->level == 0)
         return 0;
-    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.eye, children);
+    count = terrimpi_tree_children(&f->terrain->tree, node, f->eye, children);
     for (i = 0; i < count; i++) {
-        const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
+        const terrimpi_cache_picture *p = terrimpi_cache_find(cache, children[i].number);
         if (!p || p->layer_count == 0 ||
-            !terrimpi_tree_opens(&v->terrain->tree, children[i].number))
+            !terrimpi_tree_opens(&f->terrain->tree, children[i].number))
             return 0;
     }
     for (i = 0; i < count; i++)
-        if (!terrimpi_view_impostor_add(v, &children[i]))
+        if (!terrimpi_view_impostor_add(f, cache, &children[i], list))
             return 0;
     return 1;
 }
@@ -11557,24 +11698,25 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
 /* Lists a candidate, or in its place what shows the same: its children, of which it was put
    together, or its parents, of which it is a part; but these show more than the region, which in
    painter's order would cover what is before it. Returns 0 when there is no picture. */
-static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
+static int terrimpi_candidate_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                                   const terrimpi_candidate *c, terrimpi_view_draws *list)
 {
-    const terrimp_quadtree *tree = &v->terrain->tree;
+    const terrimp_quadtree *tree = &f->terrain->tree;
     terrimp_node node = c->node;
     uint32_t up;
-    if (terrimpi_view_impostor_add(v, &node))
+    if (terrimpi_view_impostor_add(f, cache, &node, list))
         return 1;
-    v->stats.waiting++;
-    if (terrimpi_view_impostors(&v->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
+    list->waiting++;
+    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
         return 0;
-    if (terrimpi_view_impostor_add_children(v, &node))
+    if (terrimpi_view_impostor_add_children(f, cache, &node, list))
         return 1;
-    for (up = v->desc.sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
+    for (up = f->desc->sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
-        terrimpi_terrain_node_box(v->terrain, &node, &box);
-        if (terrimpi_view_distance(&v->frame, &box) >= v->desc.fade_start &&
-            terrimpi_view_impostor_add(v, &node))
+        terrimpi_terrain_node_box(f->terrain, &node, &box);
+        if (terrimpi_view_distance(f, &box) >= f->desc->fade_start &&
+            terrimpi_view_impostor_add(f, cache, &node, list))
             return 1;
     }
     return 0;
@@ -11582,21 +11724,23 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
 
 /* Lists a region's impostors, and in the fade band its ground, over which they appear; or nothing,
    when one of them has no picture. */
-static int terrimpi_view_impostor_list(terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_impostor_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                                       const terrimpi_region *region, terrimpi_view_draws *list)
 {
-    float band = v->desc.fade_end - v->desc.fade_start;
-    uint32_t before = v->draw_count, i;
+    float band = f->desc->fade_end - f->desc->fade_start;
+    uint32_t before = list->count, i;
     int covered = 1;
     for (i = 0; i < region->candidate_count; i++)
-        covered &= terrimpi_candidate_list(v, &v->candidates[region->first_candidate + i]);
+        covered &= terrimpi_candidate_list(f, cache, &region->candidates[i], list);
     if (!covered) {
-        while (v->draw_count > before)
-            v->cache.pictures[v->draws[--v->draw_count].index].listed = 0;
+        while (list->count > before)
+            cache->pictures[list->items[--list->count].index].listed = 0;
         return 0;
     }
-    for (i = before; i < v->draw_count; i++)
-        v->draws[i].alpha = terrimpi_min(1.0f, (region->closest - v->desc.fade_start) / band);
-    return region->closest >= v->desc.fade_end || terrimpi_view_ground_list(v, region);
+    for (i = before; i < list->count; i++)
+        list->items[i].alpha = terrimpi_min(1.0f, (region->closest - f->desc->fade_start) / band);
+    return region->closest >= f->desc->fade_end ||
+           terrimpi_view_ground_list(f, cache, region, list);
 }
 
 /* ---- the commands ---- */
@@ -11614,12 +11758,12 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
                                       const terrimp_callbacks *callbacks)
 {
     const terrimp_geomip_draw *ground = &v->ground.draws[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &ground->node);
+    terrimp_node place;
     terrimp_ground_command command;
     terrimp_pattern pattern;
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &ground->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &ground->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11636,14 +11780,14 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
                                         const terrimp_callbacks *callbacks)
 {
     terrimpi_cache_picture *picture = &v->cache.pictures[draw->index];
-    terrimp_node place = terrimpi_real_place(v->terrain, &picture->node);
+    terrimp_node place;
     terrimp_impostor_command command;
     terrimp_mesh_info mesh;
     float eye[3];
     uint32_t k, layer;
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
-    terrimpi_tile_offset(v->terrain, &picture->node, v->frame.middle, command.offset);
+    place = terrimpi_real_place(v->terrain, &picture->node, v->frame.middle, command.offset);
     command.node = place.number;
     command.level = place.level;
     command.x = place.x;
@@ -11669,7 +11813,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
         if (v->cache.places) {
             memcpy(command.place_matrix, v->cache.places[draw->index].matrix[layer],
                    sizeof command.place_matrix);
-            terrimpi_impostor_place_from(command.place_matrix, eye, v->frame.camera.eye);
+            v->cache.exact->from(command.place_matrix, eye, v->frame.camera.eye);
         }
         callbacks->draw_impostor(callbacks->user, &command);
     }
@@ -11690,7 +11834,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
                                               v->built->tree.level_x[0], draw->index / tiles *
                                               v->built->tree.level_z[0]);
-        terrimpi_tile_offset(v->terrain, &first, v->frame.middle, command.offset);
+        terrimpi_real_place(v->terrain, &first, v->frame.middle, command.offset);
     }
     callbacks->draw_floor(callbacks->user, &command);
 }
@@ -11701,9 +11845,10 @@ typedef struct terrimpi_view_kind {
     int (*estimate)(const terrimp_view *v, const terrimpi_region *region,
                     terrimpi_region_offer *offer);
     /* Whether it can do so in this frame, before captures. */
-    int (*ready)(const terrimp_view *v, const terrimpi_region *region);
+    int (*ready)(const terrimpi_region *region);
     /* Puts its draws on the list; returns 0 when it is not ready: then the kind before it does. */
-    int (*list)(terrimp_view *v, const terrimpi_region *region);
+    int (*list)(const terrimpi_frame *f, terrimpi_cache *cache, const terrimpi_region *region,
+                terrimpi_view_draws *list);
     void (*emit)(const terrimp_view *v, const terrimpi_view_draw *draw,
                  const terrimp_callbacks *callbacks);
 } terrimpi_view_kind;
@@ -11733,7 +11878,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
     int is_known = 1;
-    terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
+    terrimpi_region_measure(&v->frame, &v->cache, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
         total[kind] = offers[kind].draw + offers[kind].upkeep;
@@ -11747,14 +11892,14 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = (uint8_t)best;
     for (i = 0; i < region->candidate_count; i++)
-        is_known &= v->candidates[region->first_candidate + i].is_known &&
-                    !v->candidates[region->first_candidate + i].is_short;
+        is_known &= region->candidates[i].is_known &&
+                    !region->candidates[i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
         v->kind_of[region->node] = (uint8_t)best;
     sums->spread += offers[best].upkeep;
-    sums->drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
+    sums->drawn += offers[terrimpi_view_kinds[best].ready(region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
-        const terrimpi_candidate *c = &v->candidates[region->first_candidate + i];
+        const terrimpi_candidate *c = &region->candidates[i];
         sums->pixels += c->pixels;
         if (c->picture)
             c->picture->seen = v->frame.number;
@@ -11870,6 +12015,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         return 0;
     plan->node = c->node;
     plan->layer_count = 1;
+    plan->limit = f->desc->cost_limit;
     terrimpi_terrain_node_box(f->terrain, &c->node, &plan->box);
     terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, plan->eye);
     memcpy(origin, plan->eye, sizeof origin);
@@ -11899,7 +12045,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->cost = terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
                                       (float)job->triangles);
     room = terrimpi_spending_room(f, room, job);
-    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
+    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->jobs.open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -11935,7 +12081,7 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
         const terrimpi_capture_draw *draw = &v->capture_draws[job->to / rows];
         uint32_t count = rows - job->to % rows;
         if (used + draw->triangle_count * count / rows > triangles) {
-            if (v->desc.max_cost > 0.0f && draw->first_index == 0)
+            if (v->desc.max_cost > 0.0f && job->plan.limit && draw->first_index == 0)
                 count = (terrimpi_max_u32(triangles, used) - used) * rows / draw->triangle_count;
             else if (used > 0)
                 break;
@@ -11963,18 +12109,19 @@ static int terrimpi_candidate_after(const void *candidates, uint32_t a, uint32_t
 
 /* Lists what could be captured, most urgent first; each rank by the error on the screen times the
    pixels that show it. Returns how many. */
-static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
+static uint32_t terrimpi_regions_queue(const terrimpi_frame *f, const terrimpi_job *begun,
+                                       terrimpi_regions *regions)
 {
-    uint32_t r, i, count = 0;
-    for (r = 0; r < v->region_count; r++)
-        for (i = 0; i < v->regions[r].candidate_count; i++) {
-            uint32_t index = v->regions[r].first_candidate + i;
-            terrimpi_candidate *c = &v->candidates[index];
+    uint32_t i, count = 0;
+    const terrimpi_region *r;
+    for (r = regions->items; r < regions->items + regions->count; r++)
+        for (i = 0; i < r->candidate_count; i++) {
+            terrimpi_candidate *c = &r->candidates[i];
             float weight = terrimpi_max(c->pixels / (1.0f + c->pixels), 1e-3f) + c->pixels;
-            if (v->regions[r].kind != TERRIMPI_VIEW_KIND_IMPOSTOR ||
-                (v->open && v->jobs[0].plan.node.number == c->node.number) ||
+            if (r->kind != TERRIMPI_VIEW_KIND_IMPOSTOR ||
+                (begun && begun->plan.node.number == c->node.number) ||
                 (c->urgency < 1.0f &&
-                 (v->desc.no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
+                 (f->desc->no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
                 continue;
             c->rank = !terrimpi_candidate_ready(c) ? TERRIMPI_JOB_RANK_MISSING
                       : c->urgency >= 1.0f         ? TERRIMPI_JOB_RANK_DUE
@@ -11982,10 +12129,10 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
             c->weight = c->rank == TERRIMPI_JOB_RANK_MISSING
                             ? weight
                             : weight * terrimpi_max(terrimpi_min(c->urgency, 2.0f),
-                                                    terrimpi_view_age(&v->frame, c->picture));
-            v->queue[count++] = index;
+                                                    terrimpi_view_age(f, c->picture));
+            regions->queue[count++] = (uint32_t)(c - regions->candidates);
         }
-    terrimpi_sort(v->queue, count, v->candidates, terrimpi_candidate_after);
+    terrimpi_sort(regions->queue, count, regions->candidates, terrimpi_candidate_after);
     return count;
 }
 
@@ -12047,9 +12194,9 @@ static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
 {
     const terrimp_view_desc *d = &v->desc;
-    terrimpi_job *job = &v->jobs[v->job_count];
+    terrimpi_job *job = &v->jobs.items[v->jobs.count];
     uint32_t room = terrimpi_spending_left(&v->frame, s), triangles;
-    if (v->job_count == d->max_captures ||
+    if (v->jobs.count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
@@ -12062,15 +12209,15 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
     room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
          s->texels + job->texels > d->max_capture_texels) ||
-        (job->triangles > room && v->open)) {
+        (job->triangles > room && v->jobs.open)) {
         terrimpi_job_cancel(&v->cache, job);
         return 0;
     }
-    v->job_count++;
+    v->jobs.count++;
     triangles = job->triangles;
     if (triangles > room && job->in_pieces) {
         triangles = terrimpi_job_cut(v, room, job);
-        v->open = job->to < job->end ? v->job_count : 0u;
+        v->jobs.open = job->to < job->end ? v->jobs.count : 0u;
     }
     terrimpi_spending_add(&v->frame, job, triangles, s);
     return 1;
@@ -12079,7 +12226,7 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
 /* Makes the next piece of the picture that has been begun, unless it has become useless. */
 static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
-    terrimpi_job *job = &v->jobs[0];
+    terrimpi_job *job = &v->jobs.items[0];
     float angle, parallax;
     uint32_t count, room;
     int has_pages;
@@ -12091,10 +12238,10 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
         terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
-        v->open = 0;
+        v->jobs.open = 0;
         return;
     }
-    v->job_count = 1;
+    v->jobs.count = 1;
     job->picture->seen = v->frame.number;
     room = terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job);
     terrimpi_spending_add(&v->frame, job, terrimpi_job_cut(v, room, job), s);
@@ -12112,25 +12259,26 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     if (v->desc.max_cost > 0.0f)
         s.allowance = terrimpi_clamp(v->desc.max_cost - drawn, 0.0f, s.allowance);
     s.spread = spread;
-    if (v->open)
+    if (v->jobs.open)
         terrimpi_view_continue(v, &s);
-    count = terrimpi_view_fill_queue(v);
+    count = terrimpi_regions_queue(&v->frame, v->jobs.open ? v->jobs.items : NULL, &v->regions);
     for (i = 0; i < count; i++) {
-        const terrimpi_candidate *c = &v->candidates[v->queue[i]];
+        const terrimpi_candidate *c = &v->regions.candidates[v->regions.queue[i]];
         int is_due = c->urgency >= 1.0f;
         int taken = terrimpi_view_take(v, c, &s);
         due += is_due ? 1u : 0u;
         put_off += is_due && !taken ? 1u : 0u;
     }
-    for (i = 0; i < v->job_count; i++) {
-        v->stats.captures += v->jobs[i].plan.layer_count;
-        v->stats.splits += v->jobs[i].plan.layer_count - 1u;
+    for (i = 0; i < v->jobs.count; i++) {
+        v->stats.captures += v->jobs.items[i].plan.layer_count;
+        v->stats.splits += v->jobs.items[i].plan.layer_count - 1u;
     }
     v->stats.cost = drawn + s.cost;
     v->stats.captured_texels = s.texels;
     v->stats.captured_triangles = s.triangles;
     v->stats.captures_due = due;
     v->stats.hidden = v->cull.hidden_count;
+    v->stats.late = v->late;
     v->stats.shortfall = due ? (float)put_off / (float)due : 0.0f;
 }
 
@@ -12139,80 +12287,22 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_view_list(terrimp_view *v)
 {
-    uint32_t i, impostors = 0;
-    v->draw_count = 0;
-    for (i = 0; i < v->region_count; i++) {
-        int kind = v->regions[i].kind;
-        while (!terrimpi_view_kinds[kind].list(v, &v->regions[i]))
+    terrimpi_view_draws *list = &v->draws;
+    uint32_t i;
+    memset(list->kind_count, 0, sizeof list->kind_count);
+    list->count = list->waiting = 0;
+    for (i = 0; i < v->regions.count; i++) {
+        int kind = v->regions.items[i].kind;
+        while (!terrimpi_view_kinds[kind].list(&v->frame, &v->cache, &v->regions.items[i], list))
             kind--;
     }
-    for (i = 0; i < v->draw_count; i++)
-        impostors += v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR ? 1u : 0u;
-    if ((impostors > 0 || (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
+    for (i = 0; i < list->count; i++)
+        list->kind_count[list->items[i].kind]++;
+    if ((list->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
+         (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
-            terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
-}
-
-/* What a draw adds to the statistics. */
-static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
-                                     terrimp_stats *s)
-{
-    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
-        terrimp_pattern pattern;
-        terrimpi_view_ground_pattern(v, draw->index, &pattern);
-        s->ground++;
-        s->draws++;
-        s->triangles += pattern.triangle_count;
-    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
-        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
-        terrimp_mesh_info mesh;
-        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
-        s->impostors++;
-        s->impostors_by_level[p->node.level]++;
-        s->draws += p->layers_now;
-        s->triangles += mesh.index_count / 3u * p->layers_now;
-        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
-        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
-    } else {
-        s->draws++;
-        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
-    }
-}
-
-/* The rest of the statistics. */
-static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
-{
-    const terrimp_camera *c = &v->frame.camera;
-    float tan_x, tan_y, first, last;
-    uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        terrimpi_view_count_draw(v, &v->draws[i], s);
-    s->visible = v->region_count;
-    s->late = v->late;
-    s->evictions = v->cache.evictions;
-    s->atlas_failures = v->cache.failures;
-    for (i = 0; i < v->region_count; i++) {
-        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
-        terrimp_box box;
-        terrimpi_terrain_node_box(v->terrain, &node, &box);
-        first = v->regions[i].closest;
-        last = terrimp_box_farthest(&box, c->eye);
-        if (c->orthographic) {
-            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
-            first -= c->reach;
-        }
-        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
-        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
-    }
-    /* A point at that distance in the corner of the screen has the smallest depth. */
-    terrimpi_camera_tangents(c, &tan_x, &tan_y);
-    if (!c->orthographic)
-        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
-    for (i = 0; i < v->desc.atlas_count; i++)
-        s->texels_used += v->cache.atlases[i].texels_used;
-    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
-                     s->texels_used;
+            terrimpi_view_add(list, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
 /* The next frame for a camera. It follows the eye's motion; a jump is none. */
@@ -12262,8 +12352,8 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
             terrimp_view_invalidate(v); /* no picture is of use to a camera of the other kind */
         v->frame = *f;
         memset(sums, 0, sizeof *sums);
-        for (i = 0; i < v->region_count; i++)
-            terrimpi_view_decide(v, &v->regions[i], sums);
+        for (i = 0; i < v->regions.count; i++)
+            terrimpi_view_decide(v, &v->regions.items[i], sums);
         v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
@@ -12281,12 +12371,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
     float reuse, middle[2] = {0.0f, 0.0f};
-    int32_t went[2] = {0, 0};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
-    terrimpi_tiled_enter(view, &resolved, middle, went);
-    if (went[0] || went[1])
-        terrimpi_tiled_move(view, went[0], went[1]);
+    if (view->tiled)
+        view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
     if (view->terrain->tree.pages) {
@@ -12299,7 +12387,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
-    terrimpi_view_cancel(view);
+    terrimpi_jobs_cancel(&view->cache, &view->jobs);
     reuse = view->stats.reuse; /* goes on */
     memset(&view->stats, 0, sizeof view->stats);
     view->stats.reuse = reuse;
@@ -12308,7 +12396,6 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
     terrimpi_view_list(view);
-    terrimpi_view_count_frame(view, &view->stats);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
@@ -12343,26 +12430,20 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
                                          p->texture_matrix[i]);
         camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
         if (v->cache.places)
-            terrimpi_impostor_place_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                           v->cache.places[p - v->cache.pictures].matrix[i]);
+            v->cache.exact->make(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
+                                 v->cache.places[p - v->cache.pictures].matrix[i]);
     }
 }
 
 /* Lists the frame without the pictures that could not be made. */
 static void terrimpi_view_list_again(terrimp_view *v)
 {
-    terrimp_stats *s = &v->stats;
     uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
-            v->cache.pictures[v->draws[i].index].listed = 0;
-    terrimpi_view_lose(v);
-    memset(s->impostors_by_level, 0, sizeof s->impostors_by_level);
-    s->ground = s->impostors = s->waiting = s->draws = s->triangles = 0;
-    s->texels_used = 0;
-    s->worst_angle_rad = s->worst_parallax_px = 0.0f;
+    for (i = 0; i < v->draws.count; i++)
+        if (v->draws.items[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+            v->cache.pictures[v->draws.items[i].index].listed = 0;
+    terrimpi_jobs_lose(&v->cache, &v->jobs);
     terrimpi_view_list(v);
-    terrimpi_view_count_frame(v, &v->stats);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -12386,8 +12467,8 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
     if (job->to < job->end)
         return;
     terrimpi_view_finish(v, job);
-    if (v->open && &v->jobs[v->open - 1u] == job)
-        v->open = 0;
+    if (v->jobs.open && &v->jobs.items[v->jobs.open - 1u] == job)
+        v->jobs.open = 0;
 }
 
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
@@ -12397,31 +12478,94 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     int kind;
     TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
-    if ((view->stats.ground + view->job_count > 0 && !callbacks->draw_ground) ||
-        (view->stats.impostors > 0 && !callbacks->draw_impostor) ||
-        (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
+    if ((view->draws.kind_count[TERRIMPI_VIEW_KIND_GROUND] + view->jobs.count > 0 &&
+         !callbacks->draw_ground) ||
+        (view->draws.kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 && !callbacks->draw_impostor) ||
+        (view->jobs.count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
     view->capturing = 1;
-    for (i = 0; i < view->job_count; i++)
-        terrimpi_view_capture(view, &view->jobs[i], callbacks);
-    view->job_count = 0;
+    for (i = 0; i < view->jobs.count; i++)
+        terrimpi_view_capture(view, &view->jobs.items[i], callbacks);
+    view->jobs.count = 0;
     if (view->lost)
         terrimpi_view_list_again(view);
     view->capturing = view->lost = 0;
-    for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
-        terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
+    for (i = view->desc.sorted ? view->draws.count : 0u; i-- > 0;)
+        terrimpi_view_kinds[view->draws.items[i].kind].emit(view, &view->draws.items[i], callbacks);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
-        for (i = 0; i < view->draw_count; i++)
-            if (view->draws[i].kind == kind)
-                terrimpi_view_kinds[kind].emit(view, &view->draws[i], callbacks);
+        for (i = 0; i < view->draws.count; i++)
+            if (view->draws.items[i].kind == kind)
+                terrimpi_view_kinds[kind].emit(view, &view->draws.items[i], callbacks);
     return TERRIMP_OK;
+}
+
+/* What a draw adds to the statistics. */
+static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_draw *draw,
+                                     terrimp_stats *s)
+{
+    if (draw->kind == TERRIMPI_VIEW_KIND_GROUND) {
+        terrimp_pattern pattern;
+        terrimpi_view_ground_pattern(v, draw->index, &pattern);
+        s->draws++;
+        s->triangles += pattern.triangle_count;
+    } else if (draw->kind == TERRIMPI_VIEW_KIND_IMPOSTOR) {
+        const terrimpi_cache_picture *p = &v->cache.pictures[draw->index];
+        terrimp_mesh_info mesh;
+        terrimpi_mesh_place(v->terrain, p->node.number, &mesh);
+        s->impostors_by_level[p->node.level]++;
+        s->draws += p->layers_now;
+        s->triangles += mesh.index_count / 3u * p->layers_now;
+        s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
+        s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
+    } else {
+        s->draws++;
+        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
+    }
+}
+
+/* The statistics that the frame itself has no use for. */
+static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
+{
+    const terrimp_camera *c = &v->frame.camera;
+    float tan_x, tan_y, first, last;
+    uint32_t i;
+    for (i = 0; i < v->draws.count; i++)
+        terrimpi_view_count_draw(v, &v->draws.items[i], s);
+    s->ground = v->draws.kind_count[TERRIMPI_VIEW_KIND_GROUND];
+    s->impostors = v->draws.kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR];
+    s->visible = v->regions.count;
+    s->waiting = v->draws.waiting;
+    s->evictions = v->cache.evictions;
+    s->atlas_failures = v->cache.failures;
+    for (i = 0; i < v->regions.count; i++) {
+        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions.items[i].node);
+        terrimp_box box;
+        terrimpi_terrain_node_box(v->terrain, &node, &box);
+        first = v->regions.items[i].closest;
+        last = terrimp_box_farthest(&box, c->eye);
+        if (c->orthographic) {
+            terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);
+            first -= c->reach;
+        }
+        s->z_near = i == 0 ? first : terrimpi_min(s->z_near, first);
+        s->z_far = i == 0 ? last + c->reach : terrimpi_max(s->z_far, last + c->reach);
+    }
+    /* A point at that distance in the corner of the screen has the smallest depth. */
+    terrimpi_camera_tangents(c, &tan_x, &tan_y);
+    if (!c->orthographic)
+        s->z_near /= TERRIMP_SQRTF(1.0f + tan_x * tan_x + tan_y * tan_y);
+    for (i = 0; i < v->desc.atlas_count; i++)
+        s->texels_used += v->cache.atlases[i].texels_used;
+    s->texels_free = (uint64_t)v->desc.atlas_count * v->desc.atlas_size * v->desc.atlas_size -
+                     s->texels_used;
 }
 
 TERRIMP_API terrimp_result terrimp_view_get_stats(const terrimp_view *view, terrimp_stats *stats)
 {
     TERRIMPI_REFUSE(!view || !stats, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(view->frame.number == 0, TERRIMP_E_STATE);
+    TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
     *stats = view->stats;
+    terrimpi_view_count_frame(view, stats);
     return TERRIMP_OK;
 }
 
@@ -16299,7 +16443,10 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
     float line[TERRIMP_MAX_TILE_DIM];
     terrimp_simplify_desc desc;
     terrimpi_simp_last_spacing squeeze;
-    int side, even = (p->span_x | p->span_z) % (1u << p->level) == 0;
+    int side;
+    squeeze.step = 1 << (p->level + p->coarse);
+    squeeze.last_x = (int32_t)((p->span_x << p->coarse) - p->cut_x);
+    squeeze.last_z = (int32_t)((p->span_z << p->coarse) - p->cut_z);
     desc.heights = build->tile;
     desc.cols = p->cols;
     desc.rows = p->rows;
@@ -16313,10 +16460,9 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
                                              &desc.borders[side].point_count));
         desc.borders[side].points = points[side];
     }
-    squeeze.step = 1 << p->level;
-    squeeze.last_x = (int32_t)p->span_x;
-    squeeze.last_z = (int32_t)p->span_z;
-    return terrimpi_simp_run(&desc, even ? NULL : &squeeze, build->rest, build->rest_bytes, mesh);
+    return terrimpi_simp_run(&desc,
+                             (squeeze.last_x | squeeze.last_z) % squeeze.step ? &squeeze : NULL,
+                             build->rest, build->rest_bytes, mesh);
 }
 
 /* Finds what a mesh misses along a border: for each place of the tile there the largest height of
@@ -16648,7 +16794,7 @@ TERRIMP_API terrimp_result terrimp_simplify_field(const terrimp_heightfield *fie
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_TRY(terrimp_heightfield_read(&f, samples->x, samples->y, samples->width,
                                           samples->height, 1, build.tile));
-    p.level = 0;
+    memset(&p, 0, sizeof p);
     p.x = samples->x;
     p.z = samples->y;
     p.cols = samples->width;
@@ -17327,7 +17473,65 @@ static terrimp_result terrimpi_paging_open(terrimpi_paging *w, uint32_t level,
                                       terrimpi_paging_layout(w, level, r, NULL, &part)));
     terrimpi_paging_layout(w, level, r, (unsigned char *)scratch, &part);
     TERRIMPI_TRY(terrimp_terrain_init(&part, w->part, w->part_bytes, &made));
+    if (level > 0) {
+        made->coarse = level;
+        made->cut_x = ((r->width - 1u) << level) + 1u - w->whole.desc.field.width;
+        made->cut_z = ((r->height - 1u) << level) + 1u - w->whole.desc.field.depth;
+    }
     return terrimp_terrain_build_begin(made);
+}
+
+/* How far the edge along which a finer neighbour cuts its quads across, in the corner that meets a
+   coarser side, is from the ground of the blocks where it crosses their diagonals: from the middle
+   of quad (i, j) of a level towards +x and -z, or the other way. */
+static float terrimpi_paging_across(const terrimp_quadtree *t, uint32_t level, uint32_t i,
+                                    uint32_t j, int on)
+{
+    const terrimp_heightfield *f = &t->field;
+    uint32_t half = 1u << level >> 1, k, x = (i << level) + half, z = (j << level) + half;
+    float from = terrimpi_field_sample(f, x, z), most = 0.0f;
+    float to = terrimpi_field_sample(f, on ? x + half : x - half, on ? z - half : z + half);
+    for (k = 0; k < half; k++) {
+        uint32_t a = on ? x + k : x - k - 1u, b = on ? z - k - 1u : z + k;
+        float middle = 0.5f * (terrimpi_field_sample(f, a, b) +
+                               terrimpi_field_sample(f, a + 1u, b + 1u));
+        float line = from + (to - from) * (((float)k + 0.5f) / (float)half);
+        most = terrimpi_max(most, terrimpi_abs(line - middle));
+    }
+    return most;
+}
+
+/* How far the ground of a node above the blocks, and what is drawn up to it, is from the blocks'
+   own at most, between the samples that both are made of. Two surfaces of triangles are farthest
+   apart at a vertex or where edges cross. Edges cross between samples when a neighbour cuts its
+   quads across; and in quads that are cut off at the far edge, where both stay within the range of
+   the samples. */
+static terrimp_result terrimpi_paging_between(const terrimpi_paging *w, const terrimp_node *n,
+                                              float *most)
+{
+    const terrimp_quadtree *t = &w->part->tree, *whole = &w->whole.tree;
+    uint32_t level = n->level, all = w->level + level, quads = t->chunk_quads, size = 1u << level;
+    uint32_t x = n->x * quads, z = n->z * quads, i, j;
+    for (j = z - (z > 0); j <= z + quads; j++)
+        for (i = x - (x > 0); i <= x + quads; i++) {
+            uint32_t wide = terrimpi_tree_col(whole, all, i + 1u);
+            uint32_t deep = terrimpi_tree_row(whole, all, j + 1u);
+            float low, high;
+            wide -= terrimpi_tree_col(whole, all, i);
+            deep -= terrimpi_tree_row(whole, all, j);
+            if (wide == 0 || deep == 0)
+                continue;
+            if (terrimpi_min_u32(wide, deep) >> all == 0) {
+                TERRIMPI_TRY(terrimpi_field_range(&t->field,
+                                                  terrimpi_rect(i << level, j << level, size + 1u,
+                                                                size + 1u), 0, &low, &high));
+                *most = terrimpi_max(*most, high - low);
+            } else if ((i < x || i == x + quads) != (j < z || j == z + quads)) {
+                int on = i < x || j == z + quads;
+                *most = terrimpi_max(*most, terrimpi_paging_across(t, level, i, j, on));
+            }
+        }
+    return TERRIMP_OK;
 }
 
 /* Builds a node of the part and makes it hold those below it. */
@@ -17337,20 +17541,26 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     terrimp_geomip_node *ground = &t->tree.nodes[n->number];
     terrimpi_mesh *mesh = &t->meshes[n->number];
     float *missed = w->missed + n->number, *squares = w->squares + n->number, count = 0.0f;
-    terrimp_node child;
+    float around = 0.0f; /* what the blocks miss in the node and where neighbours meet it */
+    terrimp_node child, beyond;
     uint32_t i;
+    int side;
     TERRIMPI_TRY(terrimp_terrain_build_node(t, n->number, w->scratch, w->scratch_bytes));
     w->held[n->number] = *missed = *squares = 0.0f;
-    for (i = 0; i < 4u; i++) {
+    for (i = 0; i < 4u && w->level > 0; i++) {
         if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
         *missed = terrimpi_max(*missed, w->missed[child.number]);
         *squares += w->squares[child.number];
         count += 1.0f;
+        for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++)
+            if (terrimpi_tree_beyond(&t->tree, &child, side, &beyond))
+                around = terrimpi_max(around, w->missed[beyond.number]);
     }
     if (w->level > 0) {
         *squares /= count;
-        ground->error += *missed;
+        TERRIMPI_TRY(terrimpi_paging_between(w, n, &ground->error));
+        ground->error += terrimpi_max(*missed, around);
         ground->rms = TERRIMP_SQRTF(ground->rms * ground->rms + *squares);
         mesh->error += *missed;
         mesh->error_rms = TERRIMP_SQRTF(mesh->error_rms * mesh->error_rms + *squares);

@@ -58,7 +58,7 @@ View make_view(const Terrain &terrain, int mode)
     terrimp_view *view = nullptr;
     desc.mode = mode;
     desc.atlas_size = atlas_size;
-    desc.exact_depth = 1;
+    desc.exact_depth = terrimp_view_exact_depth();
     check(terrimp_view_create(terrain.get(), &desc, nullptr, &view));
     return View(view);
 }

@@ -175,7 +175,7 @@ int main(int argc, char **argv)
     need_ok(terrimp_terrain_create(&desc, NULL, &terrain));
     need_ok(terrimp_terrain_get_info(terrain, &info));
     settings.atlas_size = ATLAS_SIZE;
-    settings.exact_depth = 1;
+    settings.exact_depth = terrimp_view_exact_depth();
     need_ok(terrimp_view_create(terrain, &settings, NULL, &p.view));
     need(context_open(&p.context, WIDTH, HEIGHT));
     gl.frame = &p.context;

@@ -150,7 +150,7 @@ static void open_graphics(flyover *f)
     desc.field = &f->tour.field;
     desc.lightmap = lightmap;
     desc.atlas_size = f->chosen.desc.atlas_size;
-    desc.exact_depth = f->chosen.desc.exact_depth;
+    desc.exact_depth = f->chosen.desc.exact_depth != NULL;
     trouble = context_open(&f->context, (int)f->options.width, (int)f->options.height);
     if (!trouble)
         trouble = gl_terrain_open(&f->gl, &desc);
@@ -187,7 +187,7 @@ static void open_contender(flyover *f, contender *c, const char *name, int mode)
     desc.no_lookahead = o->no_lookahead;
     desc.no_splits = o->no_splits;
     desc.no_spreading = o->no_spreading;
-    desc.exact_depth = o->exact_depth;
+    desc.exact_depth = o->exact_depth ? terrimp_view_exact_depth() : NULL;
     desc.hider = f->walls && c == &f->chosen ? &f->horizon.hider : NULL;
     c->name = name;
     c->picture = allocate((size_t)o->width * o->height * 3);

@@ -213,7 +213,8 @@ static int opened(const terrimp_terrain *terrain, terrimp_view_desc settings, in
 {
     settings.mode = mode;
     settings.sorted = sorted;
-    settings.exact_depth = !sorted; /* else depth buffer and painter's order would differ */
+    if (!sorted) /* else depth buffer and painter's order would differ */
+        settings.exact_depth = terrimp_view_exact_depth();
     return terrimp_view_create(terrain, &settings, NULL, view) == TERRIMP_OK;
 }
 

@@ -129,7 +129,8 @@ static void check_scene(scene *s)
     int exact, i;
     for (exact = 0; exact < 2; exact++) {
         gl_terrain_close(&s->gl);
-        s->exact_depth = settings.exact_depth = exact;
+        s->exact_depth = exact;
+        settings.exact_depth = exact ? terrimp_view_exact_depth() : NULL;
         scene_fill(s, ATLAS);
         for (i = 0; i < 2; i++) {
             const scene_look *look = &looks[i];

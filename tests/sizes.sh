@@ -58,7 +58,10 @@ machine() # name, prefix, flags, "judged" or ""
     linked "$2" "$object" $draws || exit 1
     row "$1" "run time, a host that opens, updates, renders" $work/part.o "$4"
     largest "$2" $work/part.o
-    needs_no_pages "$1" "$2" $work/part.o
+    has_none_of "$1" "$2" $work/part.o pages '^terrimpi_page_'
+    has_none_of "$1" "$2" $work/part.o "terrain without end" '^terrimpi_tiled_'
+    has_none_of "$1" "$2" $work/part.o "exact depth" '^terrimpi_impostor_place_'
+    has_none_of "$1" "$2" $work/part.o "pieces of nodes" '^terrimpi_capture_draw_rows'
     $compile -DTERRIMP_NO_BUILD $leave_out -o $work/small.o || exit 1
     linked "$2" $work/small.o $draws || exit 1
     row "$1" "without splits, BOUND, morphing" $work/part.o "$4"
@@ -71,12 +74,12 @@ machine() # name, prefix, flags, "judged" or ""
     [ -z "$2" ] || needs_no_float "$1" "$2" $work/part.o
 }
 
-# A host that opens no terrain in pages has no code of the room Residency but to find that out.
-needs_no_pages() # name, prefix, object
+# What a host does not ask for it has no code of; of pages that which finds out that there are none.
+has_none_of() # name, prefix, object, what, the functions of it
 {
-    found=$("$2nm" "$3" | awk '$3 ~ /^terrimpi_page_/ && $3 != "terrimpi_page_of" { print $3 }')
-    [ -n "$found" ] || { echo "    has no code for pages"; return; }
-    echo "    FAILED: the host has code for pages:" $found
+    found=$("$2nm" "$3" | awk -v of="$5" '$3 ~ of && $3 != "terrimpi_page_of" { print $3 }')
+    [ -n "$found" ] || { echo "    has no code for $4"; return; }
+    echo "    FAILED: the host has code for $4:" $found
     failed=1
 }
 

@@ -104,7 +104,7 @@ static uint32_t numbers_flight(const terrimp_terrain *t, int mode, float unit, u
     memset(&d, 0, sizeof d);
     d.mode = mode;
     d.costs.capture = 100.0f;
-    d.exact_depth = 1;
+    d.exact_depth = terrimp_view_exact_depth();
     CHECK(terrimp_view_create(t, &d, NULL, &view) == TERRIMP_OK);
     for (frame = 0; frame < 20; frame++) {
         terrimp_camera c;
@@ -160,7 +160,7 @@ static void eyes_at_the_end_of_the_world_get_finite_matrices(void)
     float at;
     memset(&d, 0, sizeof d);
     d.mode = TERRIMP_MODE_IMPOSTOR;
-    d.exact_depth = 1;
+    d.exact_depth = terrimp_view_exact_depth();
     for (at = 1e3f; at < 1e38f; at *= 10.0f) {
         numbers_seen seen;
         terrimp_callbacks all = numbers_callbacks(&seen);

@@ -269,12 +269,61 @@ static void pages_say_what_memory_does(void)
         uint32_t block_level = turn % 3u, chunk = turn % 2u ? 16u : 8u;
         if (turn % 4u == 1u)
             width = depth = 129u;
+        if (turn == 7u) /* above the blocks the last column and row are closer: triangles turn */
+            width = 111u, depth = 20u;
         paged_prepare(&p, width, depth, formats[turn % 4u], turn % 5u ? LAND_HILLS : LAND_NOISE,
                       chunk, block_level);
         if (land_build(&p.l) && paged_build(&p)) {
             if (paged_open(&p, p.l.info.node_count + 8u)) {
                 paged_fetch_all(&p);
                 check_pages_say_the_same(&p, block_level ? block_level : UINT32_MAX);
+            }
+        }
+        paged_free(&p);
+    }
+}
+
+/* Makes ground even between the samples of a level. */
+static void paged_smooth(land *l, const terrimp_quadtree *tree, uint32_t level)
+{
+    terrimpi_mip_ground ground = terrimpi_mip_ground_of(tree);
+    uint32_t x, z;
+    for (z = 0; z < l->desc.field.depth; z++)
+        for (x = 0; x < l->desc.field.width; x++)
+            l->samples[z * l->desc.field.width + x] = terrimpi_mip_height(&ground, level, x, z);
+}
+
+/* Errors above the blocks hold for each sample, as drawn up to borders too: ground that is even
+   between the samples that these levels are made of leaves them what memory finds; quads that are
+   cut off at the far edge, a peak beside a border and one of a sample alone, no less. */
+static void pages_above_blocks_miss_no_sample(void)
+{
+    uint32_t turn, node;
+    for (turn = 0; turn < 12u && check_bad == 0; turn++) {
+        paged_land p;
+        terrimp_quadtree tree;
+        int cut = turn < 4u && turn / 2u % 2u;
+        uint32_t level = turn < 4u ? 1u + turn % 2u : 1u, side = 65u - (cut ? 1u << level : 0u);
+        uint32_t along = 2u + 4u * random_range(0, 11), beside = turn / 2u % 2u ? 30u : 34u;
+        paged_prepare(&p, side, side, TERRIMP_FORMAT_F32, LAND_NOISE, 8, level);
+        CHECK(terrimp_quadtree_init(&p.l.desc.field, 8, &tree) == TERRIMP_OK);
+        if (turn >= 4u)
+            memset(p.l.samples, 0, side * side * sizeof(float));
+        if (turn >= 8u)
+            along++, beside++;
+        if (turn >= 4u) /* or the same, rows for columns */
+            p.l.samples[turn % 2u ? along * side + beside : beside * side + along] = 250.0f;
+        if (cut)
+            paged_smooth(&p.l, &tree, level + 1u);
+        if (turn < 8u)
+            paged_smooth(&p.l, &tree, level);
+        if (land_build(&p.l) && paged_build(&p) && paged_open(&p, p.info.node_count + 8u)) {
+            paged_fetch_all(&p);
+            for (node = tree.level_first[level + 1u]; node < tree.node_count; node++) {
+                float own = terrimpi_tree_kept(&p.opened->tree, node)->error;
+                float memory = terrimpi_tree_kept(&p.l.terrain->tree, node)->error;
+                CHECK(own >= memory * 0.9999f);
+                CHECK(own <= memory * 1.0001f || cut || turn >= 8u);
             }
         }
         paged_free(&p);
@@ -366,7 +415,7 @@ static void pages_are_edited(void)
         header[100] ^= 1u;
         CHECK(terrimp_pages_renew(p.opened, header, sizeof header, &edit) == TERRIMP_E_BAKE);
         root = p.l.info.node_count - 1u;
-        CHECK(terrimp_terrain_touched(p.l.terrain, &edit, 0, NULL, 0, &touched) == TERRIMP_OK);
+        CHECK(terrimp_terrain_touched(p.opened, &edit, 0, NULL, 0, &touched) == TERRIMP_OK);
         for (i = 0; i <= root; i++) { /* pages that the edit does not reach are the same */
             CHECK(terrimp_page_get_info(p.opened, i, &info) == TERRIMP_OK);
             same += memcmp(old + info.offset, p.file + info.offset, info.bytes) == 0;
@@ -1336,6 +1385,7 @@ static void pages_tests(void)
 {
     RUN(bad_pages);
     RUN(pages_say_what_memory_does);
+    RUN(pages_above_blocks_miss_no_sample);
     RUN(pages_are_built_in_any_order);
     RUN(pages_are_edited);
     RUN(pages_that_are_no_good_are_refused);

@@ -646,6 +646,7 @@ static void views_of_tiles_need_no_depth_buffer(void)
                     terrimp_view_desc d;
                     memset(&d, 0, sizeof d);
                     d.sorted = 1;
+                    d.endless = terrimp_view_endless();
                     d.mode = mode;
                     if (mode == TERRIMP_MODE_AUTO) { /* many pictures */
                         d.ground_tolerance_px = 0.05f;
@@ -790,7 +791,7 @@ static void pieces_of_pictures_are_in_painters_order(void)
         return;
     memset(&d, 0, sizeof d), memset(&h, 0, sizeof h), memset(&draw, 0, sizeof draw);
     h.l = &l;
-    d.ground_tolerance_px = 0.25f, d.max_cost = 9000.0f;
+    d.ground_tolerance_px = 0.25f, d.max_cost = 9000.0f, d.cost_limit = terrimp_view_cost_limit();
     d.no_splits = 1; /* these are not cut */
     d.costs.capture = 100.0f, d.costs.ground_px = d.costs.impostor_px = 0.02f;
     draw.user = &h, draw.begin_capture = piece_begin, draw.end_capture = piece_end;
@@ -877,6 +878,7 @@ static void views_that_wrap_show_what_nine_terrains_show(void)
         h.l = &one, plain.l = &nine;
         memset(&d, 0, sizeof d);
         d.sorted = 1;
+        d.endless = terrimp_view_endless();
         d.mode = TERRIMP_MODE_FULL;
         CHECK(terrimp_view_create(nine.terrain, &d, NULL, &yardstick) == TERRIMP_OK);
         d.mode = turn % 2 ? TERRIMP_MODE_FULL : TERRIMP_MODE_GEOMIP;
@@ -926,8 +928,9 @@ static void views_that_wrap_repeat_after_a_period(void)
             return;
         memset(&d, 0, sizeof d);
         d.sorted = 1;
+        d.endless = terrimp_view_endless();
         d.wrap_tiles = 5;
-        d.exact_depth = turn % 2;
+        d.exact_depth = turn % 2 ? terrimp_view_exact_depth() : NULL;
         d.ground_tolerance_px = 0.1f;
         d.costs.capture = 5.0f;
         d.costs.triangle = 4.0f;
@@ -1050,9 +1053,11 @@ static void views_keep_to_their_cost(void)
             float median, mean, most, least, limited, free_ratio, ratio;
             int rests;
             memset(&d, 0, sizeof d);
+            d.endless = terrimp_view_endless();
             d.mode = mode;
             d.ground_tolerance_px = 0.25f;
             d.costs.capture = 100.0f;
+            d.cost_limit = terrimp_view_cost_limit();
             free_ratio = pace_fly(&l, &d, &median, &mean, &most, &rests);
             d.max_cost = 0.9f * mean;
             ratio = pace_fly(&l, &d, &least, &limited, &most, &rests);
@@ -1077,7 +1082,12 @@ static void views_without_end_or_of_a_cost_refuse_bad_input(void)
     if (!land_build(&one))
         return;
     memset(&d, 0, sizeof d);
+    d.endless = terrimp_view_endless();
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_OK && out.wrap_tiles == 3);
+    d.endless = NULL;
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    CHECK(strcmp(terrimp_view_desc_trouble(one.terrain, &d), "endless") == 0);
+    d.endless = terrimp_view_endless();
     CHECK(out.max_ground == 9u * land_chunks(&one) && !(out.max_cost > 0.0f));
     CHECK(terrimp_view_create(one.terrain, &d, NULL, &view) == TERRIMP_OK);
     d.wrap_tiles = 5;
@@ -1087,12 +1097,19 @@ static void views_without_end_or_of_a_cost_refuse_bad_input(void)
         d.wrap_tiles = tiles[i];
         CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
         CHECK(terrimp_view_bytes(one.terrain, &d) == 0);
+        CHECK(strcmp(terrimp_view_desc_trouble(one.terrain, &d), "wrap_tiles") == 0);
     }
     memset(&d, 0, sizeof d);
+    d.endless = terrimp_view_endless();
     memset(&hider, 0, sizeof hider);
     d.hider = &hider;
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
     d.hider = NULL;
+    d.max_cost = 1.0f; /* without its cost_limit */
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    CHECK(strcmp(terrimp_view_desc_trouble(one.terrain, &d), "max_cost") == 0);
+    d.cost_limit = terrimp_view_cost_limit();
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_OK);
     d.max_cost = -1.0f;
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
     d.max_cost = not_a_number();
@@ -1103,6 +1120,7 @@ static void views_without_end_or_of_a_cost_refuse_bad_input(void)
     if (!land_build(&one))
         return;
     memset(&d, 0, sizeof d);
+    d.endless = terrimp_view_endless();
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
     land_free(&one), land_free(&nine);
     CHECK(terrimp_view_pace(100.0f, 10.0f, 10.2f) <= 100.0f);

@@ -1228,7 +1228,7 @@ static terrimp_view_desc random_settings(int mode)
     d.no_lookahead = (int)random_range(0, 1);
     d.no_splits = (int)random_range(0, 1);
     d.no_spreading = (int)random_range(0, 1);
-    d.exact_depth = d.no_spreading;
+    d.exact_depth = d.no_spreading ? terrimp_view_exact_depth() : NULL;
     d.costs.capture = random_magnitude(0.1f, 1e4f);
     d.costs.draw = maybe(1.0f, 1000.0f);
     d.costs.triangle = maybe(0.5f, 20.0f);
@@ -1454,7 +1454,7 @@ static void flights_with_split_pictures_keep_every_law(void)
     d.max_angle_rad = 0.5f;
     d.costs.capture = d.costs.impostor_px = 1e-3f;
     d.costs.ground_px = 10.0f;
-    d.exact_depth = 1;
+    d.exact_depth = terrimp_view_exact_depth();
     if (land_build(&l)) {
         (void)fly_and_check(&l, &d, 150, &flight_room);
         CHECK(flight_room.total_splits > 2);
@@ -1691,7 +1691,7 @@ static void settings_change_without_a_loss(void)
         wrong.tolerance_px = -1.0f;
         CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
         wrong = d; /* what the view has no memory for */
-        wrong.exact_depth = 1;
+        wrong.exact_depth = terrimp_view_exact_depth();
         CHECK(terrimp_view_set(f->view, &wrong) == TERRIMP_E_RANGE);
         wrong = d;
         memset(&horizon, 0, sizeof horizon); /* of no terrain */
@@ -1758,6 +1758,7 @@ static void what_was_forgotten_since_the_update_is_not_drawn(void)
             flight_forget(f);
             flight_clear(f);
             CHECK(terrimp_view_render(f->view, &callbacks) == TERRIMP_E_STATE);
+            CHECK(terrimp_view_get_stats(f->view, &f->stats) == TERRIMP_E_STATE);
             CHECK(f->item_count == 0 && f->capture_count == 0);
             CHECK(rest(f, &camera) < REST_FRAMES);
             CHECK(f->impostor_count > 3);
@@ -2537,7 +2538,7 @@ static void flights_of_any_camera_keep_every_law(void)
         if (i % 4 == 0) {
             make_hills(&l);
             d = eager_settings();
-            d.exact_depth = i % 8 / 4;
+            d.exact_depth = i % 8 / 4 ? terrimp_view_exact_depth() : NULL;
         } else {
             random_land(&l);
         }
