@@ -70,7 +70,7 @@ TIFF_LIBS  = $(if $(call has_header,tiffio.h),-ltiff)
 EXAMPLES := $(filter-out viewer,$(patsubst examples/%.c,%,$(wildcard examples/*.c)))
 EXAMPLES_CPP := $(patsubst examples/%.cpp,%,$(wildcard examples/*.cpp))
 BENCHES  := $(patsubst tests/%.c,%,$(wildcard tests/bench_*.c))
-TESTS    := unit unit_host render
+TESTS    := unit flights unit_host render
 HOST     := $(patsubst examples/%.c,$(BUILD)/%.o,$(wildcard examples/host/*.c))
 DEPS     := $(filter deps deps-portable deps-viewer deps-web,$(MAKECMDGOALS))
 
@@ -149,8 +149,8 @@ fuzz: | $(DEPS)
 	@sh tests/fuzz.sh $(SECONDS)
 
 # Into a file beside it first: the program that prints the new values has the old ones in it.
-golden: unit
-	@$(BUILD)/unit golden > $(BUILD)/golden.h && cp $(BUILD)/golden.h tests/golden.h
+golden: flights
+	@$(BUILD)/flights golden > $(BUILD)/golden.h && cp $(BUILD)/golden.h tests/golden.h
 	@git --no-pager diff --stat tests/golden.h
 
 clean:

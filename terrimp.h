@@ -176,8 +176,8 @@
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
-       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 39 KB of code at -Os on
-       a Cortex-M4, 36 KB without the three options that follow it above, if its linker drops
+       TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 36 KB of code at -Os on
+       a Cortex-M4, 33 KB without the three options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -1500,6 +1500,8 @@ typedef struct terrimp_endless terrimp_endless;
 TERRIMP_API const terrimp_endless *terrimp_view_endless(void);
 typedef struct terrimp_exact_depth terrimp_exact_depth;
 TERRIMP_API const terrimp_exact_depth *terrimp_view_exact_depth(void);
+typedef struct terrimp_cost_limit terrimp_cost_limit;
+TERRIMP_API const terrimp_cost_limit *terrimp_view_cost_limit(void);
 
 /* How the terrain is drawn. */
 typedef enum terrimp_mode {
@@ -1580,10 +1582,12 @@ typedef struct terrimp_view_desc {
     uint32_t wrap_tiles;    /* as so many repetitions along each axis, with the eye's in the middle;
                                each takes 44 bytes for each node
                                [Limits: odd, 3..15; 65537 samples an axis] [Default 0 -> 3] */
+    const terrimp_cost_limit *cost_limit; /* (required for max_cost) terrimp_view_cost_limit() */
     float max_cost;         /* of a frame, in the unit of costs, in AUTO and GEOMIP: what its draws
                                and captures are predicted to cost. The ground is coarsened until
                                they fit, and made finer again when that is predicted to fit, too;
-                               captures are made in pieces that leave no frame dearer
+                               captures are made in pieces, of single rows of quads if need be,
+                               that leave no frame dearer
                                [Limits: >= 0] [Default 0 -> no limit] */
     terrimp_hider *hider;   /* of the terrain's quadtree, outliving the view: what it hides is
                                neither drawn nor captured: see terrimp_horizon, terrimp_sets
@@ -9498,7 +9502,15 @@ typedef struct terrimpi_capture_plan {
     uint32_t layer_count;
     uint32_t source;        /* level of the ground that is drawn */
     uint32_t border;        /* its width: see terrimpi_terrain_apron_quads */
+    const terrimp_cost_limit *limit; /* for pieces that end within a node; NULL: none does */
 } terrimpi_capture_plan;
+
+/* What only max_cost needs. */
+struct terrimp_cost_limit {
+    void (*draw_rows)(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
+                      const terrimp_node *node, uint32_t from, uint32_t to,
+                      terrimp_ground_command *ground, const terrimp_callbacks *callbacks);
+};
 
 /* Ground of the source level: a whole node, or the part of one that lies in the border. */
 typedef struct terrimpi_capture_draw {
@@ -9803,6 +9815,12 @@ static void terrimpi_capture_draw_rows(const terrimp_terrain *t, const terrimpi_
     }
 }
 
+TERRIMP_API const terrimp_cost_limit *terrimp_view_cost_limit(void)
+{
+    static const terrimp_cost_limit calls = {terrimpi_capture_draw_rows};
+    return &calls;
+}
+
 /* Makes a slice of a layer, from the row `from` of all its draws on, up to `to`: the host's
    commands. `middle` is added to the places of all. */
 static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_capture_plan *plan,
@@ -9848,7 +9866,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         ground.first_index = draws[i].first_index;
         ground.index_count = draws[i].index_count;
         if (last - first < rows)
-            terrimpi_capture_draw_rows(t, plan, &node, first, last, &ground, callbacks);
+            plan->limit->draw_rows(t, plan, &node, first, last, &ground, callbacks);
         else
             callbacks->draw_ground(callbacks->user, &ground);
     }
@@ -9874,8 +9892,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
                                          are older are torn */
 #define TERRIMPI_VIEW_COARSE 1.3f     /* texels too large by this are due, */
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
-#define TERRIMPI_VIEW_SMALL 1.0f      /* [px] tolerance up to which impostors are no smaller than
-                                         the ground's nodes whatever that costs */
 #define TERRIMPI_VIEW_FILL 0.7f       /* of the atlases, that pictures in use may fill, */
 #define TERRIMPI_VIEW_SOFTEST 0.7f    /* ... with so much of texels_per_px at least */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
@@ -10091,6 +10107,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
                     d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
+                    (d.max_cost > 0.0f && !d.cost_limit) ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
@@ -10131,6 +10148,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
         TERRIMPI_TROUBLE(terrimp_view_desc, max_slot),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_impostors),
         TERRIMPI_TROUBLE(terrimp_view_desc, max_captures),
+        TERRIMPI_TROUBLE(terrimp_view_desc, max_cost),
         TERRIMPI_TROUBLE(terrimp_view_desc, endless),
         TERRIMPI_TROUBLE(terrimp_view_desc, wrap_tiles),
         TERRIMPI_TROUBLE(terrimp_view_desc, hider),
@@ -10471,10 +10489,10 @@ static void terrimpi_cull_close(terrimpi_cull *cull)
 }
 
 /* Which cuts run at a node in sight, of those that do not run above it. `done` gets them, and the
-   impostor cut where the ground is too close for one. Where a choice is, impostors are no smaller
-   than the ground's nodes: ground beside them would be coarser than borders are lifted for by one
-   level, see terrimpi_build_lift_border. At larger tolerances that is too dear where these are
-   lifted for two. */
+   impostor cut where the ground is too close for one. Where a choice is, and borders are lifted for
+   one level only, impostors are no smaller than the ground's nodes: ground beside them would be
+   coarser than that, see terrimpi_build_lift_border. (Where borders are lifted for two, so much is
+   too dear: over the Pyrenees 10 % of the time at 1 px, and 0.7 dB.) */
 static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cache,
                               const terrimpi_mip_frame *mip, const terrimp_node *node, int planes,
                               float closest, int *done)
@@ -10490,8 +10508,7 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
     if (*done & TERRIMPI_CULL_IMPOSTOR)
         return cuts;
     smallest = *done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER &&
-               (f->desc->tolerance_px <= TERRIMPI_VIEW_SMALL ||
-                terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u);
+               terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u;
     impostor = terrimpi_cull_impostor(
         f, node, closest, cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE,
         smallest && (!mip || terrimpi_mip_ratio_of(mip, node->number) >= 0.0f));
@@ -10831,13 +10848,21 @@ typedef struct terrimpi_region {
     uint32_t node;
     float closest;
     uint32_t first_ground, ground_count; /* of the ground draws, which stand in the order of all */
-    uint32_t first_candidate;
+    terrimpi_candidate *candidates;
     uint16_t candidate_count;            /* none: ground is all it can be */
     uint8_t fits;                        /* there are some, and a camera fits round each */
     uint8_t kind;                        /* that shows it */
     uint8_t late;                        /* its ground is coarser, since pages are missing */
     float pixels;                        /* that the candidates cover, about */
 } terrimpi_region;
+
+/* All of them, and what could be captured for them. */
+typedef struct terrimpi_regions {
+    terrimpi_region *items;         /* [max_ground + 1] front to back */
+    terrimpi_candidate *candidates; /* [max_impostors] by region */
+    uint32_t *queue;                /* [max_impostors] candidates to capture, most urgent first */
+    uint32_t count, candidate_count;
+} terrimpi_regions;
 
 /* What a kind would cost a region. */
 typedef struct terrimpi_region_offer {
@@ -10852,6 +10877,14 @@ typedef struct terrimpi_view_draw {
     float alpha;
 } terrimpi_view_draw;
 
+/* All of them. */
+typedef struct terrimpi_view_draws {
+    terrimpi_view_draw *items; /* [max_ground + max_impostors + 1] front to back */
+    uint32_t count;
+    uint32_t kind_count[TERRIMPI_VIEW_KIND_COUNT]; /* of each kind */
+    uint32_t waiting;          /* impostors that have no picture yet */
+} terrimpi_view_draws;
+
 /* A capture of this frame, or a piece of one. */
 typedef struct terrimpi_job {
     terrimpi_capture_plan plan;
@@ -10864,24 +10897,26 @@ typedef struct terrimpi_job {
     uint8_t expired;               /* since its first piece was made */
 } terrimpi_job;
 
+/* All of them; of one that is made in pieces the next one comes first in the next frame. */
+typedef struct terrimpi_jobs {
+    terrimpi_job *items; /* [max_captures] */
+    uint32_t count;
+    uint32_t open;       /* 1 + the job of which pieces are missing */
+} terrimpi_jobs;
+
 struct terrimp_view {
     const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
                                                wraps */
-    uint32_t region_count, candidate_count, job_count, draw_count;
-    uint32_t kind_count[TERRIMPI_VIEW_KIND_COUNT]; /* draws of each kind */
     terrimpi_cache cache;
     terrimpi_cull cull;
     uint8_t *kind_of;              /* [node_count] that showed the region */
-    terrimpi_region *regions;      /* [max_ground + 1] front to back */
-    terrimpi_candidate *candidates; /* [max_impostors] by region */
-    uint32_t *queue;               /* [max_impostors] candidates to capture, most urgent first */
-    terrimpi_job *jobs;            /* [max_captures] */
-    terrimpi_view_draw *draws;          /* [max_ground + max_impostors + 1] front to back */
+    terrimpi_regions regions;
+    terrimpi_jobs jobs;
+    terrimpi_view_draws draws;
     terrimpi_capture_draw *capture_draws; /* of one capture */
     float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
     uint16_t *mesh_indices;        /* [index_stride] */
     uint32_t late;                 /* nodes and pictures that pages are missing for */
-    uint32_t open;                 /* 1 + the job of which pieces are missing */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
     terrimp_geomip_view ground;
@@ -10929,6 +10964,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     terrimp_live_atlas_desc atlas = terrimpi_view_atlas_desc(&v->desc);
     terrimpi_arena l = terrimpi_arena_at(base);
     terrimpi_cache *c = &v->cache;
+    terrimpi_regions *r = &v->regions;
     terrimpi_arena captures;
     size_t scratch;
     uint32_t i;
@@ -10962,13 +10998,14 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
     terrimpi_view_layout_captures(v, &captures);
     v->kind_of = (uint8_t *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
-    v->regions = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *v->regions);
-    v->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *v->candidates);
-    v->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *v->queue);
-    v->jobs = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures, sizeof *v->jobs);
-    v->draws = (terrimpi_view_draw *)terrimpi_take(
+    r->items = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *r->items);
+    r->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *r->candidates);
+    r->queue = (uint32_t *)terrimpi_take(&l, impostors, sizeof *r->queue);
+    v->jobs.items = (terrimpi_job *)terrimpi_take(&l, v->desc.max_captures,
+                                                 sizeof *v->jobs.items);
+    v->draws.items = (terrimpi_view_draw *)terrimpi_take(
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
-        sizeof *v->draws);
+        sizeof *v->draws.items);
     if (v->tiled)
         v->desc.endless->layout(v, &l);
     return l.ok && slots ? l.bytes : 0;
@@ -11068,20 +11105,20 @@ static void terrimpi_job_cancel(terrimpi_cache *cache, const terrimpi_job *job)
 
 /* Forgets the jobs of a frame that is not rendered, but for a picture that has been begun: that one
    becomes the first. */
-static void terrimpi_view_cancel(terrimp_view *v)
+static void terrimpi_jobs_cancel(terrimpi_cache *cache, terrimpi_jobs *jobs)
 {
     uint32_t i;
-    for (i = 0; i < v->job_count; i++) {
-        if (v->open == i + 1u && v->jobs[i].from > 0)
+    for (i = 0; i < jobs->count; i++) {
+        if (jobs->open == i + 1u && jobs->items[i].from > 0)
             continue;
-        terrimpi_job_cancel(&v->cache, &v->jobs[i]);
-        if (v->open == i + 1u)
-            v->open = 0;
+        terrimpi_job_cancel(cache, &jobs->items[i]);
+        if (jobs->open == i + 1u)
+            jobs->open = 0;
     }
-    v->job_count = 0;
-    if (v->open) {
-        v->jobs[0] = v->jobs[v->open - 1u];
-        v->open = 1;
+    jobs->count = 0;
+    if (jobs->open) {
+        jobs->items[0] = jobs->items[jobs->open - 1u];
+        jobs->open = 1;
     }
 }
 
@@ -11195,10 +11232,10 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
     v->frame.eye[0] -= way[0];
     v->frame.eye[2] -= way[1];
     v->outdated = 1; /* its draws are of nodes that are elsewhere now */
-    terrimpi_view_cancel(v);
-    if (v->open)
-        terrimpi_job_cancel(&v->cache, &v->jobs[0]);
-    v->open = 0;
+    terrimpi_jobs_cancel(&v->cache, &v->jobs);
+    if (v->jobs.open)
+        terrimpi_job_cancel(&v->cache, &v->jobs.items[0]);
+    v->jobs.open = 0;
     for (k = 0; k < count; k++) { /* from which they come is later in this direction */
         terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
         uint32_t was = terrimpi_tiled_before(t, &n, x, z);
@@ -11262,45 +11299,48 @@ TERRIMP_API terrimp_result terrimp_view_invalidate(terrimp_view *view)
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     terrimpi_cache_clear(&view->cache);
     terrimpi_motion_lose(&view->frame.motion);
-    view->job_count = view->open = 0;
+    view->jobs.count = view->jobs.open = 0;
     view->outdated = 1;
     return TERRIMP_OK;
 }
 
 /* Forgets a picture, and what of it has been begun. */
-static void terrimpi_view_forget(terrimp_view *v, terrimpi_cache_picture *p)
+static void terrimpi_jobs_forget(terrimpi_cache *cache, terrimpi_jobs *jobs,
+                                 terrimpi_cache_picture *p)
 {
-    if (v->open && v->jobs[v->open - 1u].picture == p) {
-        terrimpi_job_cancel(&v->cache, &v->jobs[v->open - 1u]);
-        v->open = 0;
+    if (jobs->open && jobs->items[jobs->open - 1u].picture == p) {
+        terrimpi_job_cancel(cache, &jobs->items[jobs->open - 1u]);
+        jobs->open = 0;
     }
-    terrimpi_cache_drop(&v->cache, p);
+    terrimpi_cache_drop(cache, p);
 }
 
 /* The same for all that are lost. */
-static void terrimpi_view_lose(terrimp_view *v)
+static void terrimpi_jobs_lose(terrimpi_cache *cache, terrimpi_jobs *jobs)
 {
     terrimpi_cache_picture *p;
-    for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++)
+    for (p = cache->pictures; p < cache->pictures + cache->capacity; p++)
         if (p->lost)
-            terrimpi_view_forget(v, p);
+            terrimpi_jobs_forget(cache, jobs, p);
 }
 
 /* Marks the picture of a node, or all, as lost, else as expired. Pieces of one that is being made
    are older than that. */
 static terrimp_result terrimpi_view_mark(terrimp_view *v, uint32_t node, int lost)
 {
+    terrimpi_job *open;
     terrimpi_cache_picture *p;
     TERRIMPI_REFUSE(!v, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(node != TERRIMP_EVERY_NODE && node >= v->built->tree.node_count,
                     TERRIMP_E_RANGE);
+    open = v->jobs.open ? &v->jobs.items[v->jobs.open - 1u] : NULL;
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
         if (p->seen == 0 || (node != TERRIMP_EVERY_NODE &&
                              terrimpi_real_node(v->terrain, p->node.number) != node))
             continue;
         *(lost ? &p->lost : &p->expired) = 1;
-        if (v->open && v->jobs[v->open - 1u].picture == p && v->jobs[v->open - 1u].from > 0)
-            v->jobs[v->open - 1u].expired = 1;
+        if (open && open->picture == p && open->from > 0)
+            open->expired = 1;
     }
     return TERRIMP_OK;
 }
@@ -11318,7 +11358,7 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
                     rows == 0, TERRIMP_E_RANGE);
     cols = terrimpi_min_u32(cols, tree->field.width - x);
     rows = terrimpi_min_u32(rows, tree->field.depth - z);
-    terrimpi_view_cancel(view);
+    terrimpi_jobs_cancel(&view->cache, &view->jobs);
     view->outdated = 1;
     if (view->tiled)
         view->desc.endless->fill(view->tiled, view->built);
@@ -11327,7 +11367,7 @@ TERRIMP_API terrimp_result terrimp_view_touch(terrimp_view *view, uint32_t x, ui
             if (terrimpi_cache_shows(p, tree->chunk_quads,
                                      x + k % tiles * (tree->field.width - 1u),
                                      z + k / tiles * (tree->field.depth - 1u), cols, rows))
-                terrimpi_view_forget(view, p);
+                terrimpi_jobs_forget(&view->cache, &view->jobs, p);
     return TERRIMP_OK;
 }
 
@@ -11337,9 +11377,9 @@ TERRIMP_API terrimp_result terrimp_view_drop(terrimp_view *view, uint32_t node)
     view->lost = view->capturing;
     if (view->capturing)
         return TERRIMP_OK;
-    terrimpi_view_cancel(view);
+    terrimpi_jobs_cancel(&view->cache, &view->jobs);
     view->outdated = 1;
-    terrimpi_view_lose(view);
+    terrimpi_jobs_lose(&view->cache, &view->jobs);
     return TERRIMP_OK;
 }
 
@@ -11395,53 +11435,55 @@ static void terrimpi_view_add_ground(terrimp_geomip_view *ground, terrimpi_mip_f
 
 /* Makes a region of the nodes [at, end) in sight, of which the first is in one of the cuts. What is
    in sight has ground. With too many impostors it has none. */
-static void terrimpi_view_add_region(terrimp_view *v, uint32_t at, terrimpi_mip_frame *mip)
+static void terrimpi_regions_add(const terrimpi_frame *f, const terrimpi_cull_node *nodes,
+                                 uint32_t at, terrimp_geomip_view *ground,
+                                 terrimpi_mip_frame *mip, terrimpi_regions *regions)
 {
-    const terrimp_quadtree *tree = &v->terrain->tree;
-    const terrimpi_cull_node *nodes = v->cull.nodes;
-    terrimpi_region *region = &v->regions[v->region_count];
-    uint32_t first = v->candidate_count, i, end;
+    terrimpi_region *region = &regions->items[regions->count];
+    uint32_t first = regions->candidate_count, i, end;
     memset(region, 0, sizeof *region);
     region->node = nodes[at].number;
     region->closest = nodes[at].closest;
-    region->first_ground = v->ground.draws_needed;
-    region->first_candidate = first;
+    region->first_ground = ground->draws_needed;
+    region->candidates = regions->candidates + first;
     for (i = at, end = nodes[at].end; i < end; i++) {
-        terrimp_node node = terrimpi_tree_node(tree, nodes[i].number);
+        terrimp_node node = terrimpi_tree_node(&f->terrain->tree, nodes[i].number);
         if (nodes[i].cuts & TERRIMPI_CULL_GROUND)
-            terrimpi_view_add_ground(&v->ground, mip, &node);
+            terrimpi_view_add_ground(ground, mip, &node);
         region->late |= (uint8_t)(mip && terrimpi_mip_ratio_of(mip, node.number) < 0.0f);
         if (!(nodes[i].cuts & TERRIMPI_CULL_IMPOSTOR))
             continue;
-        if (v->candidate_count < v->desc.max_impostors) {
-            terrimpi_candidate *c = &v->candidates[v->candidate_count];
+        if (regions->candidate_count < f->desc->max_impostors) {
+            terrimpi_candidate *c = &regions->candidates[regions->candidate_count];
             memset(c, 0, sizeof *c);
             c->node = node;
             c->closest = nodes[i].closest;
             c->is_short = (nodes[i].cuts & TERRIMPI_CULL_SHORT) != 0;
         }
-        v->candidate_count++;
+        regions->candidate_count++;
     }
-    region->ground_count = v->ground.draws_needed - region->first_ground;
-    if (region->ground_count == 0 || v->candidate_count > v->desc.max_impostors)
-        v->candidate_count = first;
-    region->candidate_count = (uint16_t)(v->candidate_count - first);
-    v->region_count += region->ground_count > 0 ? 1u : 0u;
+    region->ground_count = ground->draws_needed - region->first_ground;
+    if (region->ground_count == 0 || regions->candidate_count > f->desc->max_impostors)
+        regions->candidate_count = first;
+    region->candidate_count = (uint16_t)(regions->candidate_count - first);
+    regions->count += region->ground_count > 0 ? 1u : 0u;
 }
 
-static void terrimpi_view_make_regions(terrimp_view *v, terrimpi_mip_frame *mip)
+static void terrimpi_regions_make(const terrimpi_frame *f, const terrimpi_cull *cull,
+                                  terrimp_geomip_view *ground, terrimpi_mip_frame *mip,
+                                  terrimpi_regions *regions)
 {
     uint32_t i = 0;
-    v->region_count = v->candidate_count = 0;
-    v->ground.draws_needed = v->ground.triangle_count = 0;
-    while (i < v->cull.count)
-        if (v->cull.nodes[i].cuts) {
-            terrimpi_view_add_region(v, i, mip);
-            i = v->cull.nodes[i].end;
+    regions->count = regions->candidate_count = 0;
+    ground->draws_needed = ground->triangle_count = 0;
+    while (i < cull->count)
+        if (cull->nodes[i].cuts) {
+            terrimpi_regions_add(f, cull->nodes, i, ground, mip, regions);
+            i = cull->nodes[i].end;
         } else {
             i++;
         }
-    v->ground.draw_count = v->ground.draws_needed;
+    ground->draw_count = ground->draws_needed;
 }
 
 /* Finds what is in sight and makes both cuts through it; where max_ground is too small, at a larger
@@ -11460,7 +11502,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     } else if (terrimpi_view_full(&v->desc)) {
         if (!terrimpi_cull_list(&v->cull, f, &v->cache, NULL))
             return TERRIMP_E_CAPACITY;
-        terrimpi_view_make_regions(v, NULL);
+        terrimpi_regions_make(f, &v->cull, &v->ground, NULL, &v->regions);
         return TERRIMP_OK;
     }
     for (;;) {
@@ -11478,7 +11520,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
             return TERRIMP_E_CAPACITY;
         v->ground_scale *= TERRIMPI_VIEW_COARSER;
     }
-    terrimpi_view_make_regions(v, mip.whole < 0.0f && v->late == 0 ? NULL : &mip);
+    terrimpi_regions_make(f, &v->cull, &v->ground,
+                          mip.whole < 0.0f && v->late == 0 ? NULL : &mip, &v->regions);
     if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
         float ahead[3];
         for (i = 0; i < 3u; i++)
@@ -11541,14 +11584,14 @@ static int terrimpi_candidate_ready(const terrimpi_candidate *c)
 /* Fills in a region's candidates and the pixels that they cover. Both kinds shade the same ones:
    what that costs alike is left out, or it would hide how much dearer the rest of one is. */
 static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cache *cache,
-                                    terrimpi_candidate *candidates, terrimpi_region *region)
+                                    terrimpi_region *region)
 {
     uint32_t i;
     region->fits = region->candidate_count > 0;
     region->pixels = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++) {
-        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &candidates[i]);
-        region->pixels += candidates[i].pixels;
+        region->fits = (uint8_t)terrimpi_candidate_estimate(f, cache, &region->candidates[i]);
+        region->pixels += region->candidates[i].pixels;
     }
 }
 
@@ -11567,7 +11610,7 @@ static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi
                                            terrimpi_region_offer *offer)
 {
     const terrimp_costs *costs = &v->desc.costs;
-    const terrimpi_candidate *c = &v->candidates[region->first_candidate];
+    const terrimpi_candidate *c = region->candidates;
     uint32_t i;
     offer->draw = offer->upkeep = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++, c++) {
@@ -11578,77 +11621,82 @@ static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi
     return region->fits;
 }
 
-static int terrimpi_view_ground_ready(const terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_ground_ready(const terrimpi_region *region)
 {
-    (void)v;
     (void)region;
     return 1;
 }
 
-static int terrimpi_view_impostor_ready(const terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_impostor_ready(const terrimpi_region *region)
 {
     uint32_t i;
     for (i = 0; i < region->candidate_count; i++)
-        if (!terrimpi_candidate_ready(&v->candidates[region->first_candidate + i]))
+        if (!terrimpi_candidate_ready(&region->candidates[i]))
             return 0;
     return 1;
 }
 
 /* ---- the draw list ---- */
 
-static void terrimpi_view_add(terrimp_view *v, int kind, uint32_t index)
+static void terrimpi_view_add(terrimpi_view_draws *list, int kind, uint32_t index)
 {
-    terrimpi_view_draw *draw = &v->draws[v->draw_count++];
+    terrimpi_view_draw *draw = &list->items[list->count++];
     draw->kind = kind;
     draw->index = index;
     draw->alpha = 1.0f;
 }
 
-static int terrimpi_view_ground_list(terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_ground_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                                     const terrimpi_region *region, terrimpi_view_draws *list)
 {
     uint32_t i;
+    (void)f;
+    (void)cache;
     for (i = 0; i < region->ground_count; i++)
-        terrimpi_view_add(v, TERRIMPI_VIEW_KIND_GROUND, region->first_ground + i);
+        terrimpi_view_add(list, TERRIMPI_VIEW_KIND_GROUND, region->first_ground + i);
     return 1;
 }
 
 /* Lists a node's impostor, once, if it has a picture that is good. One that is drawn for several
    regions does not fade. */
-static int terrimpi_view_impostor_add(terrimp_view *v, const terrimp_node *node)
+static int terrimpi_view_impostor_add(const terrimpi_frame *f, terrimpi_cache *cache,
+                                      const terrimp_node *node, terrimpi_view_draws *list)
 {
-    terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, node->number);
-    const terrimp_quadtree *tree = &v->terrain->tree;
+    terrimpi_cache_picture *p = terrimpi_cache_find(cache, node->number);
+    const terrimp_quadtree *tree = &f->terrain->tree;
     if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
         return 0;
-    if (p->listed == v->frame.number) {
-        v->draws[p->draw].alpha = 1.0f;
+    if (p->listed == f->number) {
+        list->items[p->draw].alpha = 1.0f;
         return 1;
     }
-    terrimpi_view_judge(&v->frame, p);
+    terrimpi_view_judge(f, p);
     if (p->layers_now == 0 || p->urgency > TERRIMPI_VIEW_STALE)
         return 0;
-    p->listed = p->seen = v->frame.number;
-    p->draw = v->draw_count;
-    terrimpi_view_add(v, TERRIMPI_VIEW_KIND_IMPOSTOR, (uint32_t)(p - v->cache.pictures));
+    p->listed = p->seen = f->number;
+    p->draw = list->count;
+    terrimpi_view_add(list, TERRIMPI_VIEW_KIND_IMPOSTOR, (uint32_t)(p - cache->pictures));
     return 1;
 }
 
 /* Lists the impostors of a node's children; all or none of them has a picture. */
-static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_node *node)
+static int terrimpi_view_impostor_add_children(const terrimpi_frame *f, terrimpi_cache *cache,
+                                               const terrimp_node *node,
+                                               terrimpi_view_draws *list)
 {
     terrimp_node children[4];
     uint32_t i, count;
     if (node->level == 0)
         return 0;
-    count = terrimpi_tree_children(&v->terrain->tree, node, v->frame.eye, children);
+    count = terrimpi_tree_children(&f->terrain->tree, node, f->eye, children);
     for (i = 0; i < count; i++) {
-        const terrimpi_cache_picture *p = terrimpi_cache_find(&v->cache, children[i].number);
+        const terrimpi_cache_picture *p = terrimpi_cache_find(cache, children[i].number);
         if (!p || p->layer_count == 0 ||
-            !terrimpi_tree_opens(&v->terrain->tree, children[i].number))
+            !terrimpi_tree_opens(&f->terrain->tree, children[i].number))
             return 0;
     }
     for (i = 0; i < count; i++)
-        if (!terrimpi_view_impostor_add(v, &children[i]))
+        if (!terrimpi_view_impostor_add(f, cache, &children[i], list))
             return 0;
     return 1;
 }
@@ -11656,24 +11704,25 @@ static int terrimpi_view_impostor_add_children(terrimp_view *v, const terrimp_no
 /* Lists a candidate, or in its place what shows the same: its children, of which it was put
    together, or its parents, of which it is a part; but these show more than the region, which in
    painter's order would cover what is before it. Returns 0 when there is no picture. */
-static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
+static int terrimpi_candidate_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                                   const terrimpi_candidate *c, terrimpi_view_draws *list)
 {
-    const terrimp_quadtree *tree = &v->terrain->tree;
+    const terrimp_quadtree *tree = &f->terrain->tree;
     terrimp_node node = c->node;
     uint32_t up;
-    if (terrimpi_view_impostor_add(v, &node))
+    if (terrimpi_view_impostor_add(f, cache, &node, list))
         return 1;
-    v->stats.waiting++;
-    if (terrimpi_view_impostors(&v->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
+    list->waiting++;
+    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
         return 0;
-    if (terrimpi_view_impostor_add_children(v, &node))
+    if (terrimpi_view_impostor_add_children(f, cache, &node, list))
         return 1;
-    for (up = v->desc.sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
+    for (up = f->desc->sorted ? 2u : 0u; up < 2u && node.level + 1u < tree->level_count; up++) {
         terrimp_box box;
         node = terrimpi_tree_parent(tree, &node);
-        terrimpi_terrain_node_box(v->terrain, &node, &box);
-        if (terrimpi_view_distance(&v->frame, &box) >= v->desc.fade_start &&
-            terrimpi_view_impostor_add(v, &node))
+        terrimpi_terrain_node_box(f->terrain, &node, &box);
+        if (terrimpi_view_distance(f, &box) >= f->desc->fade_start &&
+            terrimpi_view_impostor_add(f, cache, &node, list))
             return 1;
     }
     return 0;
@@ -11681,21 +11730,23 @@ static int terrimpi_candidate_list(terrimp_view *v, const terrimpi_candidate *c)
 
 /* Lists a region's impostors, and in the fade band its ground, over which they appear; or nothing,
    when one of them has no picture. */
-static int terrimpi_view_impostor_list(terrimp_view *v, const terrimpi_region *region)
+static int terrimpi_view_impostor_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                                       const terrimpi_region *region, terrimpi_view_draws *list)
 {
-    float band = v->desc.fade_end - v->desc.fade_start;
-    uint32_t before = v->draw_count, i;
+    float band = f->desc->fade_end - f->desc->fade_start;
+    uint32_t before = list->count, i;
     int covered = 1;
     for (i = 0; i < region->candidate_count; i++)
-        covered &= terrimpi_candidate_list(v, &v->candidates[region->first_candidate + i]);
+        covered &= terrimpi_candidate_list(f, cache, &region->candidates[i], list);
     if (!covered) {
-        while (v->draw_count > before)
-            v->cache.pictures[v->draws[--v->draw_count].index].listed = 0;
+        while (list->count > before)
+            cache->pictures[list->items[--list->count].index].listed = 0;
         return 0;
     }
-    for (i = before; i < v->draw_count; i++)
-        v->draws[i].alpha = terrimpi_min(1.0f, (region->closest - v->desc.fade_start) / band);
-    return region->closest >= v->desc.fade_end || terrimpi_view_ground_list(v, region);
+    for (i = before; i < list->count; i++)
+        list->items[i].alpha = terrimpi_min(1.0f, (region->closest - f->desc->fade_start) / band);
+    return region->closest >= f->desc->fade_end ||
+           terrimpi_view_ground_list(f, cache, region, list);
 }
 
 /* ---- the commands ---- */
@@ -11800,9 +11851,10 @@ typedef struct terrimpi_view_kind {
     int (*estimate)(const terrimp_view *v, const terrimpi_region *region,
                     terrimpi_region_offer *offer);
     /* Whether it can do so in this frame, before captures. */
-    int (*ready)(const terrimp_view *v, const terrimpi_region *region);
+    int (*ready)(const terrimpi_region *region);
     /* Puts its draws on the list; returns 0 when it is not ready: then the kind before it does. */
-    int (*list)(terrimp_view *v, const terrimpi_region *region);
+    int (*list)(const terrimpi_frame *f, terrimpi_cache *cache, const terrimpi_region *region,
+                terrimpi_view_draws *list);
     void (*emit)(const terrimp_view *v, const terrimpi_view_draw *draw,
                  const terrimp_callbacks *callbacks);
 } terrimpi_view_kind;
@@ -11832,7 +11884,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
     int is_known = !region->late;
-    terrimpi_region_measure(&v->frame, &v->cache, v->candidates + region->first_candidate, region);
+    terrimpi_region_measure(&v->frame, &v->cache, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
         total[kind] = offers[kind].draw + offers[kind].upkeep;
@@ -11846,14 +11898,14 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = (uint8_t)best;
     for (i = 0; i < region->candidate_count; i++)
-        is_known &= v->candidates[region->first_candidate + i].is_known &&
-                    !v->candidates[region->first_candidate + i].is_short;
+        is_known &= region->candidates[i].is_known &&
+                    !region->candidates[i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
         v->kind_of[region->node] = (uint8_t)best;
     sums->spread += offers[best].upkeep;
-    sums->drawn += offers[terrimpi_view_kinds[best].ready(v, region) ? best : 0].draw;
+    sums->drawn += offers[terrimpi_view_kinds[best].ready(region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
-        const terrimpi_candidate *c = &v->candidates[region->first_candidate + i];
+        const terrimpi_candidate *c = &region->candidates[i];
         sums->pixels += c->pixels;
         if (c->picture)
             c->picture->seen = v->frame.number;
@@ -11969,6 +12021,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         return 0;
     plan->node = c->node;
     plan->layer_count = 1;
+    plan->limit = f->desc->cost_limit;
     terrimpi_terrain_node_box(f->terrain, &c->node, &plan->box);
     terrimpi_view_ahead(f, &c->node, &plan->box, c->closest, plan->eye);
     memcpy(origin, plan->eye, sizeof origin);
@@ -11998,7 +12051,7 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     job->cost = terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
                                       (float)job->triangles);
     room = terrimpi_spending_room(f, room, job);
-    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->open);
+    job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->jobs.open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
         terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
@@ -12034,7 +12087,7 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
         const terrimpi_capture_draw *draw = &v->capture_draws[job->to / rows];
         uint32_t count = rows - job->to % rows;
         if (used + draw->triangle_count * count / rows > triangles) {
-            if (v->desc.max_cost > 0.0f && draw->first_index == 0)
+            if (v->desc.max_cost > 0.0f && job->plan.limit && draw->first_index == 0)
                 count = (terrimpi_max_u32(triangles, used) - used) * rows / draw->triangle_count;
             else if (used > 0)
                 break;
@@ -12062,18 +12115,19 @@ static int terrimpi_candidate_after(const void *candidates, uint32_t a, uint32_t
 
 /* Lists what could be captured, most urgent first; each rank by the error on the screen times the
    pixels that show it. Returns how many. */
-static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
+static uint32_t terrimpi_regions_queue(const terrimpi_frame *f, const terrimpi_job *begun,
+                                       terrimpi_regions *regions)
 {
-    uint32_t r, i, count = 0;
-    for (r = 0; r < v->region_count; r++)
-        for (i = 0; i < v->regions[r].candidate_count; i++) {
-            uint32_t index = v->regions[r].first_candidate + i;
-            terrimpi_candidate *c = &v->candidates[index];
+    uint32_t i, count = 0;
+    const terrimpi_region *r;
+    for (r = regions->items; r < regions->items + regions->count; r++)
+        for (i = 0; i < r->candidate_count; i++) {
+            terrimpi_candidate *c = &r->candidates[i];
             float weight = terrimpi_max(c->pixels / (1.0f + c->pixels), 1e-3f) + c->pixels;
-            if (v->regions[r].kind != TERRIMPI_VIEW_KIND_IMPOSTOR ||
-                (v->open && v->jobs[0].plan.node.number == c->node.number) ||
+            if (r->kind != TERRIMPI_VIEW_KIND_IMPOSTOR ||
+                (begun && begun->plan.node.number == c->node.number) ||
                 (c->urgency < 1.0f &&
-                 (v->desc.no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
+                 (f->desc->no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
                 continue;
             c->rank = !terrimpi_candidate_ready(c) ? TERRIMPI_JOB_RANK_MISSING
                       : c->urgency >= 1.0f         ? TERRIMPI_JOB_RANK_DUE
@@ -12081,10 +12135,10 @@ static uint32_t terrimpi_view_fill_queue(terrimp_view *v)
             c->weight = c->rank == TERRIMPI_JOB_RANK_MISSING
                             ? weight
                             : weight * terrimpi_max(terrimpi_min(c->urgency, 2.0f),
-                                                    terrimpi_view_age(&v->frame, c->picture));
-            v->queue[count++] = index;
+                                                    terrimpi_view_age(f, c->picture));
+            regions->queue[count++] = (uint32_t)(c - regions->candidates);
         }
-    terrimpi_sort(v->queue, count, v->candidates, terrimpi_candidate_after);
+    terrimpi_sort(regions->queue, count, regions->candidates, terrimpi_candidate_after);
     return count;
 }
 
@@ -12146,9 +12200,9 @@ static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
 {
     const terrimp_view_desc *d = &v->desc;
-    terrimpi_job *job = &v->jobs[v->job_count];
+    terrimpi_job *job = &v->jobs.items[v->jobs.count];
     uint32_t room = terrimpi_spending_left(&v->frame, s), triangles;
-    if (v->job_count == d->max_captures ||
+    if (v->jobs.count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
@@ -12161,15 +12215,15 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
     room = terrimpi_spending_room(&v->frame, room, job);
     if ((d->max_capture_texels && s->texels > 0 &&
          s->texels + job->texels > d->max_capture_texels) ||
-        (job->triangles > room && v->open)) {
+        (job->triangles > room && v->jobs.open)) {
         terrimpi_job_cancel(&v->cache, job);
         return 0;
     }
-    v->job_count++;
+    v->jobs.count++;
     triangles = job->triangles;
     if (triangles > room && job->in_pieces) {
         triangles = terrimpi_job_cut(v, room, job);
-        v->open = job->to < job->end ? v->job_count : 0u;
+        v->jobs.open = job->to < job->end ? v->jobs.count : 0u;
     }
     terrimpi_spending_add(&v->frame, job, triangles, s);
     return 1;
@@ -12178,7 +12232,7 @@ static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terr
 /* Makes the next piece of the picture that has been begun, unless it has become useless. */
 static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
 {
-    terrimpi_job *job = &v->jobs[0];
+    terrimpi_job *job = &v->jobs.items[0];
     float angle, parallax;
     uint32_t count, room;
     int has_pages;
@@ -12190,10 +12244,10 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
         terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
         TERRIMPI_VIEW_STALE) {
         terrimpi_job_cancel(&v->cache, job);
-        v->open = 0;
+        v->jobs.open = 0;
         return;
     }
-    v->job_count = 1;
+    v->jobs.count = 1;
     job->picture->seen = v->frame.number;
     room = terrimpi_spending_room(&v->frame, terrimpi_spending_left(&v->frame, s), job);
     terrimpi_spending_add(&v->frame, job, terrimpi_job_cut(v, room, job), s);
@@ -12211,19 +12265,19 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
     if (v->desc.max_cost > 0.0f)
         s.allowance = terrimpi_clamp(v->desc.max_cost - drawn, 0.0f, s.allowance);
     s.spread = spread;
-    if (v->open)
+    if (v->jobs.open)
         terrimpi_view_continue(v, &s);
-    count = terrimpi_view_fill_queue(v);
+    count = terrimpi_regions_queue(&v->frame, v->jobs.open ? v->jobs.items : NULL, &v->regions);
     for (i = 0; i < count; i++) {
-        const terrimpi_candidate *c = &v->candidates[v->queue[i]];
+        const terrimpi_candidate *c = &v->regions.candidates[v->regions.queue[i]];
         int is_due = c->urgency >= 1.0f;
         int taken = terrimpi_view_take(v, c, &s);
         due += is_due ? 1u : 0u;
         put_off += is_due && !taken ? 1u : 0u;
     }
-    for (i = 0; i < v->job_count; i++) {
-        v->stats.captures += v->jobs[i].plan.layer_count;
-        v->stats.splits += v->jobs[i].plan.layer_count - 1u;
+    for (i = 0; i < v->jobs.count; i++) {
+        v->stats.captures += v->jobs.items[i].plan.layer_count;
+        v->stats.splits += v->jobs.items[i].plan.layer_count - 1u;
     }
     v->stats.cost = drawn + s.cost;
     v->stats.captured_texels = s.texels;
@@ -12239,21 +12293,22 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
 static void terrimpi_view_list(terrimp_view *v)
 {
+    terrimpi_view_draws *list = &v->draws;
     uint32_t i;
-    v->draw_count = 0;
-    for (i = 0; i < v->region_count; i++) {
-        int kind = v->regions[i].kind;
-        while (!terrimpi_view_kinds[kind].list(v, &v->regions[i]))
+    memset(list->kind_count, 0, sizeof list->kind_count);
+    list->count = list->waiting = 0;
+    for (i = 0; i < v->regions.count; i++) {
+        int kind = v->regions.items[i].kind;
+        while (!terrimpi_view_kinds[kind].list(&v->frame, &v->cache, &v->regions.items[i], list))
             kind--;
     }
-    memset(v->kind_count, 0, sizeof v->kind_count);
-    for (i = 0; i < v->draw_count; i++)
-        v->kind_count[v->draws[i].kind]++;
-    if ((v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
+    for (i = 0; i < list->count; i++)
+        list->kind_count[list->items[i].kind]++;
+    if ((list->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
          (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
         terrimpi_view_over(&v->frame, v->frame.camera.eye))
         for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
-            terrimpi_view_add(v, TERRIMPI_VIEW_KIND_FLOOR, i);
+            terrimpi_view_add(list, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
 /* The next frame for a camera. It follows the eye's motion; a jump is none. */
@@ -12303,8 +12358,8 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
             terrimp_view_invalidate(v); /* no picture is of use to a camera of the other kind */
         v->frame = *f;
         memset(sums, 0, sizeof *sums);
-        for (i = 0; i < v->region_count; i++)
-            terrimpi_view_decide(v, &v->regions[i], sums);
+        for (i = 0; i < v->regions.count; i++)
+            terrimpi_view_decide(v, &v->regions.items[i], sums);
         v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
@@ -12338,7 +12393,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
-    terrimpi_view_cancel(view);
+    terrimpi_jobs_cancel(&view->cache, &view->jobs);
     reuse = view->stats.reuse; /* goes on */
     memset(&view->stats, 0, sizeof view->stats);
     view->stats.reuse = reuse;
@@ -12390,11 +12445,10 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
 static void terrimpi_view_list_again(terrimp_view *v)
 {
     uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        if (v->draws[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
-            v->cache.pictures[v->draws[i].index].listed = 0;
-    terrimpi_view_lose(v);
-    v->stats.waiting = 0;
+    for (i = 0; i < v->draws.count; i++)
+        if (v->draws.items[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+            v->cache.pictures[v->draws.items[i].index].listed = 0;
+    terrimpi_jobs_lose(&v->cache, &v->jobs);
     terrimpi_view_list(v);
 }
 
@@ -12419,8 +12473,8 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
     if (job->to < job->end)
         return;
     terrimpi_view_finish(v, job);
-    if (v->open && &v->jobs[v->open - 1u] == job)
-        v->open = 0;
+    if (v->jobs.open && &v->jobs.items[v->jobs.open - 1u] == job)
+        v->jobs.open = 0;
 }
 
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
@@ -12430,24 +12484,24 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     int kind;
     TERRIMPI_REFUSE(!view || !callbacks, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(view->frame.number == 0 || view->outdated, TERRIMP_E_STATE);
-    if ((view->kind_count[TERRIMPI_VIEW_KIND_GROUND] + view->job_count > 0 &&
+    if ((view->draws.kind_count[TERRIMPI_VIEW_KIND_GROUND] + view->jobs.count > 0 &&
          !callbacks->draw_ground) ||
-        (view->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 && !callbacks->draw_impostor) ||
-        (view->job_count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
+        (view->draws.kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 && !callbacks->draw_impostor) ||
+        (view->jobs.count > 0 && (!callbacks->begin_capture || !callbacks->end_capture)))
         return TERRIMP_E_NULL;
     view->capturing = 1;
-    for (i = 0; i < view->job_count; i++)
-        terrimpi_view_capture(view, &view->jobs[i], callbacks);
-    view->job_count = 0;
+    for (i = 0; i < view->jobs.count; i++)
+        terrimpi_view_capture(view, &view->jobs.items[i], callbacks);
+    view->jobs.count = 0;
     if (view->lost)
         terrimpi_view_list_again(view);
     view->capturing = view->lost = 0;
-    for (i = view->desc.sorted ? view->draw_count : 0u; i-- > 0;)
-        terrimpi_view_kinds[view->draws[i].kind].emit(view, &view->draws[i], callbacks);
+    for (i = view->desc.sorted ? view->draws.count : 0u; i-- > 0;)
+        terrimpi_view_kinds[view->draws.items[i].kind].emit(view, &view->draws.items[i], callbacks);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_COUNT && !view->desc.sorted; kind++)
-        for (i = 0; i < view->draw_count; i++)
-            if (view->draws[i].kind == kind)
-                terrimpi_view_kinds[kind].emit(view, &view->draws[i], callbacks);
+        for (i = 0; i < view->draws.count; i++)
+            if (view->draws.items[i].kind == kind)
+                terrimpi_view_kinds[kind].emit(view, &view->draws.items[i], callbacks);
     return TERRIMP_OK;
 }
 
@@ -12481,18 +12535,19 @@ static void terrimpi_view_count_frame(const terrimp_view *v, terrimp_stats *s)
     const terrimp_camera *c = &v->frame.camera;
     float tan_x, tan_y, first, last;
     uint32_t i;
-    for (i = 0; i < v->draw_count; i++)
-        terrimpi_view_count_draw(v, &v->draws[i], s);
-    s->ground = v->kind_count[TERRIMPI_VIEW_KIND_GROUND];
-    s->impostors = v->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR];
-    s->visible = v->region_count;
+    for (i = 0; i < v->draws.count; i++)
+        terrimpi_view_count_draw(v, &v->draws.items[i], s);
+    s->ground = v->draws.kind_count[TERRIMPI_VIEW_KIND_GROUND];
+    s->impostors = v->draws.kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR];
+    s->visible = v->regions.count;
+    s->waiting = v->draws.waiting;
     s->evictions = v->cache.evictions;
     s->atlas_failures = v->cache.failures;
-    for (i = 0; i < v->region_count; i++) {
-        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions[i].node);
+    for (i = 0; i < v->regions.count; i++) {
+        terrimp_node node = terrimpi_tree_node(&v->terrain->tree, v->regions.items[i].node);
         terrimp_box box;
         terrimpi_terrain_node_box(v->terrain, &node, &box);
-        first = v->regions[i].closest;
+        first = v->regions.items[i].closest;
         last = terrimp_box_farthest(&box, c->eye);
         if (c->orthographic) {
             terrimpi_camera_depths(&box, c->eye, c->forward, &first, &last);

@@ -52,17 +52,20 @@ else
     skip "gcc -fanalyzer: gcc is not installed"
 fi
 
-unit="-std=c99 -g -I. tests/unit.c -lm"
-if have clang && clang -O1 -fsanitize=memory $unit -o $work/unit-msan > /dev/null 2>&1; then
-    check "unit tests, MemorySanitizer" tests_pass $work/unit-msan
-else
-    skip "MemorySanitizer: clang has none here"
-fi
-if have valgrind; then
-    ${CC:-cc} -O2 $unit -o $work/unit-valgrind
-    check "unit tests, valgrind" tests_pass \
-        valgrind -q --error-exitcode=9 --leak-check=full $work/unit-valgrind
-else
-    skip "valgrind: it is not installed"
-fi
+for program in unit flights; do
+    flags="-std=c99 -g -I. tests/$program.c -lm"
+    if have clang && clang -O1 -fsanitize=memory $flags -o $work/$program-msan > /dev/null 2>&1
+    then
+        check "$program, MemorySanitizer" tests_pass $work/$program-msan
+    else
+        skip "$program, MemorySanitizer: clang has none here"
+    fi
+    if have valgrind; then
+        ${CC:-cc} -O2 $flags -o $work/$program-valgrind
+        check "$program, valgrind" tests_pass \
+            valgrind -q --error-exitcode=9 --leak-check=full $work/$program-valgrind
+    else
+        skip "$program, valgrind: it is not installed"
+    fi
+done
 check_report

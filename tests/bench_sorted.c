@@ -282,7 +282,7 @@ static float fly_view(order_host *h, const char *name, int mode, float max_cost,
     memset(&d, 0, sizeof d);
     memset(&draw, 0, sizeof draw);
     d.mode = mode, d.sorted = 1, d.max_cost = max_cost, d.atlas_size = ATLAS;
-    d.endless = terrimp_view_endless();
+    d.endless = terrimp_view_endless(), d.cost_limit = terrimp_view_cost_limit();
     d.costs.ground_px = d.costs.impostor_px = 0.5f; /* of this host, a triangle's 40 ns being 1 */
     draw.user = h;
     draw.begin_capture = view_begin, draw.end_capture = view_end;

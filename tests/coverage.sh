@@ -18,7 +18,20 @@ for tool in "$CC" "$gcov"; do
     command -v "$tool" > /dev/null || { echo "coverage: $tool is not installed"; exit 1; }
 done
 
-$CC -std=c99 -O0 --coverage '-DTERRIMP_ASSERT(condition)=((void)0)' -I"$PWD" -c tests/unit.c \
+# Both programs as one, so that lines count which either of them reaches; it adds up their tests.
+cat > $work/unit.c << 'END'
+#define main unit_main
+#include "tests/unit.c"
+#undef main
+#define main flights_main
+#include "tests/flights.c"
+#undef main
+int main(int argc, char **argv)
+{
+    return unit_main(argc, argv) | flights_main(argc, argv);
+}
+END
+$CC -std=c99 -O0 --coverage '-DTERRIMP_ASSERT(condition)=((void)0)' -I"$PWD" -c $work/unit.c \
     -o $work/unit.o && $CC --coverage $work/unit.o -lm -o $work/unit || exit 1
 $work/unit > $work/unit.txt 2>&1
 tail -n 1 $work/unit.txt

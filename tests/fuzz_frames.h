@@ -102,6 +102,7 @@ static void describe_view(terrimp_view_desc *desc)
         desc->costs.ground_px = fuzz_float(9.0f);
         desc->costs.impostor_px = fuzz_float(1.0f);
     }
+    desc->cost_limit = terrimp_view_cost_limit();
     desc->max_cost = switches & 16u ? 64.0f * fuzz_u8() : 0.0f;
 }
 

@@ -99,6 +99,7 @@ machine()
         builds_and_runs "$4" $3 -std=c99 -static tests/compile/bare.c
     check "$1: makes a bake" makes_bake "$1" "$4" $3 -std=c99 -static
     check "$1: unit tests, $2" unit_tests_pass "$4" $3 -static tests/unit.c $5
+    check "$1: flights, $2" unit_tests_pass "$4" $3 -static tests/flights.c $5
 }
 
 # Sizes and indices that fit 64 bits may not fit 32: the fuzzers' corpus, undefined behaviour ends

@@ -984,6 +984,7 @@ static void pictures_in_pieces_are_like_whole_ones(void)
         whole.no_splits = 1; /* what is made in pieces is not split either */
         pieces = whole;
         pieces.max_capture_triangles = 16000;
+        pieces.cost_limit = terrimp_view_cost_limit();
         pieces.max_cost = i == 2 ? 1e9f : 0.0f; /* then they are cut within nodes, too */
         for (p = 3; p < SAMPLE_POSES; p++) {
             terrimp_view *view = open_view(&s, &whole);

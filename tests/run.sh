@@ -150,21 +150,33 @@ have timeout && limit="timeout 900"
 # Of debug information only line numbers: all that reports need, and quicker to compile.
 sanitize="-g1 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 races="-std=c99 -g1 -O1 -fsanitize=thread -I."
-unit="-std=c99 -I. tests/unit.c -lm -o"
 
 # ---- the list: slow suites first, or the last one would run alone
 
-suite "unit tests, built as the README says" "$CC $unit build/test/unit && build/test/unit"
-suite "pages of 4097 x 4097 samples" "$CC -O2 -DPAGED_SIDE=4097u -DPAGED_CHUNK=64u $unit \
-    build/test/unit-pages && build/test/unit-pages pages_"
+# unit "name" "compiler and options" program [words]: builds and runs unit.c or flights.c.
+unit()
+{
+    name=$1
+    command="$2 -std=c99 -I. tests/$3.c -lm -o build/test/$3-$count"
+    run=build/test/$3-$count
+    shift 3
+    suite "$name" "$command && $run $*"
+}
+
+# Some tests repeat more often than elsewhere; flights are optimised, or they would take minutes.
+all_rounds="TERRIMP_LONG=1; export TERRIMP_LONG;"
+unit "flights, all rounds" "$all_rounds $CC -O2" flights
 for compiler in gcc clang; do
     if sanitizers_work $compiler; then
-        suite "unit tests, $compiler with sanitizers" \
-            "$compiler $sanitize $unit build/test/unit-$compiler && build/test/unit-$compiler"
+        unit "flights, $compiler with sanitizers" "$compiler $sanitize" flights
+        unit "unit tests, $compiler with sanitizers" "$compiler $sanitize" unit
     else
-        skip "unit tests, $compiler with sanitizers: it is not here, or has none"
+        skip "unit tests and flights, $compiler with sanitizers: it is not here, or has none"
     fi
 done
+unit "unit tests, built as the README says, all rounds" "$all_rounds $CC" unit
+unit "golden values, without optimisation" "$CC" flights golden_values
+unit "pages of 4097 x 4097 samples" "$CC -O2 -DPAGED_SIDE=4097u -DPAGED_CHUNK=64u" flights pages_
 echo "(building what the suites share, then running them, $jobs at once)"
 build all
 earlier=

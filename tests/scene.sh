@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.." || exit 1
 logs=build/bench/scene
 out=tests/results/scene.md
 mkdir -p $logs
-${MAKE:-make} -s build/render build/conventions build/unit build/bench_edits || exit 1
+${MAKE:-make} -s build/render build/conventions build/unit build/flights build/bench_edits || exit 1
 
 measure() # name, program and its arguments
 {
@@ -23,9 +23,9 @@ measure cameras build/render no_camera_sees_a_hole
 measure tiles build/render terrains_side_by_side
 measure relit build/render pictures_lit_when_drawn
 measure pop build/render renewed_light
-measure day build/unit a_day_costs
+measure day build/flights a_day_costs
 measure origin build/unit pictures_stay_in_place
-measure failing build/unit capture
+measure failing build/flights capture
 measure edits build/bench_edits ${SIDES:-1025 2049 4097}
 
 # The numbers of a log's lines: the least or the most of what follows or precedes a text.
@@ -91,7 +91,7 @@ END
     row "pictures in UTM coordinates at 1 m, texels off" 7.2 "0.1" "at most 0.05 ($(laws origin))" \
         "build/unit pictures_stay"
     row "captures over a day of 24 minutes, a frame" "every one, anew" 0.5 \
-        "$(pick most day 's/.*, \([0-9.]*\) captures a frame.*/\1/p')" "build/unit a_day"
+        "$(pick most day 's/.*, \([0-9.]*\) captures a frame.*/\1/p')" "build/flights a_day"
     row "worst pop of a renewal, grey levels" "-" 5 \
         "$(pick most pop 's/.*worst pop \([0-9.]*\) grey.*/\1/p')" "build/render renewed_light"
     row "lit when drawn against pictures made anew, eye at rest, worst over a day" - "38 dB" \
@@ -102,7 +102,7 @@ END
         "$(pick most tiles 's/.*, \([0-9]*\) when they are joined/\1/p')" \
         "build/render side_by_side"
     row "captures that fail, or are lost" "worn for ever" "made again" "$(laws failing)" \
-        "build/unit capture"
+        "build/flights capture"
     for side in ${SIDES:-1025 2049 4097}; do
         was=-
         case $side in 1025) was="17 ms" ;; 2049) was="48 ms" ;; 4097) was="160 ms" ;; esac

@@ -61,6 +61,7 @@ machine() # name, prefix, flags, "judged" or ""
     has_none_of "$1" "$2" $work/part.o pages '^terrimpi_page_'
     has_none_of "$1" "$2" $work/part.o "terrain without end" '^terrimpi_tiled_'
     has_none_of "$1" "$2" $work/part.o "exact depth" '^terrimpi_impostor_place_'
+    has_none_of "$1" "$2" $work/part.o "pieces of nodes" '^terrimpi_capture_draw_rows'
     $compile -DTERRIMP_NO_BUILD $leave_out -o $work/small.o || exit 1
     linked "$2" $work/small.o $draws || exit 1
     row "$1" "without splits, BOUND, morphing" $work/part.o "$4"

@@ -780,7 +780,7 @@ static void live_atlas_refuses_without_a_change(void)
     free(copy);
 }
 
-static void atlas_tests(void)
+static inline void atlas_tests(void)
 {
     RUN(packed_rectangles_keep_apart_and_inside);
     RUN(oversize_rectangles_are_scaled_with_their_shape);

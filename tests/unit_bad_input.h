@@ -4,7 +4,6 @@
 #define UNIT_BAD_INPUT_H
 
 #include "unit_bake.h"
-#include "unit_view.h"
 
 #include <stddef.h>
 
@@ -1296,7 +1295,7 @@ static void every_result_has_been_provoked(void)
     }
 }
 
-static void bad_input_tests(void)
+static inline void bad_input_tests(void)
 {
     RUN(result_texts_are_all_different);
     RUN(heightfield_resolve_refuses);

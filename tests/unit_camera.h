@@ -726,7 +726,7 @@ static void capture_fit_takes_flat_boxes_and_points(void)
     }
 }
 
-static void camera_tests(void)
+static inline void camera_tests(void)
 {
     RUN(camera_defaults_are_those_of_the_table);
     RUN(cameras_of_every_kind_place_known_points);

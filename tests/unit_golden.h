@@ -407,7 +407,7 @@ static void golden_print(void)
     golden_lands();
 }
 
-static void golden_tests(void)
+static inline void golden_tests(void)
 {
     RUN(everything_a_host_gets_is_as_in_the_golden_values);
     RUN(no_bit_of_a_command_escapes_the_hash);

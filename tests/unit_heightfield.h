@@ -1048,7 +1048,7 @@ static void hf_raycast_refuses_bad_arguments(void)
     CHECK(hit.distance == 0.0f && hit.normal[1] == 0.0f);
 }
 
-static void heightfield_tests(void)
+static inline void heightfield_tests(void)
 {
     RUN(hf_resolve_fills_the_documented_defaults);
     RUN(hf_resolve_refuses_bad_numbers);

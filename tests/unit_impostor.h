@@ -605,7 +605,7 @@ static void normals_fit_into_two_bytes(void)
     CHECK(worst > 0.4 && worst < 0.55);
 }
 
-static void impostor_tests(void)
+static inline void impostor_tests(void)
 {
     RUN(normals_fit_into_two_bytes);
     RUN(impostor_size_is_that_of_hess);

@@ -1557,7 +1557,7 @@ static void layer_quads_refuse(void)
     GIVES(TERRIMP_E_NULL, terrimp_layer_pack(atlas, &quad, 1, 1, &rect, NULL));
 }
 
-static void layers_tests(void)
+static inline void layers_tests(void)
 {
     RUN(no_eye_of_the_cell_sees_behind_a_texel);
     RUN(nothing_appears_farther_off_than_allowed);

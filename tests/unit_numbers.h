@@ -189,7 +189,7 @@ static void eyes_at_the_end_of_the_world_get_finite_matrices(void)
     free(samples);
 }
 
-static void numbers_tests(void)
+static inline void numbers_tests(void)
 {
     RUN(decisions_do_not_depend_on_the_unit_of_length);
     RUN(eyes_at_the_end_of_the_world_get_finite_matrices);

@@ -1437,14 +1437,19 @@ static void pages_are_wanted_by_all_views(void)
     p->memory = NULL;
 }
 
-static void pages_tests(void)
+static inline void pages_tests(void)
 {
     RUN(bad_pages);
+    RUN(pages_that_are_no_good_are_refused);
+}
+
+/* What flies: of the program flights.c. */
+static inline void pages_flights(void)
+{
     RUN(pages_say_what_memory_does);
     RUN(pages_above_blocks_miss_no_sample);
     RUN(pages_are_built_in_any_order);
     RUN(pages_are_edited);
-    RUN(pages_that_are_no_good_are_refused);
     RUN(pages_are_closed_upwards);
     RUN(pages_answer_heights_and_rays);
     RUN(pages_settle_to_what_memory_shows);

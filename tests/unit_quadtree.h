@@ -95,7 +95,7 @@ static void a_walk_sees_all_nodes_closest_first(void)
     }
 }
 
-static void quadtree_tests(void)
+static inline void quadtree_tests(void)
 {
     RUN(nodes_are_numbered_and_related_by_their_places);
     RUN(a_walk_sees_all_nodes_closest_first);

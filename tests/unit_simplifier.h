@@ -675,7 +675,7 @@ static void a_rectangle_of_a_field_simplifies_by_one_call(void)
     }
 }
 
-static void simplifier_tests(void)
+static inline void simplifier_tests(void)
 {
     RUN(a_rectangle_of_a_field_simplifies_by_one_call);
     RUN(border_keeps_its_ends_rises_and_beats_straight_lines);

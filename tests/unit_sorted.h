@@ -791,7 +791,7 @@ static void pieces_of_pictures_are_in_painters_order(void)
         return;
     memset(&d, 0, sizeof d), memset(&h, 0, sizeof h), memset(&draw, 0, sizeof draw);
     h.l = &l;
-    d.ground_tolerance_px = 0.25f, d.max_cost = 9000.0f;
+    d.ground_tolerance_px = 0.25f, d.max_cost = 9000.0f, d.cost_limit = terrimp_view_cost_limit();
     d.no_splits = 1; /* these are not cut */
     d.costs.capture = 100.0f, d.costs.ground_px = d.costs.impostor_px = 0.02f;
     draw.user = &h, draw.begin_capture = piece_begin, draw.end_capture = piece_end;
@@ -1057,6 +1057,7 @@ static void views_keep_to_their_cost(void)
             d.mode = mode;
             d.ground_tolerance_px = 0.25f;
             d.costs.capture = 100.0f;
+            d.cost_limit = terrimp_view_cost_limit();
             free_ratio = pace_fly(&l, &d, &median, &mean, &most, &rests);
             d.max_cost = 0.9f * mean;
             ratio = pace_fly(&l, &d, &least, &limited, &most, &rests);
@@ -1104,6 +1105,11 @@ static void views_without_end_or_of_a_cost_refuse_bad_input(void)
     d.hider = &hider;
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
     d.hider = NULL;
+    d.max_cost = 1.0f; /* without its cost_limit */
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
+    CHECK(strcmp(terrimp_view_desc_trouble(one.terrain, &d), "max_cost") == 0);
+    d.cost_limit = terrimp_view_cost_limit();
+    CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_OK);
     d.max_cost = -1.0f;
     CHECK(terrimp_view_desc_resolve(one.terrain, &d, &out) == TERRIMP_E_RANGE);
     d.max_cost = not_a_number();
@@ -2224,7 +2230,7 @@ static void sorted_bears_odd_cameras(void)
     }
 }
 
-static void sorted_tests(void)
+static inline void sorted_tests(void)
 {
     RUN(sorted_needs_no_depth_buffer);
     RUN(views_in_painters_order_need_no_depth_buffer);

@@ -1212,7 +1212,7 @@ static void one_wild_sample_spoils_only_its_own_nodes(void)
     }
 }
 
-static void terrain_tests(void)
+static inline void terrain_tests(void)
 {
     RUN(parts_of_buffers_are_those_of_the_whole);
     RUN(terrain_defaults_are_those_of_the_table);

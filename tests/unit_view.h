@@ -2693,7 +2693,7 @@ static void the_field_that_is_wrong_is_named(void)
     land_free(&l);
 }
 
-static void view_tests(void)
+static inline void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
     RUN(view_defaults_are_those_of_the_table);

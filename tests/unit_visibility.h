@@ -882,7 +882,7 @@ static void visibility_refuses_what_makes_no_sense(void)
     visible_free(&s);
 }
 
-static void visibility_tests(void)
+static inline void visibility_tests(void)
 {
     RUN(visibility_hides_nothing_that_shows);
     RUN(visible_sets_hide_nothing_that_shows);
