@@ -10430,8 +10430,8 @@ static int terrimpi_cull_hides(terrimpi_cull *cull, const terrimpi_frame *f,
 }
 
 /* Whether the impostor cut runs at a node: far enough away, and small enough on the screen. A node
-   that has a picture keeps its place for a little longer. Where smaller ones may be and pages of its
-   children are missing it has to, with TERRIMPI_CULL_SHORT. */
+   that has a picture keeps its place for a little longer. Where smaller ones may be and pages of
+   its children are missing it has to, with TERRIMPI_CULL_SHORT. */
 static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *node, float closest,
                                   int has_picture, int smallest)
 {
@@ -10851,8 +10851,8 @@ typedef struct terrimpi_region {
     terrimpi_candidate *candidates;
     uint16_t candidate_count;            /* none: ground is all it can be */
     uint8_t fits;                        /* there are some, and a camera fits round each */
-    uint8_t kind;                        /* that shows it */
-    uint8_t late;                        /* its ground is coarser, since pages are missing */
+    uint8_t kind;                        /* that shows it; until that is decided, whether its
+                                            ground is coarser, since pages are missing */
     float pixels;                        /* that the candidates cover, about */
 } terrimpi_region;
 
@@ -11450,7 +11450,7 @@ static void terrimpi_regions_add(const terrimpi_frame *f, const terrimpi_cull_no
         terrimp_node node = terrimpi_tree_node(&f->terrain->tree, nodes[i].number);
         if (nodes[i].cuts & TERRIMPI_CULL_GROUND)
             terrimpi_view_add_ground(ground, mip, &node);
-        region->late |= (uint8_t)(mip && terrimpi_mip_ratio_of(mip, node.number) < 0.0f);
+        region->kind |= (uint8_t)(mip && terrimpi_mip_ratio_of(mip, node.number) < 0.0f);
         if (!(nodes[i].cuts & TERRIMPI_CULL_IMPOSTOR))
             continue;
         if (regions->candidate_count < f->desc->max_impostors) {
@@ -11883,7 +11883,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     int before = v->kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
-    int is_known = !region->late;
+    int is_known = !region->kind;
     terrimpi_region_measure(&v->frame, &v->cache, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
         possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
@@ -12126,7 +12126,7 @@ static uint32_t terrimpi_regions_queue(const terrimpi_frame *f, const terrimpi_j
             float weight = terrimpi_max(c->pixels / (1.0f + c->pixels), 1e-3f) + c->pixels;
             if (r->kind != TERRIMPI_VIEW_KIND_IMPOSTOR ||
                 (begun && begun->plan.node.number == c->node.number) ||
-                (c->urgency < 1.0f &&
+                (c->urgency < 1.0f && !c->is_short && /* that one only asks for pages */
                  (f->desc->no_spreading || c->urgency < TERRIMPI_VIEW_EARLY)))
                 continue;
             c->rank = !terrimpi_candidate_ready(c) ? TERRIMPI_JOB_RANK_MISSING
@@ -12191,7 +12191,7 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_job *j
 static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
 {
     terrimpi_job job;
-    if (v->terrain->tree.pages && c->urgency >= 1.0f)
+    if (v->terrain->tree.pages && (c->urgency >= 1.0f || c->is_short))
         terrimpi_job_prepare(v, c, 0, &job);
 }
 

@@ -1020,8 +1020,8 @@ static void paged_show(const land *l, const terrimp_camera *camera, paged_frame 
             frame->impostors[frame->impostor_count++] = frame->impostors[i];
 }
 
-/* A low camera from where a hider hides something; NULL: sets, after their cell there is built. With
-   wide cells all may be seen from anywhere. */
+/* A low camera from where a hider hides something; NULL: sets, after their cell there is built.
+   With wide cells all may be seen from anywhere. */
 static terrimp_camera paged_low_camera(const land *l, terrimp_hider *hider, terrimp_sets *sets,
                                        const float *walls)
 {
@@ -1149,6 +1149,32 @@ static void pages_settle_to_what_memory_shows(void)
     free(walls);
     free(p->memory);
     p->memory = NULL;
+}
+
+/* Level ground is drawn as one node, exact from anywhere: nothing finer is asked for, nor are
+   smaller impostors than that node, which is too large for one. */
+static void pages_that_nothing_needs_are_not_wanted(void)
+{
+    paged_land p;
+    terrimp_view *view;
+    terrimp_camera camera;
+    terrimp_want wants[8];
+    uint32_t frame, count;
+    paged_prepare(&p, 513, 513, TERRIMP_FORMAT_U16, LAND_FLAT, 32, 0);
+    if (!paged_build(&p) || !paged_open(&p, 40))
+        return;
+    CHECK(paged_fetch(&p, p.info.node_count - 1u) == TERRIMP_OK);
+    camera = paged_camera(&p.l, 0);
+    camera.eye[1] = 900.0f;
+    view = paged_view(p.opened, TERRIMP_MODE_AUTO, 0.0f, NULL);
+    for (frame = 0; frame < 4u; frame++) {
+        CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+        CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_pages_wants(p.opened, wants, 8, &count) == TERRIMP_OK);
+        CHECK(count == 0);
+    }
+    terrimp_view_destroy(view);
+    paged_free(&p);
 }
 
 /* Morphing: vertices move as those of memory do, to the far edges of any size; and from pages that
@@ -1453,6 +1479,7 @@ static inline void pages_flights(void)
     RUN(pages_are_closed_upwards);
     RUN(pages_answer_heights_and_rays);
     RUN(pages_settle_to_what_memory_shows);
+    RUN(pages_that_nothing_needs_are_not_wanted);
     RUN(pages_morph_as_memory_does);
     RUN(pages_fly_without_holes);
     RUN(pages_asked_for_are_in_use);
