@@ -20849,11 +20849,12 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
    0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
           have an alpha, the share of the pixels in the fade band; texture matrices and
           terrimp_texture_coordinates take positions relative to the eye of the picture;
-          exact_depth; terrimp_view_set; a hider, which hides what lies behind ridges; first what
-          draws, then what builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement.
-          Gone: the pair of atlases (a benchmark has it), evict, query, rect, reset and room of the
-          live atlas, fitted heights, stitched patterns, upper_skirts, terrimp_capture_rate,
-          terrimp_heightfield_sample
+          exact_depth, endless and cost_limit, asked for by functions of their own, so that others
+          do not link what they need; terrimp_view_set; a hider, which hides what lies behind
+          ridges; statistics are counted when they are asked for; first what draws, then what
+          builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement. Gone: the pair of
+          atlases (a benchmark has it), evict, query, rect, reset and room of the live atlas, fitted
+          heights, stitched patterns, upper_skirts, terrimp_capture_rate, terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any
    0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of
