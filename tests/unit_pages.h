@@ -1347,11 +1347,13 @@ static void pages_asked_for_are_in_use(void)
     p->memory = NULL;
 }
 
-/* Of the pages that are here, which have been asked for from one place, when little was known: the
-   last frame uses all that are in sight, but for the children of such ones, since a guess is too
-   fine by one level at most; and of ground, which is all that a frame uses unless it makes
-   pictures, none is out of sight by the root's heights. Returns how many are in use. */
-static uint32_t paged_check_reads(const paged_land *p, const terrimp_camera *camera, int mode)
+/* Of the pages that are here, which have been asked for from one place, when little was known: all
+   that are in sight are `needed`, but for the children of such ones, since a guess is too fine by
+   one level at most: in the last frame, or with pictures in any, since what these are made of is
+   not used again; and of ground, which is all that a frame uses unless it makes pictures, none is
+   out of sight by the root's heights. Returns how many are in use. */
+static uint32_t paged_check_reads(const paged_land *p, const terrimp_camera *camera, int mode,
+                                  const unsigned char *needed)
 {
     const struct terrimp_pages *pages = p->opened->tree.pages;
     const terrimp_quadtree *tree = &p->opened->tree;
@@ -1366,8 +1368,7 @@ static uint32_t paged_check_reads(const paged_land *p, const terrimp_camera *cam
             continue;
         CHECK(terrimp_geomip_box(tree, node, &box) == TERRIMP_OK);
         if (terrimp_frustum_test(&frustum, &box, TERRIMP_PLANES_ALL) != TERRIMP_PLANES_OUTSIDE)
-            CHECK(pages->slots[i].used == pages->frame ||
-                  terrimpi_page_above(tree, node)->used == pages->frame);
+            CHECK(needed[node] || needed[terrimpi_tree_parent_number(tree, node)]);
         box.min[1] = root.min[1];
         box.max[1] = root.max[1];
         CHECK(pages->slots[i].used == pages->frame || mode != TERRIMP_MODE_GEOMIP ||
@@ -1390,13 +1391,20 @@ static void pages_of_a_jump_come_at_once(void)
         terrimp_camera camera = paged_camera(&p->l, turn / 2u);
         uint32_t count = 1, rounds = 0, reads = 0, i;
         int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        unsigned char *needed = (unsigned char *)calloc(p->l.info.node_count, 1);
         free(p->memory);
         paged_open(p, PAGED_ALL);
         CHECK(paged_fetch(p, p->l.info.node_count - 1u) == TERRIMP_OK);
         view = paged_view(p->opened, mode, 0.0f, NULL);
         while (count > 0 && rounds < 20u) {
+            const struct terrimp_pages *pages = p->opened->tree.pages;
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
             CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+            for (i = 0; i < p->l.info.node_count; i++) {
+                const terrimpi_page_slot *slot = terrimpi_page_slot_of(pages, i);
+                needed[i] = (needed[i] && mode == TERRIMP_MODE_AUTO) ||
+                            (slot && slot->used == pages->frame);
+            }
             CHECK(terrimp_pages_wants(p->opened, wants, 512, &count) == TERRIMP_OK);
             for (i = 0; i < count; i++)
                 CHECK(paged_fetch(p, wants[i].node) == TERRIMP_OK); /* parents come first */
@@ -1405,7 +1413,8 @@ static void pages_of_a_jump_come_at_once(void)
         }
         CHECK(rounds <= p->opened->tree.level_count / 2u + reads / TERRIMPI_PAGE_WANTS);
         all_reads += reads;
-        all_used += paged_check_reads(p, &camera, mode);
+        all_used += paged_check_reads(p, &camera, mode, needed);
+        free(needed);
         terrimp_view_destroy(view);
     }
     CHECK(all_reads * 2u <= all_used * 3u);
