@@ -2827,8 +2827,8 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc);
    placement  out
    Errors     E_RANGE also for a parent that is not greater, or a gain of two candidates
    Cost       about O(gains + chosen * log(candidates)): scores only ever fall, so that only the
-              best one is scored anew until it stays the best. 1.6 s for 300,000 candidates with
-              3.1 million gains, 26 bytes of scratch memory for each of these
+              best one is scored anew until it stays the best. 0.8 s for 300,000 candidates with
+              3.1 million gains, 27 bytes of scratch memory for each of these
    Source     Jeschke 2004, section 5.7; all after the choice is ours */
 TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *scratch,
                                          size_t bytes, uint8_t *shown, float *costs,
@@ -20101,13 +20101,16 @@ typedef struct terrimpi_place_work {
     uint8_t *shown;     /* [gain_count] */
     float *scores;      /* [candidate_count] gain for memory when it was last looked at */
     uint32_t *heap;     /* [candidate_count] the best score first */
-    uint32_t *owner;    /* [gain_count] candidate */
-    uint32_t *first;    /* [view_count] gains shown in each view, as a list */
-    uint32_t *next;     /* [gain_count] */
+    uint32_t *cluster;  /* [gain_count] */
+    uint32_t *first;    /* [view_count + 1] where the gains of each view begin in list */
+    uint32_t *count;    /* [view_count] those that are shown */
+    uint32_t *list;     /* [gain_count] these gains */
+    uint32_t *rank;     /* [cluster_count] see terrimpi_place_rank */
+    uint32_t *low;      /* [cluster_count] */
     uint32_t heap_count;
     uint8_t *wish;      /* [candidate_count] TERRIMPI_PLACE_... */
     uint8_t *best;      /* [gain_count] what the best attempt shows */
-    uint8_t *made;      /* [candidate_count] its memory is paid for */
+    uint8_t *made;      /* [gain_count] its picture's memory is paid for */
     uint32_t *spare;    /* [view_count] gains of those, as a list: */
     uint32_t *another;  /* [gain_count] */
     uint32_t *log;      /* [3 * gain_count] gains that were shown or hidden, to be undone */
@@ -20120,12 +20123,15 @@ static size_t terrimpi_place_layout(const terrimp_place_desc *d, void *base, ter
     p->desc = d;
     p->scores = (float *)terrimpi_take(&arena, d->candidate_count, sizeof *p->scores);
     p->heap = (uint32_t *)terrimpi_take(&arena, d->candidate_count, sizeof *p->heap);
-    p->owner = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->owner);
-    p->first = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->first);
-    p->next = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->next);
+    p->cluster = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->cluster);
+    p->first = (uint32_t *)terrimpi_take(&arena, (size_t)d->view_count + 1u, sizeof *p->first);
+    p->count = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->count);
+    p->list = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->list);
+    p->rank = (uint32_t *)terrimpi_take(&arena, d->cluster_count, sizeof *p->rank);
+    p->low = (uint32_t *)terrimpi_take(&arena, d->cluster_count, sizeof *p->low);
     p->wish = (uint8_t *)terrimpi_take(&arena, d->candidate_count, 1);
     p->best = (uint8_t *)terrimpi_take(&arena, d->gain_count, 1);
-    p->made = (uint8_t *)terrimpi_take(&arena, d->candidate_count, 1);
+    p->made = (uint8_t *)terrimpi_take(&arena, d->gain_count, 1);
     p->spare = (uint32_t *)terrimpi_take(&arena, d->view_count, sizeof *p->spare);
     p->another = (uint32_t *)terrimpi_take(&arena, d->gain_count, sizeof *p->another);
     p->log = (uint32_t *)terrimpi_take(&arena, d->gain_count, 3 * sizeof *p->log);
@@ -20138,12 +20144,28 @@ TERRIMP_API size_t terrimp_place_scratch_bytes(const terrimp_place_desc *desc)
     return desc ? terrimpi_place_layout(desc, NULL, &p) : 0;
 }
 
-/* Whether a cluster is another one or lies within it: parents have greater numbers. */
+/* Ranks the clusters so that those within one have the ranks from above low to its own. */
+static void terrimpi_place_rank(terrimpi_place_work *p)
+{
+    const uint32_t *parents = p->desc->parents;
+    uint32_t i, roots = p->desc->cluster_count;
+    for (i = 0; i < p->desc->cluster_count; i++)
+        p->low[i] = 1;
+    for (i = 0; i < p->desc->cluster_count; i++) /* parents have greater numbers */
+        if (parents[i] != i)
+            p->low[parents[i]] += p->low[i];
+    while (i-- > 0) {
+        uint32_t *end = parents[i] == i ? &roots : &p->low[parents[i]], count = p->low[i];
+        p->rank[i] = *end;
+        p->low[i] = *end - 1u;
+        *end -= count;
+    }
+}
+
+/* Whether a cluster is another one or lies within it. */
 static int terrimpi_place_within(const terrimpi_place_work *p, uint32_t cluster, uint32_t other)
 {
-    while (cluster < other && p->desc->parents[cluster] != cluster)
-        cluster = p->desc->parents[cluster];
-    return cluster == other;
+    return p->rank[other] - p->rank[cluster] < p->rank[other] - p->low[other];
 }
 
 /* What a picture would take off a view's cost: less what pictures of the same cluster or its parts
@@ -20151,12 +20173,13 @@ static int terrimpi_place_within(const terrimpi_place_work *p, uint32_t cluster,
 static float terrimpi_place_net(const terrimpi_place_work *p, uint32_t gain)
 {
     const terrimp_place_gain *g = &p->desc->gains[gain];
-    uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i;
+    const uint32_t *list = p->list + p->first[g->view];
+    uint32_t cluster = p->cluster[gain], i;
     float net = g->saved;
-    for (i = p->first[g->view]; i != TERRIMPI_PLACE_NONE; i = p->next[i]) {
-        uint32_t other = p->desc->candidates[p->owner[i]].cluster;
+    for (i = p->count[g->view]; i-- > 0;) {
+        uint32_t other = p->cluster[list[i]];
         if (terrimpi_place_within(p, other, cluster))
-            net -= p->desc->gains[i].saved;
+            net -= p->desc->gains[list[i]].saved;
         else if (terrimpi_place_within(p, cluster, other))
             return 0.0f;
     }
@@ -20213,30 +20236,27 @@ static void terrimpi_place_sink(terrimpi_place_work *p, uint32_t at)
 static void terrimpi_place_toggle(terrimpi_place_work *p, uint32_t gain)
 {
     const terrimp_place_gain *g = &p->desc->gains[gain];
-    uint32_t *at = &p->first[g->view];
+    uint32_t *list = p->list + p->first[g->view], *count = &p->count[g->view], i;
     p->log[p->log_count++] = gain;
     p->shown[gain] = !p->shown[gain];
     if (p->shown[gain]) {
-        p->next[gain] = *at;
-        *at = gain;
+        list[(*count)++] = gain;
         p->costs[g->view] -= g->saved;
         return;
     }
-    while (*at != gain)
-        at = &p->next[*at];
-    *at = p->next[gain];
+    for (i = 0; list[i] != gain; i++) {}
+    list[i] = list[--*count];
     p->costs[g->view] += g->saved;
 }
 
 /* Shows a picture in a view, in place of those of the same cluster and its parts. */
 static void terrimpi_place_show(terrimpi_place_work *p, uint32_t gain)
 {
-    uint32_t cluster = p->desc->candidates[p->owner[gain]].cluster, i, after;
-    for (i = p->first[p->desc->gains[gain].view]; i != TERRIMPI_PLACE_NONE; i = after) {
-        after = p->next[i];
-        if (terrimpi_place_within(p, p->desc->candidates[p->owner[i]].cluster, cluster))
-            terrimpi_place_toggle(p, i);
-    }
+    uint32_t view = p->desc->gains[gain].view, i;
+    const uint32_t *list = p->list + p->first[view];
+    for (i = p->count[view]; i-- > 0;)
+        if (terrimpi_place_within(p, p->cluster[list[i]], p->cluster[gain]))
+            terrimpi_place_toggle(p, list[i]);
     terrimpi_place_toggle(p, gain);
 }
 
@@ -20295,7 +20315,7 @@ static int terrimpi_place_stand_in(terrimpi_place_work *p, uint32_t view, float 
         float most = 0.0f;
         for (i = p->spare[view]; i != TERRIMPI_PLACE_NONE; i = p->another[i]) {
             float useful = terrimpi_place_useful(p, i);
-            if (useful > most && p->made[p->owner[i]] && !p->shown[i]) {
+            if (useful > most && p->made[i] && !p->shown[i]) {
                 most = useful;
                 best = i;
             }
@@ -20313,7 +20333,7 @@ static void terrimpi_place_drop(terrimpi_place_work *p, uint32_t candidate)
     const terrimp_place_candidate *c = &p->desc->candidates[candidate];
     uint32_t i;
     p->log_count = 0;
-    p->made[candidate] = 0;
+    memset(p->made + c->first_gain, 0, c->gain_count);
     for (i = c->first_gain; i < c->first_gain + c->gain_count; i++) {
         uint32_t view = p->desc->gains[i].view;
         float cost = p->costs[view];
@@ -20326,27 +20346,11 @@ static void terrimpi_place_drop(terrimpi_place_work *p, uint32_t candidate)
             p->log_count = i; /* where undoing is noted, and forgotten */
             terrimpi_place_toggle(p, p->log[i]);
         }
-        p->made[candidate] = 1;
+        memset(p->made + c->first_gain, 1, c->gain_count);
         return;
     }
 }
 
-/* Lists, view by view, what pictures that are paid for could do. */
-static void terrimpi_place_spares(terrimpi_place_work *p)
-{
-    uint32_t i;
-    for (i = 0; i < p->desc->candidate_count; i++)
-        p->made[i] = (uint8_t)terrimpi_place_uses(p, p->shown, i);
-    for (i = 0; i < p->desc->view_count; i++)
-        p->spare[i] = TERRIMPI_PLACE_NONE;
-    for (i = p->desc->gain_count; i-- > 0;) {
-        uint32_t view = p->desc->gains[i].view;
-        if (p->owner[i] == TERRIMPI_PLACE_NONE || !p->made[p->owner[i]])
-            continue;
-        p->another[i] = p->spare[view];
-        p->spare[view] = i;
-    }
-}
 
 static int terrimpi_place_smaller(const void *candidates, uint32_t a, uint32_t b)
 {
@@ -20354,15 +20358,25 @@ static int terrimpi_place_smaller(const void *candidates, uint32_t a, uint32_t b
     return c[a].memory < c[b].memory;
 }
 
-/* Gives back what others can stand in for, the largest first. */
+/* Lists, view by view, what pictures that are paid for could do; then gives back those that others
+   can stand in for, the largest first. */
 static void terrimpi_place_give_back(terrimpi_place_work *p)
 {
+    const terrimp_place_candidate *c = p->desc->candidates;
     uint32_t i, count = 0;
-    terrimpi_place_spares(p);
+    memset(p->spare, 0xff, p->desc->view_count * sizeof *p->spare);
+    memset(p->made, 0, p->desc->gain_count);
     for (i = 0; i < p->desc->candidate_count; i++)
-        if (p->made[i])
+        if (terrimpi_place_uses(p, p->shown, i)) {
+            memset(p->made + c[i].first_gain, 1, c[i].gain_count);
             p->heap[count++] = i;
-    terrimpi_sort(p->heap, count, p->desc->candidates, terrimpi_place_smaller);
+        }
+    for (i = p->desc->gain_count; i-- > 0;)
+        if (p->made[i]) {
+            p->another[i] = p->spare[p->desc->gains[i].view];
+            p->spare[p->desc->gains[i].view] = i;
+        }
+    terrimpi_sort(p->heap, count, c, terrimpi_place_smaller);
     for (i = 0; i < count; i++)
         terrimpi_place_drop(p, p->heap[i]);
 }
@@ -20408,11 +20422,9 @@ static void terrimpi_place_sum(const terrimpi_place_work *p, terrimp_placement *
 /* Places from the beginning, as wished. */
 static void terrimpi_place_attempt(terrimpi_place_work *p, terrimp_placement *out)
 {
-    uint32_t i;
     memcpy(p->costs, p->desc->costs, p->desc->view_count * sizeof *p->costs);
     memset(p->shown, 0, p->desc->gain_count);
-    for (i = 0; i < p->desc->view_count; i++)
-        p->first[i] = TERRIMPI_PLACE_NONE;
+    memset(p->count, 0, p->desc->view_count * sizeof *p->count);
     terrimpi_place_greedily(p);
     terrimpi_place_give_back(p);
     terrimpi_place_sum(p, out);
@@ -20462,13 +20474,19 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     p.costs = costs;
     p.shown = shown;
     memset(p.wish, 0, desc->candidate_count);
-    memset(p.owner, 0xff, desc->gain_count * sizeof *p.owner); /* gains may be nobody's */
+    memset(p.cluster, 0xff, desc->gain_count * sizeof *p.cluster); /* gains may be nobody's */
     for (i = 0; i < desc->candidate_count; i++)
         for (k = 0; k < desc->candidates[i].gain_count; k++) {
-            uint32_t *owner = &p.owner[desc->candidates[i].first_gain + k];
-            TERRIMPI_REFUSE(*owner != TERRIMPI_PLACE_NONE, TERRIMP_E_RANGE);
-            *owner = i;
+            uint32_t *cluster = &p.cluster[desc->candidates[i].first_gain + k];
+            TERRIMPI_REFUSE(*cluster != TERRIMPI_PLACE_NONE, TERRIMP_E_RANGE);
+            *cluster = desc->candidates[i].cluster;
         }
+    terrimpi_place_rank(&p);
+    memset(p.first, 0, ((size_t)desc->view_count + 1u) * sizeof *p.first);
+    for (i = 0; i < desc->gain_count; i++)
+        p.first[desc->gains[i].view + 1u]++;
+    for (i = 0; i < desc->view_count; i++)
+        p.first[i + 1u] += p.first[i];
     terrimpi_place_attempt(&p, placement);
     memcpy(p.best, shown, desc->gain_count);
     terrimpi_place_improve(&p, placement);

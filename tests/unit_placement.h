@@ -163,16 +163,20 @@ static float exact_placing(const placing *p, uint32_t *unsolved)
     return least;
 }
 
-/* Against all sets of candidates: as many views are solved, with nearly as little memory. */
+/* Against all sets of candidates: as many views are solved, with nearly as little memory. At last
+   three that take 9 to 14 % more unless pairs of candidates are tried, found among 20,000. */
 static void placements_take_little_more_memory_than_the_exact_answer(void)
 {
+    static const uint32_t hard[] = {1173298187u, 869780051u, 287242002u};
     placing *p = &place_room;
     float worst = 0.0f;
     int n, count = 0, more = 0;
-    for (n = 0; n < PLACE_SETS; n++) {
+    for (n = 0; n < PLACE_SETS + 3; n++) {
         terrimp_placement out;
         uint32_t fewest;
         float least;
+        if (n >= PLACE_SETS)
+            check_state = hard[n - PLACE_SETS];
         random_placing(p);
         CHECK(run_placing(p, &out) == TERRIMP_OK);
         least = exact_placing(p, &fewest);
