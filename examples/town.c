@@ -475,7 +475,8 @@ int main(int argc, char **argv)
     int n, judged = 0;
     if (!samples || trees > 4000)
         return 2;
-    plot *= sqrtf((float)trees / 105.0f);
+    if (trees > 105) /* fewer stand farther apart: houses and the flight take as much room */
+        plot *= sqrtf((float)trees / 105.0f);
     field.samples = samples, field.width = field.depth = SIDE, field.format = TERRIMP_FORMAT_U16;
     field.height_scale = 0.15f * PROCEDURAL_HEIGHT_SCALE;
     field.spacing_x = field.spacing_z = plot / 16;
