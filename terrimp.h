@@ -18424,20 +18424,10 @@ static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
 /* How many steps of the far side take 1 / depth from d to the target or beyond. */
 static uint32_t terrimpi_layers_steps(float d, float shrink, float shift, float target)
 {
-    float shrinks[17], shifts[17];
-    uint32_t steps = 0;
-    int i;
-    for (i = 0; i < 17; i++) {
-        shrinks[i] = shrink;
-        shifts[i] = shift;
-        shift *= 2.0f - shrink;
-        shrink *= 2.0f - shrink;
-    }
-    for (i = 16; i >= 0; i--)
-        if (d - (shrinks[i] * d + shifts[i]) > target) {
-            d -= shrinks[i] * d + shifts[i];
-            steps += 1u << i;
-        }
+    uint32_t steps = 0, more;
+    for (more = 1u << 16; more > 0; more /= 2u)
+        if (terrimpi_layer_walk(d, shrink, shift, steps + more) > target)
+            steps += more;
     return steps + 1u;
 }
 
@@ -18504,15 +18494,17 @@ static uint32_t terrimpi_mask_tail(uint32_t width)
     return 0xffffffffu >> (31u - (width - 1u) % 32u);
 }
 
+/* The bits of a word of a row that are columns x to end - 1. */
+static uint32_t terrimpi_mask_span(uint32_t word, uint32_t x, uint32_t end)
+{
+    return (word == x / 32u ? 0xffffffffu << x % 32u : 0xffffffffu) &
+           (word == (end - 1u) / 32u ? terrimpi_mask_tail(end) : 0xffffffffu);
+}
+
 /* A word of a row's bits, without what lies outside of columns x to end - 1. */
 static uint32_t terrimpi_mask_word(const uint32_t *row, uint32_t word, uint32_t x, uint32_t end)
 {
-    uint32_t bits = word * 32u < end ? row[word] : 0u;
-    if (word == x / 32u)
-        bits &= 0xffffffffu << x % 32u;
-    if (word == (end - 1u) / 32u)
-        bits &= terrimpi_mask_tail(end);
-    return bits;
+    return word * 32u < end ? row[word] & terrimpi_mask_span(word, x, end) : 0u;
 }
 
 /* Adds opaque texels to a row of state, then keeps those whose neighbour at dx is there as well. */
@@ -18873,10 +18865,9 @@ TERRIMP_API terrimp_result terrimp_cover(const terrimp_cover_desc *desc, void *s
     terrimpi_cover c;
     size_t needed;
     uint32_t i, kept;
-    TERRIMPI_REFUSE(!desc || !desc->mask || !scratch || !rects || !count, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
+    TERRIMPI_REFUSE(!desc || !desc->mask || !rects || !count, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_cover_begin(desc, scratch, capacity, &c, &needed));
-    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
     terrimpi_cover_swap(&c);
     c.nodes[0].rect = terrimpi_rect(0, 0, desc->width, desc->height);
     c.node_count = terrimpi_cover_tighten(&c, &c.nodes[0].rect) > 0;
@@ -18973,8 +18964,7 @@ static void terrimpi_mask_fill(uint32_t *row, uint32_t x, uint32_t end)
 {
     uint32_t word;
     for (word = x / 32u; x < end && word <= (end - 1u) / 32u; word++)
-        row[word] |= (word == x / 32u ? 0xffffffffu << x % 32u : 0xffffffffu) &
-                     (word == (end - 1u) / 32u ? terrimpi_mask_tail(end) : 0xffffffffu);
+        row[word] |= terrimpi_mask_span(word, x, end);
 }
 
 /* The part of a convex polygon [count][2] between two heights, in columns; 0 when there is none. */
@@ -19018,7 +19008,8 @@ static void terrimpi_record_polygon(const terrimp_layer_record *r, uint32_t laye
                                     uint32_t count)
 {
     float low = TERRIMPI_FLOAT_MAX, high = -TERRIMPI_FLOAT_MAX, left, right;
-    uint32_t i, y, end;
+    float centre = r->no_outline ? 0.5f : 0.0f;
+    uint32_t i, y, end, touched = !r->no_outline;
     for (i = 0; i < count; i++) {
         low = terrimpi_min(low, uv[2u * i + 1u]);
         high = terrimpi_max(high, uv[2u * i + 1u]);
@@ -19027,18 +19018,13 @@ static void terrimpi_record_polygon(const terrimp_layer_record *r, uint32_t laye
         return;
     end = terrimpi_min_u32(terrimpi_record_texel(high, r->height) + 1u, r->height);
     for (y = terrimpi_record_texel(low, r->height); y < end; y++) {
-        float bottom = (float)y + (r->no_outline ? 0.5f : 0.0f);
-        float top = (float)y + (r->no_outline ? 0.5f : 1.0f);
-        if (!terrimpi_record_polygon_row(uv, count, bottom, top, &left, &right) || right < 0.0f)
-            continue;
-        if (r->no_outline)
+        if (terrimpi_record_polygon_row(uv, count, (float)y + centre, (float)(y + 1u) - centre,
+                                        &left, &right) &&
+            right >= 0.0f)
             terrimpi_mask_fill(terrimpi_record_row(r, layer, y),
-                               terrimpi_record_texel(left + 0.5f, r->width),
-                               terrimpi_record_texel(right + 0.5f, r->width));
-        else
-            terrimpi_mask_fill(
-                terrimpi_record_row(r, layer, y), terrimpi_record_texel(left, r->width),
-                terrimpi_min_u32(terrimpi_record_texel(right, r->width) + 1u, r->width));
+                               terrimpi_record_texel(left + centre, r->width),
+                               terrimpi_min_u32(terrimpi_record_texel(right + centre, r->width) +
+                                                    touched, r->width));
     }
 }
 
@@ -19839,8 +19825,8 @@ static uint32_t terrimpi_depth_pass(terrimpi_depth *d, float before, float longe
     uint32_t vertex, i, done = 0;
     for (vertex = 0; vertex < d->corner_count; vertex++) {
         float lengths[2u * TERRIMPI_DEPTH_STAR];
-        uint32_t next = 0;
-        int collapsed;
+        uint32_t next;
+        int collapsed = 0;
         if (d->at[vertex] == TERRIMPI_DEPTH_END || !terrimpi_depth_collect(d, vertex, &s))
             continue;
         for (i = 0; i < s.other_count; i++) {
@@ -19849,20 +19835,16 @@ static uint32_t terrimpi_depth_pass(terrimpi_depth *d, float before, float longe
                 lengths[i] = 0.0f; /* not to be tried, or no more */
         }
         d->stale[vertex] = 1;
-        while (next != TERRIMPI_DEPTH_END) {
-            next = TERRIMPI_DEPTH_END;
-            for (i = 0; i < s.other_count; i++)
-                if (lengths[i] > 0.0f &&
-                    (next == TERRIMPI_DEPTH_END || lengths[i] < lengths[next]))
+        while (collapsed <= 0) {
+            for (i = 0, next = 0; i < s.other_count; i++)
+                if (lengths[i] > 0.0f && (!(lengths[next] > 0.0f) || lengths[i] < lengths[next]))
                     next = i;
-            if (next == TERRIMPI_DEPTH_END)
+            if (!s.other_count || !(lengths[next] > 0.0f))
                 break;
             lengths[next] = 0.0f;
             collapsed = terrimpi_depth_collapse(d, &s, vertex, next, longest);
             if (collapsed < 0)
                 d->stale[vertex] = 0;
-            if (collapsed > 0)
-                next = TERRIMPI_DEPTH_END;
             done += collapsed > 0;
         }
     }
@@ -20827,12 +20809,11 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare p;
     size_t needed;
     uint32_t i;
-    TERRIMPI_REFUSE(!scratch || !set || !set->candidates || !set->pictures || !set->gains ||
+    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains ||
                         !set->parents || !set->costs,
                     TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
-    TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
-    TERRIMPI_REFUSE(bytes < needed, TERRIMP_E_MEMORY);
+    TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
     p.set = set;
     set->cluster_count = p.nodes;
     set->view_count = p.cells * p.cells * p.desc.directions;

@@ -1146,6 +1146,41 @@ static void depth_meshes_keep_to_their_layers_and_these_to_them(void)
     }
 }
 
+/* A surface that is seen edge-on in the first column, all layers deep, with two surfaces beside it
+   that it might go on in: the closer one shares its edge, the other one reaches all the way to it. */
+static void folds_reach_the_edge_that_they_begin_at(void)
+{
+    enum { ROWS = 8, DEEP = 6 };
+    static uint32_t masks[DEEP][ROWS];
+    static uint64_t scratch[8000];
+    terrimp_depth_mesh_desc d;
+    terrimp_depth_mesh m;
+    uint32_t i, at[2] = {0, 0};
+    for (i = 0; i < DEEP * ROWS; i++)
+        masks[i / ROWS][i % ROWS] = i / ROWS % (DEEP - 1) ? 1u : 7u;
+    memset(&d, 0, sizeof d);
+    d.opaque = d.visible = masks[0];
+    d.width = 3;
+    d.height = ROWS;
+    d.layers = DEEP;
+    memset(&m, 0, sizeof m);
+    m.vertices = depth_vertices;
+    m.indices = depth_indices;
+    m.sheets = depth_sheets;
+    m.texel_layers = depth_texels;
+    m.vertex_capacity = m.index_capacity = m.sheet_capacity = m.texel_capacity = 1000;
+    CHECK(terrimp_depth_mesh_make(&d, scratch, sizeof scratch, &m) == TERRIMP_OK);
+    CHECK(m.sheet_count == 2);
+    for (i = 0; i < m.index_count; i++) {
+        const terrimp_depth_vertex *v = &m.vertices[m.indices[i]];
+        if (!same_float(v->u, 1.0f))
+            continue;
+        CHECK(same_float(v->layer, 0.0f));
+        at[i >= m.sheets[1].first_index]++;
+    }
+    CHECK(at[0] > 0 && at[1] > 0);
+}
+
 /* On layers vertices stand where layers do; between them what is straight in the world is straight
    in the grid, when the layers are even. */
 static void vertices_of_depth_meshes_stand_on_their_layers(void)
@@ -1577,6 +1612,7 @@ static inline void layers_tests(void)
     RUN(layers_of_pictures_with_depth_show_no_gap);
     RUN(corners_between_two_layers_are_closed);
     RUN(depth_meshes_keep_to_their_layers_and_these_to_them);
+    RUN(folds_reach_the_edge_that_they_begin_at);
     RUN(vertices_of_depth_meshes_stand_on_their_layers);
     RUN(layers_all_round_hold_the_world_beyond);
     RUN(layers_of_objects_pass_each_other_by_a_texel);
