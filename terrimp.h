@@ -6560,6 +6560,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
 #define TERRIMPI_TERRAIN_DIRECTIONS 8u           /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
 #define TERRIMPI_FLOOR_WALL_POINTS 4u          /* of the walls round it, for each of these */
+#define TERRIMPI_MESH_UNDER (1.0f / 8192.0f) /* of a node's side: see terrimpi_mesh_under */
 #define TERRIMPI_MESH_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
 #define TERRIMPI_MESH_INNER_STEPS 0xffffu     /* of those of inner vertices */
 
@@ -6567,7 +6568,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
 typedef struct terrimpi_mesh {
     float error, error_rms; /* [wu] of the mesh as drawn, against every sample */
     float base;             /* [wu] the heights of inner vertices count from it on */
-    float low, high;        /* [wu] of everything that is drawn of the node and of those below */
+    float low, high;        /* [wu] of its surface, the ground, and those of the nodes below */
     uint32_t counts;        /* 9 bits: triangles; 7: vertices of the border; 8: of the surface, 0 if
                                it is not built; 8: the exponent of the steps of inner heights */
 } terrimpi_mesh;
@@ -6927,12 +6928,26 @@ static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32
     return terrimpi_tree_opens(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
+/* How far the skirts of a level's meshes end below all ground: see terrimpi_mesh_skirt_foot. */
+static float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
+{
+    return TERRIMPI_MESH_UNDER * (float)(t->desc.chunk_quads << level) *
+           terrimpi_min(t->desc.field.spacing_x, t->desc.field.spacing_z);
+}
+
+/* The box of a node with the heights of a mesh: that of the node or of one above it. */
+static void terrimpi_terrain_mesh_box(const terrimp_terrain *t, const terrimp_node *node,
+                                      const terrimpi_mesh *mesh, terrimp_box *box)
+{
+    terrimpi_tree_box(&t->tree, node, mesh->low - terrimpi_mesh_under(t, node->level), mesh->high,
+                      box);
+}
+
 /* The box of a node: of everything drawn of it and of those below it. */
 static void terrimpi_terrain_node_box(const terrimp_terrain *t, const terrimp_node *node,
                                       terrimp_box *box)
 {
-    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node->number);
-    terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
+    terrimpi_terrain_mesh_box(t, node, terrimpi_mesh_of(t, node->number), box);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
@@ -7363,11 +7378,13 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
    (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most
    s + e there. When one of them is within D of L, both end at L <= s; else each hangs by D or,
-   since then L is deeper, by more, and the line is <= s + e - D <= s - e.
+   since then L is deeper, by more, and the line is <= s + e - D <= s - e. And all of that ends a
+   little lower: where ground is flat at L, a line of feet at L would be its border, but with other
+   vertices, and where the two are rounded apart a pixel shows the sky.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
-static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
-                                      uint32_t i)
+static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, uint32_t level,
+                                      const float *border, uint32_t i)
 {
     const terrimp_geomip_node *range = terrimpi_tree_kept(&t->tree, node);
     uint32_t n = terrimpi_mesh_border(terrimpi_mesh_of(t, node));
@@ -7376,9 +7393,9 @@ static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, c
                                 border[(i + n - 1u) % n * 3u + 1u]);
     float depth = terrimpi_max(2.0f * terrimpi_mesh_of(t, node)->error,
                                0.25f * (range->high - range->low));
-    if (terrimpi_min(lowest, height) - depth <= range->low)
-        return terrimpi_min(height, range->low);
-    return height - depth;
+    float foot = terrimpi_min(lowest, height) - depth <= range->low
+                     ? terrimpi_min(height, range->low) : height - depth;
+    return foot - terrimpi_mesh_under(t, level);
 }
 
 /* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
@@ -7405,7 +7422,7 @@ static void terrimpi_mesh_write(const terrimp_terrain *t, uint32_t node, float *
         return;
     memcpy(rim, xyz, (size_t)border * 3u * sizeof *rim);
     for (i = 0; i < border; i++)
-        rim[i * 3u + 1u] = terrimpi_mesh_skirt_foot(t, node, xyz, i);
+        rim[i * 3u + 1u] = terrimpi_mesh_skirt_foot(t, node, p.level, xyz, i);
     terrimpi_terrain_write_wall(indices + index_count, border, vertices, 0);
 }
 
@@ -9054,8 +9071,7 @@ static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node
     terrimp_node known = *node;
     while (!terrimpi_tree_record(&t->tree, known.number))
         known = terrimpi_tree_parent(&t->tree, &known);
-    terrimpi_tree_box(&t->tree, node, terrimpi_mesh_of(t, known.number)->low,
-                      terrimpi_mesh_of(t, known.number)->high, box);
+    terrimpi_terrain_mesh_box(t, node, terrimpi_mesh_of(t, known.number), box);
 }
 
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
