@@ -6928,7 +6928,8 @@ static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32
     return terrimpi_tree_opens(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
-/* How far the skirts of a level's meshes end below all ground: see terrimpi_mesh_skirt_foot. */
+/* How far the skirts of a level's meshes end below all ground, and their borders are over it: see
+   terrimpi_mesh_skirt_foot, terrimpi_build_lift_border. */
 static float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
 {
     return TERRIMPI_MESH_UNDER * (float)(t->desc.chunk_quads << level) *
@@ -16577,19 +16578,21 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
         }
 }
 
-/* Lifts the border until no ground beside it stands out: the corners, which are samples, and lines
-   of coarser ground over valleys would. What is missing at a place of a segment is asked of its
-   closer end, at most twice as much, which stays within the range of stored heights; a raised
-   vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
-   behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground
-   beside a mesh that is coarser by more than it is lifted for could leave one, of less than its
-   tolerance; to lift borders over all of it would double the errors of meshes where ridges are
-   steep. Neighbours of a level still share what lies between the corners. */
+/* Lifts the border until it is a little over all ground beside it: the corners, which are samples,
+   and lines of coarser ground over valleys would stand out, and ground that is level with a
+   border has other vertices there, so that a pixel may show the sky. What is missing at a place
+   of a segment is asked of its closer end, at most twice as much, which stays within the range
+   of stored heights; a raised vertex may have left that. So a ray that comes in over a mesh's
+   border comes in over all ground behind it, and what other meshes have over that is closed by
+   their skirts, which reach below the samples (see terrimpi_mesh_skirt_foot): there is no gap to
+   see the sky through. Ground beside a mesh that is coarser by more than it is lifted for could
+   leave one, of less than its tolerance; to lift borders over all of it would double the errors
+   of meshes where ridges are steep. Neighbours of a level still share what lies between the
+   corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    float *lift = build->work;
+    float *lift = build->work, over = terrimpi_mesh_under(t, p->level);
     uint32_t i, k;
     int side;
     terrimpi_build_segment s;
@@ -16610,7 +16613,7 @@ static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_
             for (k = s.from; k <= s.to; k++) {
                 float w = (float)(k - s.from) / (float)(s.to - s.from);
                 float *to = lift + (w > 0.5f ? s.b : s.a);
-                *to = terrimpi_max(*to, build->tops[k] / terrimpi_max(w, 1.0f - w));
+                *to = terrimpi_max(*to, (build->tops[k] + over) / terrimpi_max(w, 1.0f - w));
             }
         }
     }

@@ -39,7 +39,8 @@ static void no_hole_in_random_flights(void)
     static const uint32_t once[][2] = { /* seeds and paths with holes that were mended: */
         { 4244, 0 }, { 771007, 0 }, /* ground two levels coarser than a mesh beside it */
         { 771093, 1 },              /* a picture made from below the ground */
-        { 660002, 3 }               /* a skirt that ended where flat ground began */
+        { 660002, 3 },              /* a skirt that ended where flat ground began, */
+        { 1400007, 4 }              /* ... and a border that was level with it */
     };
     static holes_scene s;
     holes_sum sum, mended;
