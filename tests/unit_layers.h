@@ -1147,7 +1147,7 @@ static void depth_meshes_keep_to_their_layers_and_these_to_them(void)
 }
 
 /* A surface that is seen edge-on in the first column, all layers deep, with two surfaces beside it
-   that it might go on in: the closer one shares its edge, the other one reaches all the way to it. */
+   that it might go on in: the closer one shares its edge, the other one reaches up to it. */
 static void folds_reach_the_edge_that_they_begin_at(void)
 {
     enum { ROWS = 8, DEEP = 6 };
