@@ -14239,7 +14239,7 @@ static void terrimpi_simp_edge_moments(const terrimpi_simplifier *s, int32_t x, 
     for (; w.z < w.end; w.z++, w.at += w.slope, row += s->cols) {
         int32_t count = w.at >> 20;
         const terrimpi_simp_row_prefix *sum = row + count;
-        int32_t to_x = count * (count - 1) / 2; /* 0 + 1 + ... + (count - 1) */
+        int32_t to_x = count * (count - 1) >> 1; /* 0 + 1 + ... + (count - 1) */
         n += count;
         n1 += n;
         n2 += n1;
@@ -14301,6 +14301,7 @@ static void terrimpi_simp_update_edge(terrimpi_simplifier *s, int32_t e)
 typedef struct terrimpi_simp_local {
     float n, x, z, xx, xz, zz, h, hx, hz, hh;
     float gx, gz, wx, wz;
+    terrimpi_simp_quadric own; /* of the triangle alone, by the height of a */
 } terrimpi_simp_local;
 
 static void terrimpi_simp_recentre(const terrimpi_simplifier *s, const terrimpi_simp_moments *sums,
@@ -14346,14 +14347,17 @@ static float terrimpi_simp_square_error(const terrimpi_simplifier *s,
            d * (d * l.n + 2.0f * (gx * l.x + gz * l.z - l.h));
 }
 
-/* Adds the squared error over triangle abc as a function of a's height. */
-static void terrimpi_simp_add_triangle(const terrimpi_simp_local *l, terrimpi_simp_quadric *p)
+/* Finds the squared error over triangle abc as a function of a's height, and adds it. */
+static void terrimpi_simp_add_triangle(terrimpi_simp_local *l, terrimpi_simp_quadric *p)
 {
     float ux = l->gx * l->xx + l->gz * l->xz, uz = l->gx * l->xz + l->gz * l->zz;
-    p->a += l->n + 2.0f * (l->wx * l->x + l->wz * l->z) +
-            l->wx * (l->wx * l->xx + 2.0f * l->wz * l->xz) + l->wz * l->wz * l->zz;
-    p->b += l->h + l->wx * (l->hx - ux) + l->wz * (l->hz - uz) - l->gx * l->x - l->gz * l->z;
-    p->c += l->hh + l->gx * (ux - 2.0f * l->hx) + l->gz * (uz - 2.0f * l->hz);
+    l->own.a = l->n + 2.0f * (l->wx * l->x + l->wz * l->z) +
+               l->wx * (l->wx * l->xx + 2.0f * l->wz * l->xz) + l->wz * l->wz * l->zz;
+    l->own.b = l->h + l->wx * (l->hx - ux) + l->wz * (l->hz - uz) - l->gx * l->x - l->gz * l->z;
+    l->own.c = l->hh + l->gx * (ux - 2.0f * l->hx) + l->gz * (uz - 2.0f * l->hz);
+    p->a += l->own.a;
+    p->b += l->own.b;
+    p->c += l->own.c;
 }
 
 /* --- the triangles round an inner vertex --- */
@@ -14513,14 +14517,13 @@ static float terrimpi_simp_newton_step(terrimpi_simplifier *s, int32_t v,
     terrimpi_simp_forget_errors(s, ring);
     for (i = 0; i < ring->count; i++) {
         float gx = part[i].gx + d * part[i].wx, gz = part[i].gz + d * part[i].wz, residual;
-        terrimpi_simp_quadric own = {0.0f, 0.0f, 0.0f};
-        terrimpi_simp_add_triangle(part + i, &own);
-        residual = own.b - d * own.a;
-        xx += own.a * gx * gx;
-        xz += own.a * gx * gz;
-        zz += own.a * gz * gz;
-        xh += own.a * gx;
-        zh += own.a * gz;
+        float a = part[i].own.a;
+        residual = part[i].own.b - d * a;
+        xx += a * gx * gx;
+        xz += a * gx * gz;
+        zz += a * gz * gz;
+        xh += a * gx;
+        zh += a * gz;
         rx -= residual * gx;
         rz -= residual * gz;
     }
@@ -15563,12 +15566,13 @@ static void terrimpi_raise_segment(const terrimpi_raise *r, uint32_t a, uint32_t
     }
 }
 
-/* What each pass begins with, and what it does to a vertex: the first one raises, others lower. */
-static float terrimpi_raise_begin(int pass) { return pass ? TERRIMPI_FLOAT_MAX : 0.0f; }
+/* What each pass begins with, and what it does to a vertex: the first one raises, others lower, by
+   no more than the vertex is raised. */
+static float terrimpi_raise_begin(int pass, float raise) { return pass ? raise : 0.0f; }
 
 static float terrimpi_raise_end(int pass, float raise, float change)
 {
-    return pass ? terrimpi_max(0.0f, raise - change) : change;
+    return pass ? raise - change : change;
 }
 
 /* Raises the loop's vertices, border by border, but for the corners. */
@@ -15586,7 +15590,7 @@ static void terrimpi_raise_loop(const terrimpi_raise *r, float *raise, float *ch
             last--; /* the loop's end closes the last side itself */
         for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
             for (i = first; i <= last; i++)
-                change[i % n] = terrimpi_raise_begin(pass);
+                change[i % n] = terrimpi_raise_begin(pass, raise[i % n]);
             for (i = first; i < last; i++)
                 terrimpi_raise_segment(r, backwards ? (i + 1) % n : i, backwards ? i : (i + 1) % n,
                                        raise, change, pass > 0);
@@ -15675,8 +15679,8 @@ static void terrimpi_raise_find(const terrimpi_raise *r, float *raise)
         raise[i] = 0.0f;
     terrimpi_raise_loop(r, raise, change);
     for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
-        for (i = 0; i < n; i++)
-            change[i] = terrimpi_raise_begin(pass);
+        for (i = 0; i < n; i++) /* the border stays */
+            change[i] = i < mesh->border_vertex_count ? 0.0f : terrimpi_raise_begin(pass, raise[i]);
         for (i = 0; i < mesh->surface_index_count; i += 3)
             terrimpi_raise_triangle(r, mesh->indices + i, raise, change, pass > 0);
         for (i = mesh->border_vertex_count; i < n; i++)
