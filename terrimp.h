@@ -9063,7 +9063,9 @@ static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node
    unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
    nobody knows; when it will if it is like others of its level (as the rule PICTURE measures, see
    terrimpi_mip_distance), all is asked for in one breath: so what a far jump needs comes at once,
-   and not one level after the other. */
+   and not one level after the other. The last pages of two levels may be of different places, but
+   children are seldom rougher than their parent: so a guess falls by half from level to level, or
+   all that is in sight would be walked through: 12 s at 65537 x 65537. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimpi_page_need *need)
 {
@@ -9099,9 +9101,10 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
         all = 0;
         held = p->held + child.level;
         below.reach = need->reach *
-                      (held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f);
+                      (held[0] > 0.0f && held[1] > 0.0f
+                           ? 0.5f * terrimpi_min(held[0] / held[1], 1.0f) : 0.25f);
         below.urgency = terrimpi_min(below.reach / terrimpi_mip_distance2(&box, need->eye),
-                                     need->urgency);
+                                     0.5f * need->urgency);
         if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
             terrimpi_page_divides(t, &child, &below);
     }
@@ -12004,14 +12007,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
-    if (c->is_short) { /* it wants the nodes that it stands for, and the ground that they show */
-        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f, 0.0f};
-        need.urgency = terrimpi_max(2.0f, terrimpi_view_sharpness(f, c->closest) /
-                                              TERRIMPI_CAPTURE_SOURCE_TEXELS *
-                                              terrimpi_tree_kept(&f->terrain->tree,
-                                                                 c->node.number)->rms);
-        need.urgency *= need.urgency;
-        need.reach = need.urgency * c->closest * c->closest;
+    if (c->is_short) { /* it wants the nodes that it stands for */
+        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 4.0f, 0.0f};
         f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
         v->late++;
         return 0;
