@@ -1283,8 +1283,8 @@ static void pages_fly_without_holes(void)
             result = terrimp_view_update(view, &camera);
             CHECK(result == (paged_is_here(p, p->info.node_count - 1u) ? TERRIMP_OK
                                                                        : TERRIMP_E_PAGE));
-            paged_serve(&host);
             host.at_rest = rests ? host.times + p->l.info.node_count : NULL;
+            paged_serve(&host);
             for (k = 0; k < p->l.info.node_count && i % 100u == 99u; k++) {
                 uint32_t *times = &host.at_rest[k];
                 rested += *times;
