@@ -1895,8 +1895,8 @@ typedef struct terrimp_sorted_cell {
     int32_t at[2];                     /* its first sample, from that of its page on */
     terrimp_sorted_int away[2][3];     /* units from the eye to the places along each axis */
     terrimp_sorted_height heights[11]; /* of the places, before scale and offset */
-    uint16_t sides;                    /* of the footprint that cross it */
-    uint8_t child, order;              /* quarters that were looked at; which of them is first */
+    uint8_t crossed;                   /* by sides of the footprint */
+    uint8_t child, order;              /* quarters that were looked at; the first: x + 2 z */
 } terrimp_sorted_cell;
 
 /* Private: a side of the footprint, inside of which x * its x + z * its z + at >= 0. */
@@ -1933,9 +1933,9 @@ typedef struct terrimp_sorted {
     int partial;                 /* not all of it is in the field, or here, or beside it */
     uint8_t side_levels[4];      /* from which on heights along its sides are here */
     int32_t last[2];             /* column and row of the page's last sample in the field */
-    int depth;                   /* of the stack, above which the present square is; -1: empty */
-    terrimp_sorted_cell stack[TERRIMP_SORTED_LEVELS];
-    terrimp_sorted_int away;     /* squared, of the present square's closest point */
+    uint32_t level;              /* of the present square; those that it is a part of lie above it */
+    terrimp_sorted_cell cells[TERRIMP_SORTED_LEVELS];
+    terrimp_sorted_int near[2], away; /* of its closest point, along the axes, and squared */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -12763,7 +12763,7 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
     sorted->least_scale = terrimpi_sorted_least_scale(d.table, sorted->top);
     sorted->pages[0] = (d.field.width - 2u) / d.page_quads + 1u;
     sorted->pages[1] = (d.field.depth - 2u) / d.page_quads + 1u;
-    sorted->depth = -1;
+    sorted->level = sorted->top;
     return TERRIMP_OK;
 }
 
@@ -12888,21 +12888,19 @@ static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_h
     } while (to != first && s->side_count < TERRIMP_SORTED_SIDES);
 }
 
-/* Which of a square's sides of the footprint cross it; -1: it is outside of one. */
-static int terrimpi_sorted_sides(const terrimp_sorted *s, const terrimp_sorted_cell *c,
-                                 uint32_t level)
+/* Whether a side of the footprint crosses a square; -1: it is outside of one. Without branches,
+   which nobody could foretell. */
+static int terrimpi_sorted_sides(const terrimp_sorted *s, const terrimp_sorted_cell *c)
 {
     terrimp_sorted_int x = s->corner[0] + c->at[0], z = s->corner[1] + c->at[1];
-    const terrimp_sorted_side *side = s->sides;
-    int bit, mask = c->sides, crossing = 0;
-    for (bit = 1; bit <= mask; bit <<= 1, side++)
-        if (mask & bit) {
-            terrimp_sorted_int here = side->x * x + side->z * z + side->at;
-            if (here + ((terrimp_sorted_int)side->rise << level) < 0)
-                return -1;
-            crossing |= here < (terrimp_sorted_int)side->fall << level ? bit : 0;
-        }
-    return crossing;
+    terrimp_sorted_int size = (terrimp_sorted_int)1 << s->level, outside = 0, crossing = 0;
+    const terrimp_sorted_side *side, *end = s->sides + s->side_count;
+    for (side = s->sides; side < end; side++) {
+        terrimp_sorted_int here = side->x * x + side->z * z + side->at;
+        outside |= here + side->rise * size;
+        crossing |= here - side->fall * size;
+    }
+    return outside < 0 ? -1 : crossing < 0;
 }
 
 /* First and last page of a row that the footprint can touch, or one more: sides are divided in
@@ -12961,30 +12959,21 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
-static uint32_t terrimpi_sorted_level(const terrimp_sorted *s)
-{
-    return s->top - (uint32_t)(s->depth + 1);
-}
-
 /* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
    nodes. Only one that is closer than the square can be, across the side that faces the eye: one
    along each axis at most. */
 static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
-    const terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    uint32_t level = terrimpi_sorted_level(s), pattern = 0;
-    terrimp_sorted_int away[2];
+    uint32_t pattern = 0;
     int k;
-    if (level == 0 || s->away > s->whole[level])
+    if (s->level == 0 || s->away > s->whole[s->level])
         return 0;
-    for (k = 0; k < 2; k++)
-        away[k] = terrimpi_sorted_nearest(c->away[k][0], c->away[k][2]);
     for (k = 0; k < 2; k++) {
-        terrimp_sorted_int size = c->away[k][2] - c->away[k][0];
-        terrimp_sorted_int beside = away[k] > 0 ? terrimpi_sorted_nearest(away[k] - size, away[k])
-                                                : terrimpi_sorted_nearest(away[k], away[k] + size);
-        if (beside * beside + away[1 - k] * away[1 - k] + s->rise < s->split[level])
-            pattern |= (away[k] > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
+        terrimp_sorted_int near = s->near[k], size = s->unit[k] << s->level;
+        terrimp_sorted_int beside = near > 0 ? terrimpi_sorted_nearest(near - size, near)
+                                             : terrimpi_sorted_nearest(near, near + size);
+        if (s->away - near * near + beside * beside < s->split[s->level])
+            pattern |= (near > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
     }
     return pattern;
 }
@@ -12996,13 +12985,16 @@ static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t 
     return at < s->last[axis] ? at : s->last[axis];
 }
 
-/* A sample of the page as it is stored. */
+/* A sample of the page as it is stored, or the last one of its row or column. */
 static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
 {
-    const void *row = (const char *)s->page.samples +
-                      (size_t)(terrimpi_sorted_clamp(s, 1, z) >> s->page.level) * s->page.row_bytes;
     const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
-    x = terrimpi_sorted_clamp(s, 0, x) >> s->page.level;
+    const void *row;
+    if (s->partial) {
+        x = terrimpi_sorted_clamp(s, 0, x) >> s->page.level;
+        z = terrimpi_sorted_clamp(s, 1, z) >> s->page.level;
+    }
+    row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
     switch (s->desc.field.format) {
 #ifndef TERRIMP_FIXED
     case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
@@ -13074,9 +13066,10 @@ static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s,
 static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell *c,
                                     const uint8_t *places, uint32_t count, uint32_t level)
 {
+    const int32_t size = 1 << level;
     for (; count > 0; count--, places++) {
         uint32_t place = *places, column = place & 3u, row = place >> 2;
-        int32_t x = c->at[0] + (int32_t)(column << level), z = c->at[1] + (int32_t)(row << level);
+        int32_t x = c->at[0] + (int32_t)column * size, z = c->at[1] + (int32_t)row * size;
         terrimp_sorted_int away = c->away[0][column] * c->away[0][column] +
                                   c->away[1][row] * c->away[1][row] + s->rise;
         terrimp_sorted_int left = s->split[level + 1u] - away;
@@ -13086,7 +13079,7 @@ static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell
             *height = terrimpi_sorted_sample(s, x, z);
             continue;
         }
-        *height = terrimpi_sorted_rest(s, c, place, x, z, 2 << level);
+        *height = terrimpi_sorted_rest(s, c, place, x, z, 2 * size);
         if (here && left > 0) {
 #ifdef TERRIMP_FIXED
             terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
@@ -13103,70 +13096,60 @@ static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell
 
 /* ---- the order ---- */
 
-/* The k-th of count places from first on, from both ends towards that of the eye, or away from
-   it. */
-static int32_t terrimpi_sorted_outside_in(int32_t first, int32_t count, int32_t eye, int32_t k,
-                                          int away)
+/* The k-th of count places from first on, from both ends towards 0, or away from it. */
+static int32_t terrimpi_sorted_outside_in(int32_t first, int32_t count, int32_t k, int away)
 {
-    int32_t last = first + count - 1;
-    eye = eye < first ? first : eye > last ? last : eye;
+    int32_t last = first + count - 1, after = last < 0 ? 0 : first > 0 ? count - 1 : last;
     k = away ? count - 1 - k : k;
-    return k < last - eye ? last - k : first + (k - (last - eye));
+    return k < after ? last - k : first + k - after;
 }
 
 static void terrimpi_sorted_restart(terrimp_sorted *s)
 {
     s->rows = s->bounds[1 - s->row_axis][1] - s->bounds[1 - s->row_axis][0] + 1;
     s->row = s->col = s->cols = 0;
-    s->depth = -1;
+    s->level = s->top;
     s->triangle_count = 0;
 }
 
-/* Looks at the square above the stack, of which begin and level are known. Returns 1 if it is drawn
-   as a whole: then it is the present one; 0 after it has been pushed; -1 when it lies outside. */
-static int terrimpi_sorted_visit(terrimp_sorted *s)
+/* Looks at the present square, of which begin and level are known. Returns 1 if it is drawn as a
+   whole; 0 if it is split: then its first quarter is the next one; -1 when it lies outside. */
+static int terrimpi_sorted_visit(terrimp_sorted *s, terrimp_sorted_cell *c)
 {
-    uint32_t level = terrimpi_sorted_level(s);
-    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    int k, sides = c->sides ? terrimpi_sorted_sides(s, c, level) : 0;
-    if (sides < 0 || c->at[0] >= s->last[0] || c->at[1] >= s->last[1])
+    int k, crossed = c->crossed ? terrimpi_sorted_sides(s, c) : 0;
+    if (crossed < 0 || c->at[0] >= s->last[0] || c->at[1] >= s->last[1])
         return -1;
-    s->away = s->rise;
     for (k = 0; k < 2; k++) {
-        terrimp_sorted_int *away = c->away[k], size = s->unit[k] << level, nearest;
+        terrimp_sorted_int *away = c->away[k], size = s->unit[k] << s->level;
         away[1] = away[0] + (size >> 1);
         away[2] = away[0] + size;
-        nearest = terrimpi_sorted_nearest(away[0], away[2]);
-        s->away += nearest * nearest;
+        s->near[k] = terrimpi_sorted_nearest(away[0], away[2]);
     }
-    if (s->away >= s->split[level])
+    s->away = s->near[0] * s->near[0] + s->near[1] * s->near[1] + s->rise;
+    if (s->away >= s->split[s->level])
         return 1;
-    c->sides = (uint16_t)sides;
+    c->crossed = (uint8_t)crossed;
     c->child = 0;
-    c->order = (uint8_t)((c->away[s->row_axis][1] > 0) | (c->away[1 - s->row_axis][1] > 0) << 1);
+    c->order = (uint8_t)((c->away[0][1] > 0) | (c->away[1][1] > 0) << 1);
     c->order ^= s->desc.front_to_back ? 3 : 0;
-    s->depth++;
+    s->level--;
     return 0;
 }
 
-/* Goes to the next quarter of the square on top of the stack, of two the one first that the eye is
-   not at; rows come before columns. Returns its place; -1 after the last one. */
-static int terrimpi_sorted_quarter(terrimp_sorted *s)
+/* Goes to the next quarter of a square, of two the one first that the eye is not at; rows come
+   before columns. Returns its place. */
+static uint32_t terrimpi_sorted_quarter(const terrimp_sorted *s, terrimp_sorted_cell *whole)
 {
-    terrimp_sorted_cell *c = &s->stack[s->depth];
-    uint32_t level = terrimpi_sorted_level(s), k = c->child ^ (uint32_t)c->order, x, z;
-    if (c->child++ == 4) {
-        s->depth--;
-        return -1;
-    }
-    x = s->row_axis == 0 ? k & 1u : k >> 1;
-    z = s->row_axis == 0 ? k >> 1 : k & 1u;
-    c[1].at[0] = c->at[0] + (int32_t)(x << level);
-    c[1].at[1] = c->at[1] + (int32_t)(z << level);
-    c[1].away[0][0] = c->away[0][x];
-    c[1].away[1][0] = c->away[1][z];
-    c[1].sides = c->sides;
-    return (int)(x + 4u * z);
+    static const uint8_t turns[2][4] = { { 0, 1, 2, 3 }, { 0, 2, 1, 3 } };
+    uint32_t k = turns[s->row_axis][whole->child++] ^ (uint32_t)whole->order;
+    uint32_t x = k & 1u, z = k >> 1, size = 1u << s->level;
+    terrimp_sorted_cell *c = whole - 1;
+    c->at[0] = whole->at[0] + (int32_t)(x * size);
+    c->at[1] = whole->at[1] + (int32_t)(z * size);
+    c->away[0][0] = whole->away[0][x];
+    c->away[1][0] = whole->away[1][z];
+    c->crossed = whole->crossed;
+    return x + 4u * z;
 }
 
 /* ---- pages ---- */
@@ -13241,20 +13224,20 @@ static int terrimpi_sorted_ask(terrimp_sorted *s, terrimp_sorted_page *page)
 static int terrimpi_sorted_next_page(terrimp_sorted *s)
 {
     int along = s->row_axis, across = 1 - along, k;
-    terrimp_sorted_cell *c = &s->stack[0];
+    terrimp_sorted_cell *c = &s->cells[s->top];
     int32_t place[2];
     while (s->col >= s->cols) {
         int32_t last;
         if (s->row >= s->rows)
             return 0;
-        s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
+        s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, s->row++,
                                                  s->desc.front_to_back);
         terrimpi_sorted_row(s, s->page_row, &s->first_col, &last);
         s->cols = last - s->first_col + 1;
         s->col = 0;
     }
     place[across] = s->page_row;
-    place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, 0, s->col++,
+    place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, s->col++,
                                               s->desc.front_to_back);
     memset(&s->page, 0, sizeof s->page);
     s->page.x = place[0] + s->eye_page[0];
@@ -13265,7 +13248,7 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s)
         c->at[k] = 0;
         c->away[k][0] = s->corner[k] * s->unit[k] - s->eye[k];
     }
-    c->sides = (uint16_t)((1u << s->side_count) - 1u);
+    c->crossed = 1;
     if (!s->desc.page)
         terrimpi_sorted_field_page(s, &s->page);
     return 1;
@@ -13274,11 +13257,11 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s)
 /* Readies a page to be drawn; 0: it is not here. Its corners have their own heights. */
 static int terrimpi_sorted_open(terrimp_sorted *s)
 {
-    terrimp_sorted_height *heights = s->stack[0].heights;
+    terrimp_sorted_height *heights = s->cells[s->top].heights;
     int32_t last = (int32_t)s->desc.page_quads;
     s->page.texture_level = terrimpi_sorted_texture_level(s);
     if (s->desc.page && !terrimpi_sorted_ask(s, &s->page)) {
-        s->depth = -1;
+        s->level = s->top;
         return 0;
     }
     heights[0] = terrimpi_sorted_sample(s, 0, 0);
@@ -13293,36 +13276,30 @@ static int terrimpi_sorted_open(terrimp_sorted *s)
 static int terrimpi_sorted_look(terrimp_sorted *s, int to_count)
 {
     static const uint8_t inner[5] = { 1, 4, 5, 6, 9 };
-    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    int is_page = s->depth < 0, place = 0, found;
+    terrimp_sorted_cell *c = &s->cells[s->level];
+    terrimp_sorted_height *from = c->heights;
+    int found, is_page;
+    for (; s->level < s->top && c[1].child == 4; c++)
+        s->level++;
+    is_page = s->level == s->top;
     if (is_page && !terrimpi_sorted_next_page(s))
         return -1;
-    if (!is_page && (place = terrimpi_sorted_quarter(s)) < 0)
-        return 0;
-    found = terrimpi_sorted_visit(s);
+    if (!is_page)
+        from = c[1].heights + terrimpi_sorted_quarter(s, c + 1);
+    found = terrimpi_sorted_visit(s, c);
     if (found < 0 || to_count)
         return found > 0;
     if (is_page && !terrimpi_sorted_open(s))
         return 0;
     if (!is_page) { /* its corners are places of the square that it is a quarter of */
-        c->heights[0] = c[-1].heights[place];
-        c->heights[2] = c[-1].heights[place + 1];
-        c->heights[8] = c[-1].heights[place + 4];
-        c->heights[10] = c[-1].heights[place + 5];
+        c->heights[0] = from[0];
+        c->heights[2] = from[1];
+        c->heights[8] = from[4];
+        c->heights[10] = from[5];
     }
     if (!found)
-        terrimpi_sorted_heights(s, c, inner, 5, terrimpi_sorted_level(s));
+        terrimpi_sorted_heights(s, c, inner, 5, s->level);
     return found;
-}
-
-/* Goes to the next square; 0: there is none. */
-static int terrimpi_sorted_step(terrimp_sorted *s, int to_count)
-{
-    int found;
-    do
-        found = terrimpi_sorted_look(s, to_count);
-    while (found == 0);
-    return found > 0;
 }
 
 /* ---- triangles ---- */
@@ -13355,7 +13332,7 @@ static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square 
                                  int turned)
 {
     int a = begin, b = end ? end : 3;
-    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], places[a], places[b],
+    int first = terrimpi_sorted_corner_first(s, &s->cells[s->level], places[a], places[b],
                                              turned);
     if (first)
         terrimpi_sorted_triangle(out, a, b, corner, turned);
@@ -13372,7 +13349,7 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
                                       const uint8_t places[6], const int middle[4])
 {
     static const uint8_t plain[2][6] = { { 0, 2, 3, 0, 3, 1 }, { 0, 3, 1, 0, 2, 3 } };
-    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], 0, 10, 0), i;
+    int first = terrimpi_sorted_corner_first(s, &s->cells[s->level], 0, 10, 0), i;
     if (out->vertex_count == 4) {
         memcpy(out->indices, plain[first], sizeof plain[0]);
         out->triangle_count = 2;
@@ -13388,12 +13365,12 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
 }
 
 /* Cuts off what of the present square is beyond the last sample. */
-static void terrimpi_sorted_trim(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
+static void terrimpi_sorted_trim(const terrimp_sorted *s, terrimp_sorted_cell *c)
 {
     int i, k;
     for (k = 0; k < 2; k++)
         for (i = 1; i < 3; i++) {
-            int32_t over = c->at[k] + ((i << level) >> 1) - s->last[k];
+            int32_t over = c->at[k] + (i << s->level >> 1) - s->last[k];
             c->away[k][i] -= over > 0 ? over * s->unit[k] : 0;
         }
 }
@@ -13403,9 +13380,9 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
 {
     static const uint8_t sides[4] = { 1, 9, 4, 6 };
     uint8_t places[6] = { 0, 2, 8, 10, 0, 0 };
-    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    uint32_t pattern = terrimpi_sorted_pattern(s), level = terrimpi_sorted_level(s), count = 4, i;
-    int32_t quads = (int32_t)s->desc.page_quads;
+    terrimp_sorted_cell *c = &s->cells[s->level];
+    uint32_t pattern = terrimpi_sorted_pattern(s), count = 4, i;
+    int32_t x0, z0, quads = (int32_t)s->desc.page_quads;
     int middle[4] = { 0, 0, 0, 0 };
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
@@ -13413,15 +13390,17 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
             places[count++] = sides[i];
         }
     if (count > 4u)
-        terrimpi_sorted_heights(s, c, places + 4, count - 4u, level - 1u);
+        terrimpi_sorted_heights(s, c, places + 4, count - 4u, s->level - 1u);
     if (s->partial)
-        terrimpi_sorted_trim(s, c, level);
+        terrimpi_sorted_trim(s, c);
+    x0 = s->page.x * quads;
+    z0 = s->page.z * quads;
     for (i = 0; i < count; i++) {
         terrimp_sorted_vertex *v = &out->vertices[i];
-        int32_t x = c->at[0] + ((places[i] & 3) << level >> 1);
-        int32_t z = c->at[1] + ((places[i] >> 2) << level >> 1);
-        v->x = s->page.x * quads + terrimpi_sorted_clamp(s, 0, x);
-        v->z = s->page.z * quads + terrimpi_sorted_clamp(s, 1, z);
+        int32_t x = c->at[0] + ((places[i] & 3) << s->level >> 1);
+        int32_t z = c->at[1] + ((places[i] >> 2) << s->level >> 1);
+        v->x = x0 + (s->partial ? terrimpi_sorted_clamp(s, 0, x) : x);
+        v->z = z0 + (s->partial ? terrimpi_sorted_clamp(s, 1, z) : z);
         v->height = c->heights[places[i]];
 #ifndef TERRIMP_FIXED
         v->height = terrimpi_field_world_height(&s->desc.field, v->height);
@@ -13429,21 +13408,36 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
     }
     out->page_x = s->page.x;
     out->page_z = s->page.z;
-    out->level = (uint8_t)level;
+    out->level = (uint8_t)s->level;
     out->texture_level = (uint8_t)s->page.texture_level;
     out->vertex_count = (uint8_t)count;
     terrimpi_sorted_triangles(s, out, places, middle);
+    s->triangle_count += out->triangle_count;
+}
+
+/* Gives out the next squares, or counts them and their triangles. */
+static uint32_t terrimpi_sorted_walk(terrimp_sorted *s, terrimp_sorted_square *squares,
+                                     uint32_t capacity)
+{
+    uint32_t count = 0;
+    int found = 0;
+    while (count < capacity && found >= 0) {
+        found = terrimpi_sorted_look(s, !squares);
+        if (found <= 0)
+            continue;
+        if (squares)
+            terrimpi_sorted_emit(s, &squares[count]);
+        else
+            s->triangle_count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
+        count++;
+    }
+    return count;
 }
 
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity)
 {
-    uint32_t count = 0;
-    while (sorted && squares && count < capacity && terrimpi_sorted_step(sorted, 0)) {
-        terrimpi_sorted_emit(sorted, &squares[count]);
-        sorted->triangle_count += squares[count++].triangle_count;
-    }
-    return count;
+    return sorted && squares ? terrimpi_sorted_walk(sorted, squares, capacity) : 0;
 }
 
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
@@ -13510,12 +13504,10 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
 /* The triangles of the frame at a scale. */
 static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
 {
-    uint32_t count = 0;
     terrimpi_sorted_set_scale(s, scale);
     terrimpi_sorted_restart(s);
-    while (terrimpi_sorted_step(s, 1))
-        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
-    return count;
+    terrimpi_sorted_walk(s, NULL, 0xffffffffu);
+    return s->triangle_count;
 }
 
 /* Finds the scale whose triangles are 97 to 100 % of max_triangles, or the largest that does not
@@ -13608,7 +13600,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     float eye[3], quads;
     int k;
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
-    sorted->depth = -1;
+    sorted->level = sorted->top;
     sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     TERRIMPI_REFUSE(c.orthographic || c.z_far > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);

@@ -1395,12 +1395,11 @@ static void sorted_patterns_are_ordered(void)
             int middle[4], area = 0, first;
             memset(&s, 0, sizeof s);
             memset(&q, 0, sizeof q);
-            s.depth = -1;
             s.eye[0] = (terrimp_sorted_int)random_range(0, 64 * 24) - 64 * 8;
             s.eye[1] = (terrimp_sorted_int)random_range(0, 64 * 24) - 64 * 8;
             s.desc.front_to_back = i & 1;
             for (k = 0; k < 6; k++)
-                s.stack[0].away[k & 1][k >> 1] = (k >> 1) * 4 * 64 - s.eye[k & 1];
+                s.cells[0].away[k & 1][k >> 1] = (k >> 1) * 4 * 64 - s.eye[k & 1];
             q.vertex_count = 4;
             for (k = 0; k < 4; k++) {
                 middle[k] = pattern >> k & 1 ? q.vertex_count++ : 0;
@@ -1574,15 +1573,16 @@ static void sorted_frames_cost_what_their_triangles_do(void)
             terrimp_sorted_desc desc = sorted_hills();
             terrimp_sorted s;
             terrimp_camera camera = sorted_camera(&desc);
-            int found = 0, depth;
+            int found = 0, is_page, is_split;
             desc.scale = scales[k];
             CHECK(terrimp_sorted_init(&desc, &s) == TERRIMP_OK);
             CHECK(terrimp_sorted_begin(&s, &camera) == TERRIMP_OK);
             for (; found >= 0; looks++) {
-                depth = s.depth;
                 found = terrimpi_sorted_look(&s, 0);
-                pages += depth < 0 && (found > 0 || s.depth == 0);
-                splits += s.depth > depth;
+                is_split = found == 0 && s.level < s.top && s.cells[s.level + 1].child == 0;
+                is_page = s.level + (is_split ? 1u : 0u) == s.top;
+                pages += is_page && (found > 0 || is_split);
+                splits += is_split;
                 squares += found > 0;
                 sides += found > 0 ? terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(&s)) : 0;
             }
