@@ -13644,7 +13644,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 typedef struct terrimpi_sorted_block {
     terrimpi_mip_writer out;
     terrimpi_terrain_pattern part; /* quads that are drawn */
-    float x[3], z[3];      /* of the columns and rows of vertices, from the eye on */
+    const float *x, *z;    /* of its columns and rows of vertices, from the eye on */
 } terrimpi_sorted_block;
 
 /* The quads of a block, two bits each, first one lowest; by which of these is closer than the one
@@ -13666,19 +13666,16 @@ static uint32_t terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint
                                             uint32_t *sides)
 {
     uint32_t last = b->out.quads - 2u, coarse = b->out.pattern;
-    uint32_t right = b->x[1] < 0.0f ? 1u : 0u, below = b->z[1] < 0.0f ? 1u : 0u;
-    uint32_t bits = right * 3u + below * 12u;
+    uint32_t bits = (b->x[1] < 0.0f ? 3u : 0u) | (b->z[1] < 0.0f ? 12u : 0u), merged;
     coarse &= (z == 0 ? 1u : 0u) | (z == last ? 2u : 0u) | (x == 0 ? 4u : 0u) |
               (x == last ? 8u : 0u);
     *sides = coarse;
-    if (coarse & 9u) /* merged with the quad at the corner of +x, -z */
-        right = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? 1u : 0u;
-    if (coarse & 6u)
-        below = terrimpi_sorted_cross(b, 0, 2, 1, 1) > 0.0f ? 1u : 0u;
-    bits = coarse & 1u ? (bits & ~1u) | right : bits;
-    bits = coarse & 8u ? (bits & ~8u) | right << 3 : bits;
-    bits = coarse & 2u ? (bits & ~2u) | below << 1 : bits;
-    bits = coarse & 4u ? (bits & ~4u) | below << 2 : bits;
+    merged = coarse & 9u; /* with the quad at the corner of +x, -z */
+    if (merged)
+        bits = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? bits | merged : bits & ~merged;
+    merged = coarse & 6u;
+    if (merged)
+        bits = terrimpi_sorted_cross(b, 0, 2, 1, 1) > 0.0f ? bits | merged : bits & ~merged;
     return terrimpi_sorted_quads[bits];
 }
 
@@ -13687,33 +13684,33 @@ static void terrimpi_sorted_write_block(terrimpi_sorted_block *b, uint32_t x, ui
     uint32_t k, sides, row = b->out.quads + 1u;
     uint32_t order = terrimpi_sorted_block_order(b, x, z, &sides);
     for (k = 0; k < 4u; k++, order >>= 2) {
-        uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz;
+        uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz, at = j * row + i;
         int first = terrimpi_sorted_cross(b, (int)dx, (int)dz, (int)dx + 1, (int)dz + 1) < 0.0f;
-        uint16_t v[4];
-        if (i < b->part.x0 || i >= b->part.x1 || j < b->part.z0 || j >= b->part.z1)
+        uint16_t v[6], *to = sides ? v : b->out.out;
+        uint16_t *one = to + (first ? 0 : 3), *other = to + (first ? 3 : 0);
+        if (i - b->part.x0 >= b->part.x1 - b->part.x0 || j - b->part.z0 >= b->part.z1 - b->part.z0)
             continue;
-        v[0] = (uint16_t)(j * row + i);
-        v[1] = (uint16_t)(v[0] + row);
-        v[2] = (uint16_t)(v[1] + 1u);
-        v[3] = (uint16_t)(v[0] + 1u);
+        one[0] = other[0] = (uint16_t)at;
+        one[1] = (uint16_t)(at + row);
+        one[2] = other[1] = (uint16_t)(at + row + 1u);
+        other[2] = (uint16_t)(at + 1u);
         if (sides) {
-            v[0] = terrimpi_mip_index(&b->out, i, j);
-            v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
-            v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
-            v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+            one[0] = other[0] = terrimpi_mip_index(&b->out, i, j);
+            one[1] = terrimpi_mip_index(&b->out, i, j + 1u);
+            one[2] = other[1] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
+            other[2] = terrimpi_mip_index(&b->out, i + 1u, j);
+            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
+            terrimpi_mip_triangle(&b->out, v[3], v[4], v[5]);
+        } else {
+            b->out.out += 6;
         }
-        if (first)
-            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
-        terrimpi_mip_triangle(&b->out, v[0], v[2], v[3]);
-        if (!first)
-            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
     }
 }
 
-/* The next of the blocks at *low to *high along an axis: from both ends towards the eye's. `past`
-   says that the eye lies behind the end of the block at *low. */
-static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
+/* The next of the blocks at *low to *high along an axis: from both ends towards the eye's, at 0. */
+static uint32_t terrimpi_sorted_turn(const float *places, uint32_t *low, uint32_t *high)
 {
+    int past = places[*low + 2u] <= 0.0f;
     uint32_t at = past ? *low : *high - 2u;
     *low += past ? 2u : 0u;
     *high -= past ? 0u : 2u;
@@ -13723,22 +13720,22 @@ static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
 static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtree *tree,
                                   const terrimp_node *n, const float eye[3])
 {
-    uint32_t i0 = n->x * tree->chunk_quads, j0 = n->z * tree->chunk_quads;
+    float xs[129], zs[129]; /* of the largest chunk */
     uint32_t rows[2], cols[2], k, x, z;
+    for (k = 0; k <= tree->chunk_quads; k++) {
+        xs[k] = terrimpi_tree_x(tree, n->level, n->x * tree->chunk_quads + k) - eye[0];
+        zs[k] = terrimpi_tree_z(tree, n->level, n->z * tree->chunk_quads + k) - eye[2];
+    }
     rows[0] = b->part.z0 & ~1u;
     rows[1] = (b->part.z1 + 1u) & ~1u;
     while (rows[0] < rows[1]) {
-        z = terrimpi_sorted_turn(&rows[0], &rows[1],
-                                 terrimpi_tree_z(tree, n->level, j0 + rows[0] + 2u) <= eye[2]);
-        for (k = 0; k < 3u; k++)
-            b->z[k] = terrimpi_tree_z(tree, n->level, j0 + z + k) - eye[2];
+        z = terrimpi_sorted_turn(zs, &rows[0], &rows[1]);
+        b->z = zs + z;
         cols[0] = b->part.x0 & ~1u;
         cols[1] = (b->part.x1 + 1u) & ~1u;
         while (cols[0] < cols[1]) {
-            x = terrimpi_sorted_turn(&cols[0], &cols[1],
-                                     terrimpi_tree_x(tree, n->level, i0 + cols[0] + 2u) <= eye[0]);
-            for (k = 0; k < 3u; k++)
-                b->x[k] = terrimpi_tree_x(tree, n->level, i0 + x + k) - eye[0];
+            x = terrimpi_sorted_turn(xs, &cols[0], &cols[1]);
+            b->x = xs + x;
             terrimpi_sorted_write_block(b, x, z);
         }
     }
