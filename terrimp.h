@@ -1742,9 +1742,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
-/* The max_cost of the next frames from what the last one took, for a host that measures: at most a
-   twentieth less or a fiftieth more, the same within 3 % of the target. No clock inside, and it
-   settles where time rises with cost, and no faster than it does. A pause costs one step.
+/* The max_cost of the next frames, or max_triangles of room Sorted, from what the last one took,
+   for a host that measures: at most a twentieth less or a fiftieth more, the same within 3 % of the
+   target. No clock inside, and it settles where time rises with cost, and no faster than it does. A
+   pause costs one step.
 
    cost        that the frame was allowed; ms that it took; target_ms that it should take. What is
                not above 0, or not finite: the cost stays */
@@ -1856,7 +1857,8 @@ typedef struct terrimp_sorted_desc {
                                   scale * table[l] quads. scale has to be so large that it rises
                                   by 2 * 2^l from level l to the next. NULL: 2^l */
     uint32_t max_triangles;    /* not 0: each frame's scale is the one that leads to 97 to 100 % of
-                                  so many, as far as there is one */
+                                  so many, as far as there is one. A host that measures has it
+                                  from terrimp_view_pace */
     int front_to_back;         /* nonzero: the other way round */
     float low_far;             /* [wu] z_far of an eye on the ground, for a horizon that comes in
                                   as the eye sinks [Limits: >= 0] [Default 0 -> z_far] */
@@ -1933,9 +1935,9 @@ typedef struct terrimp_sorted {
     int partial;                 /* not all of it is in the field, or here, or beside it */
     uint8_t side_levels[4];      /* from which on heights along its sides are here */
     int32_t last[2];             /* column and row of the page's last sample in the field */
-    uint32_t level;              /* of the present square; those that it is a part of lie above it */
+    uint32_t level;              /* of the present square; what it is a part of lies above it */
     terrimp_sorted_cell cells[TERRIMP_SORTED_LEVELS];
-    terrimp_sorted_int near[2], away; /* of its closest point, along the axes, and squared */
+    terrimp_sorted_int way[2], away; /* to its closest point, along each axis, and squared */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1971,15 +1973,6 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
-
-/* The max_triangles of the next frame from what this one took, for a host that measures: at most a
-   twentieth less or a fiftieth more, nothing within 3 % of the target. Where time rises with
-   triangles, and no faster than they do, it comes to rest without swinging; a pause of the machine
-   costs one step. No clock inside.
-
-   triangles   of this frame
-   ms          that the frame took; target_ms  that it should take */
-TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms);
 
 /* Makes the next coarser level of a map or of a page of it: every second texel, mixed with those
    around it, 1 2 1 along each axis. Texels on the border are mixed along the border alone and so
@@ -12972,11 +12965,11 @@ static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
     if (s->level == 0 || s->away > s->whole[s->level])
         return 0;
     for (k = 0; k < 2; k++) {
-        terrimp_sorted_int near = s->near[k], size = s->unit[k] << s->level;
-        terrimp_sorted_int beside = near > 0 ? terrimpi_sorted_nearest(near - size, near)
-                                             : terrimpi_sorted_nearest(near, near + size);
-        if (s->away - near * near + beside * beside < s->split[s->level])
-            pattern |= (near > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
+        terrimp_sorted_int way = s->way[k], size = s->unit[k] << s->level;
+        terrimp_sorted_int beside = way > 0 ? terrimpi_sorted_nearest(way - size, way)
+                                             : terrimpi_sorted_nearest(way, way + size);
+        if (s->away - way * way + beside * beside < s->split[s->level])
+            pattern |= (way > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
     }
     return pattern;
 }
@@ -13126,9 +13119,9 @@ static int terrimpi_sorted_visit(terrimp_sorted *s, terrimp_sorted_cell *c)
         terrimp_sorted_int *away = c->away[k], size = s->unit[k] << s->level;
         away[1] = away[0] + (size >> 1);
         away[2] = away[0] + size;
-        s->near[k] = terrimpi_sorted_nearest(away[0], away[2]);
+        s->way[k] = terrimpi_sorted_nearest(away[0], away[2]);
     }
-    s->away = s->near[0] * s->near[0] + s->near[1] * s->near[1] + s->rise;
+    s->away = s->way[0] * s->way[0] + s->way[1] * s->way[1] + s->rise;
     if (s->away >= s->split[s->level])
         return 1;
     c->crossed = (uint8_t)crossed;
@@ -13454,14 +13447,6 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 #else
     position[1] = vertex->height;
 #endif
-}
-
-TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
-{
-    float now = (float)(triangles ? triangles : 1u), next = terrimp_view_pace(now, ms, target_ms);
-    if (!(next > now || next < now) || next >= 4294967040.0f)
-        return triangles;
-    return next > now ? triangles + (uint32_t)(next - now) + 1u : (uint32_t)next;
 }
 
 /* The three texels of a line that are mixed at one of them: before, itself, after. At an end where

@@ -2059,15 +2059,14 @@ static void sorted_pace_comes_to_rest(void)
     for (i = 0; i < 300; i++) {
         float fixed = random_float(0.0f, 8.0f), each = powf(10.0f, random_float(-4.0f, -2.0f));
         float target = fixed + random_float(4.0f, 30.0f), ms = 0.0f;
-        uint32_t triangles = 1u << random_range(0, 17), before;
+        float triangles = (float)(1u << random_range(0, 17)), before;
         int side = 0, turns = 0;
         for (frame = 0; frame < 800; frame++) {
             int now;
-            ms = fixed + each * (float)triangles;
+            ms = fixed + each * floorf(triangles);
             before = triangles;
-            triangles = terrimp_sorted_pace(triangles, ms, target);
-            CHECK((float)triangles >= 0.95f * (float)before - 1.0f);
-            CHECK((float)triangles <= 1.02f * (float)before + 1.0f);
+            triangles = terrimp_view_pace(triangles, ms, target);
+            CHECK(triangles >= 0.949f * before && triangles <= 1.021f * before);
             now = triangles > before ? 1 : triangles < before ? -1 : 0;
             turns += side && now && now != side;
             side = now ? now : side;
@@ -2075,12 +2074,11 @@ static void sorted_pace_comes_to_rest(void)
         CHECK(turns == 0);
         CHECK(ms >= 0.97f * target && ms <= 1.03f * target);
     }
-    CHECK(terrimp_sorted_pace(1000, not_a_number(), 16.0f) == 1000);
-    CHECK(terrimp_sorted_pace(1000, 0.0f, 16.0f) == 1000);
-    CHECK(terrimp_sorted_pace(1000, 4e4f, 16.0f) == 950);
-    CHECK(terrimp_sorted_pace(1000, 30.0f, 0.0f) == 1000);
-    CHECK(terrimp_sorted_pace(0, 1.0f, 16.0f) == 1);
-    CHECK(terrimp_sorted_pace(0xffffffffu, 1.0f, 16.0f) == 0xffffffffu);
+    CHECK(fabsf(terrimp_view_pace(1000.0f, 4e4f, 16.0f) - 950.0f) < 0.01f);
+    CHECK(terrimp_view_pace(1000.0f, not_a_number(), 16.0f) == 1000.0f);
+    CHECK(terrimp_view_pace(1000.0f, 0.0f, 16.0f) == 1000.0f);
+    CHECK(terrimp_view_pace(1000.0f, 30.0f, 0.0f) == 1000.0f);
+    CHECK(terrimp_view_pace(0.0f, 1.0f, 16.0f) == 0.0f);
 }
 
 /* The farthest corner of a square that the frame has. */
