@@ -9899,10 +9899,10 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; for max_cost, from which costs fall
                                          with the square of the tolerance, at least so much */
 #define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
-#define TERRIMPI_VIEW_DEARER 1.05f    /* first step of the tolerance when max_cost is short, and by
-                                         what each is larger than the one before */
+#define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short, */
+#define TERRIMPI_VIEW_EVEN 4u         /* ... so many a frame; by it the next ones grow, each */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for the captures of the mean frame */
-#define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame: of 45 times the tolerance */
+#define TERRIMPI_VIEW_TRIES 12u       /* ... steps a frame at most: of 10 times the tolerance */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
@@ -12336,15 +12336,15 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
 }
 
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
-   that is predicted to fit max_ground and max_cost; coarser by steps until it does. Steps grow, so
-   that a turn towards far more than was in sight is not dearer until tolerances have followed. */
+   that is predicted to fit max_ground and max_cost; coarser by steps until it does. Steps that go
+   on grow, so that a turn towards far more than was in sight is not dearer for many frames. */
 static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
                                         terrimpi_frame_sums *sums)
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
     float finer = max_cost > 0.0f ? TERRIMP_SQRTF(v->cost / max_cost) : TERRIMPI_VIEW_FINER;
-    float step = 1.0f;
+    float step = TERRIMPI_VIEW_DEARER;
     uint32_t tries, i;
     if (finer <= TERRIMPI_VIEW_FINER)
         v->ground_scale = terrimpi_max(1.0f, scale * terrimpi_max(finer, TERRIMPI_VIEW_FINEST));
@@ -12361,7 +12361,8 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
         finer = v->ground_scale;
-        v->ground_scale *= step *= TERRIMPI_VIEW_DEARER;
+        step *= tries < TERRIMPI_VIEW_EVEN ? 1.0f : TERRIMPI_VIEW_DEARER;
+        v->ground_scale *= step;
         if (finer < scale)
             v->ground_scale = terrimpi_min(v->ground_scale, scale);
     }
