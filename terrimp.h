@@ -6553,6 +6553,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
 #define TERRIMPI_TERRAIN_DIRECTIONS 8u           /* neighbours of a node */
 #define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
 #define TERRIMPI_FLOOR_WALL_POINTS 4u          /* of the walls round it, for each of these */
+#define TERRIMPI_MESH_UNDER (1.0f / 8192.0f) /* of a node's side: see terrimpi_mesh_under */
 #define TERRIMPI_MESH_BORDER_STEPS 0x3fffffu  /* of the heights of borders */
 #define TERRIMPI_MESH_INNER_STEPS 0xffffu     /* of those of inner vertices */
 
@@ -6560,7 +6561,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
 typedef struct terrimpi_mesh {
     float error, error_rms; /* [wu] of the mesh as drawn, against every sample */
     float base;             /* [wu] the heights of inner vertices count from it on */
-    float low, high;        /* [wu] of everything that is drawn of the node and of those below */
+    float low, high;        /* [wu] of its surface, the ground, and those of the nodes below */
     uint32_t counts;        /* 9 bits: triangles; 7: vertices of the border; 8: of the surface, 0 if
                                it is not built; 8: the exponent of the steps of inner heights */
 } terrimpi_mesh;
@@ -6920,12 +6921,27 @@ static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32
     return terrimpi_tree_opens(&terrain->tree, node) ? TERRIMP_OK : TERRIMP_E_PAGE;
 }
 
+/* How far the skirts of a level's meshes end below all ground, and their borders are over it: see
+   terrimpi_mesh_skirt_foot, terrimpi_build_lift_border. */
+static float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
+{
+    return TERRIMPI_MESH_UNDER * (float)(t->desc.chunk_quads << level) *
+           terrimpi_min(t->desc.field.spacing_x, t->desc.field.spacing_z);
+}
+
+/* The box of a node with the heights of a mesh: that of the node or of one above it. */
+static void terrimpi_terrain_mesh_box(const terrimp_terrain *t, const terrimp_node *node,
+                                      const terrimpi_mesh *mesh, terrimp_box *box)
+{
+    terrimpi_tree_box(&t->tree, node, mesh->low - terrimpi_mesh_under(t, node->level), mesh->high,
+                      box);
+}
+
 /* The box of a node: of everything drawn of it and of those below it. */
 static void terrimpi_terrain_node_box(const terrimp_terrain *t, const terrimp_node *node,
                                       terrimp_box *box)
 {
-    const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node->number);
-    terrimpi_tree_box(&t->tree, node, mesh->low, mesh->high, box);
+    terrimpi_terrain_mesh_box(t, node, terrimpi_mesh_of(t, node->number), box);
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_get_box(const terrimp_terrain *terrain, uint32_t node,
@@ -7356,11 +7372,13 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
    leaves a gap under it: ground is drawn through samples, and no mesh's border is below them
    (terrimpi_build_lift_border). Proof, for a sample s between two vertices: the border is at most
    s + e there. When one of them is within D of L, both end at L <= s; else each hangs by D or,
-   since then L is deeper, by more, and the line is <= s + e - D <= s - e.
+   since then L is deeper, by more, and the line is <= s + e - D <= s - e. And all of that ends a
+   little lower: where ground is flat at L, a line of feet at L would be its border, but with other
+   vertices, and where the two are rounded apart a pixel shows the sky.
    Down to the node's lowest point (Hess 4.2) much is drawn for nothing: a tenth of a frame of rough
    terrain, at the same PSNR. */
-static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, const float *border,
-                                      uint32_t i)
+static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, uint32_t level,
+                                      const float *border, uint32_t i)
 {
     const terrimp_geomip_node *range = terrimpi_tree_kept(&t->tree, node);
     uint32_t n = terrimpi_mesh_border(terrimpi_mesh_of(t, node));
@@ -7369,9 +7387,9 @@ static float terrimpi_mesh_skirt_foot(const terrimp_terrain *t, uint32_t node, c
                                 border[(i + n - 1u) % n * 3u + 1u]);
     float depth = terrimpi_max(2.0f * terrimpi_mesh_of(t, node)->error,
                                0.25f * (range->high - range->low));
-    if (terrimpi_min(lowest, height) - depth <= range->low)
-        return terrimpi_min(height, range->low);
-    return height - depth;
+    float foot = terrimpi_min(lowest, height) - depth <= range->low
+                     ? terrimpi_min(height, range->low) : height - depth;
+    return foot - terrimpi_mesh_under(t, level);
 }
 
 /* Writes one node's vertices and indices with skirts, its whole share of the buffers. */
@@ -7398,7 +7416,7 @@ static void terrimpi_mesh_write(const terrimp_terrain *t, uint32_t node, float *
         return;
     memcpy(rim, xyz, (size_t)border * 3u * sizeof *rim);
     for (i = 0; i < border; i++)
-        rim[i * 3u + 1u] = terrimpi_mesh_skirt_foot(t, node, xyz, i);
+        rim[i * 3u + 1u] = terrimpi_mesh_skirt_foot(t, node, p.level, xyz, i);
     terrimpi_terrain_write_wall(indices + index_count, border, vertices, 0);
 }
 
@@ -9047,8 +9065,7 @@ static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node
     terrimp_node known = *node;
     while (!terrimpi_tree_record(&t->tree, known.number))
         known = terrimpi_tree_parent(&t->tree, &known);
-    terrimpi_tree_box(&t->tree, node, terrimpi_mesh_of(t, known.number)->low,
-                      terrimpi_mesh_of(t, known.number)->high, box);
+    terrimpi_terrain_mesh_box(t, node, terrimpi_mesh_of(t, known.number), box);
 }
 
 /* The same for a node and its children in sight, without which it may not be left for them. Returns
@@ -16539,19 +16556,21 @@ static void terrimpi_build_ground_tops(const terrimpi_build *build, uint32_t spa
         }
 }
 
-/* Lifts the border until no ground beside it stands out: the corners, which are samples, and lines
-   of coarser ground over valleys would. What is missing at a place of a segment is asked of its
-   closer end, at most twice as much, which stays within the range of stored heights; a raised
-   vertex may have left that. So a ray that comes in over a mesh's border comes in over all ground
-   behind it, and what other meshes have over that is closed by their skirts, which reach below the
-   samples (see terrimpi_mesh_skirt_foot): there is no gap to see the sky through. Ground
-   beside a mesh that is coarser by more than it is lifted for could leave one, of less than its
-   tolerance; to lift borders over all of it would double the errors of meshes where ridges are
-   steep. Neighbours of a level still share what lies between the corners. */
+/* Lifts the border until it is a little over all ground beside it: the corners, which are samples,
+   and lines of coarser ground over valleys would stand out, and ground that is level with a
+   border has other vertices there, so that a pixel may show the sky. What is missing at a place
+   of a segment is asked of its closer end, at most twice as much, which stays within the range
+   of stored heights; a raised vertex may have left that. So a ray that comes in over a mesh's
+   border comes in over all ground behind it, and what other meshes have over that is closed by
+   their skirts, which reach below the samples (see terrimpi_mesh_skirt_foot): there is no gap to
+   see the sky through. Ground beside a mesh that is coarser by more than it is lifted for could
+   leave one, of less than its tolerance; to lift borders over all of it would double the errors
+   of meshes where ridges are steep. Neighbours of a level still share what lies between the
+   corners. */
 static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_terrain_tile *p,
                                        terrimp_mesh *mesh, const terrimpi_build *build)
 {
-    float *lift = build->work;
+    float *lift = build->work, over = terrimpi_mesh_under(t, p->level);
     uint32_t i, k;
     int side;
     terrimpi_build_segment s;
@@ -16572,7 +16591,7 @@ static void terrimpi_build_lift_border(const terrimp_terrain *t, const terrimpi_
             for (k = s.from; k <= s.to; k++) {
                 float w = (float)(k - s.from) / (float)(s.to - s.from);
                 float *to = lift + (w > 0.5f ? s.b : s.a);
-                *to = terrimpi_max(*to, build->tops[k] / terrimpi_max(w, 1.0f - w));
+                *to = terrimpi_max(*to, (build->tops[k] + over) / terrimpi_max(w, 1.0f - w));
             }
         }
     }
