@@ -16463,7 +16463,7 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
         desc.borders[side].points = points[side];
     }
     return terrimpi_simp_run(&desc,
-                             (squeeze.last_x | squeeze.last_z) % squeeze.step != 0 ? &squeeze : NULL,
+                             ((squeeze.last_x | squeeze.last_z) % squeeze.step) ? &squeeze : NULL,
                              build->rest, build->rest_bytes, mesh);
 }
 
