@@ -1742,9 +1742,10 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
 TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
                                                const terrimp_callbacks *callbacks);
 
-/* The max_cost of the next frames from what the last one took, for a host that measures: at most a
-   twentieth less or a fiftieth more, the same within 3 % of the target. No clock inside, and it
-   settles where time rises with cost, and no faster than it does. A pause costs one step.
+/* The max_cost of the next frames, or max_triangles of room Sorted, from what the last one took,
+   for a host that measures: at most a twentieth less or a fiftieth more, the same within 3 % of the
+   target. No clock inside, and it settles where time rises with cost, and no faster than it does. A
+   pause costs one step.
 
    cost        that the frame was allowed; ms that it took; target_ms that it should take. What is
                not above 0, or not finite: the cost stays */
@@ -1856,7 +1857,8 @@ typedef struct terrimp_sorted_desc {
                                   scale * table[l] quads. scale has to be so large that it rises
                                   by 2 * 2^l from level l to the next. NULL: 2^l */
     uint32_t max_triangles;    /* not 0: each frame's scale is the one that leads to 97 to 100 % of
-                                  so many, as far as there is one */
+                                  so many, as far as there is one. A host that measures has it
+                                  from terrimp_view_pace */
     int front_to_back;         /* nonzero: the other way round */
     float low_far;             /* [wu] z_far of an eye on the ground, for a horizon that comes in
                                   as the eye sinks [Limits: >= 0] [Default 0 -> z_far] */
@@ -1895,8 +1897,8 @@ typedef struct terrimp_sorted_cell {
     int32_t at[2];                     /* its first sample, from that of its page on */
     terrimp_sorted_int away[2][3];     /* units from the eye to the places along each axis */
     terrimp_sorted_height heights[11]; /* of the places, before scale and offset */
-    uint16_t sides;                    /* of the footprint that cross it */
-    uint8_t child, order;              /* quarters that were looked at; which of them is first */
+    uint8_t crossed;                   /* by sides of the footprint */
+    uint8_t child, order;              /* quarters that were looked at; the first: x + 2 z */
 } terrimp_sorted_cell;
 
 /* Private: a side of the footprint, inside of which x * its x + z * its z + at >= 0. */
@@ -1933,9 +1935,9 @@ typedef struct terrimp_sorted {
     int partial;                 /* not all of it is in the field, or here, or beside it */
     uint8_t side_levels[4];      /* from which on heights along its sides are here */
     int32_t last[2];             /* column and row of the page's last sample in the field */
-    int depth;                   /* of the stack, above which the present square is; -1: empty */
-    terrimp_sorted_cell stack[TERRIMP_SORTED_LEVELS];
-    terrimp_sorted_int away;     /* squared, of the present square's closest point */
+    uint32_t level;              /* of the present square; what it is a part of lies above it */
+    terrimp_sorted_cell cells[TERRIMP_SORTED_LEVELS];
+    terrimp_sorted_int way[2], away; /* to its closest point, along each axis, and squared */
 } terrimp_sorted;
 
 /* Writes the effective descriptor; low and high stay. out may be in.
@@ -1971,15 +1973,6 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
    Source     Finch and Bishop 1998, sections 4.4 to 4.9 */
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity);
-
-/* The max_triangles of the next frame from what this one took, for a host that measures: at most a
-   twentieth less or a fiftieth more, nothing within 3 % of the target. Where time rises with
-   triangles, and no faster than they do, it comes to rest without swinging; a pause of the machine
-   costs one step. No clock inside.
-
-   triangles   of this frame
-   ms          that the frame took; target_ms  that it should take */
-TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms);
 
 /* Makes the next coarser level of a map or of a page of it: every second texel, mixed with those
    around it, 1 2 1 along each axis. Texels on the border are mixed along the border alone and so
@@ -9080,7 +9073,9 @@ static void terrimpi_page_box(const terrimp_terrain *t, const terrimp_node *node
    unless `strays` says that it may not. Whether a child that is missing will have to be left, too,
    nobody knows; when it will if it is like others of its level (as the rule PICTURE measures, see
    terrimpi_mip_distance), all is asked for in one breath: so what a far jump needs comes at once,
-   and not one level after the other. */
+   and not one level after the other. The last pages of two levels may be of different places, but
+   children are seldom rougher than their parent: so a guess falls by half from level to level, or
+   all that is in sight would be walked through: 12 s at 65537 x 65537. */
 static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *node,
                                  const terrimpi_page_need *need)
 {
@@ -9116,9 +9111,10 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
         all = 0;
         held = p->held + child.level;
         below.reach = need->reach *
-                      (held[0] > 0.0f && held[1] > 0.0f ? 0.5f * held[0] / held[1] : 0.25f);
+                      (held[0] > 0.0f && held[1] > 0.0f
+                           ? 0.5f * terrimpi_min(held[0] / held[1], 1.0f) : 0.25f);
         below.urgency = terrimpi_min(below.reach / terrimpi_mip_distance2(&box, need->eye),
-                                     need->urgency);
+                                     0.5f * need->urgency);
         if (child.level > 0 && below.urgency >= TERRIMPI_PAGE_SURE)
             terrimpi_page_divides(t, &child, &below);
     }
@@ -9923,9 +9919,10 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_FINER 0.95f     /* ... and back, a frame; for max_cost, from which costs fall
                                          with the square of the tolerance, at least so much */
 #define TERRIMPI_VIEW_FINEST 0.8f     /* ... and at most */
-#define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short */
+#define TERRIMPI_VIEW_DEARER 1.05f    /* a step of the tolerance when max_cost is short, */
+#define TERRIMPI_VIEW_EVEN 4u         /* ... so many a frame; by it the next ones grow, each */
 #define TERRIMPI_VIEW_RESERVE 0.25f   /* of it that is left for the captures of the mean frame */
-#define TERRIMPI_VIEW_TRIES 12u       /* ... of those a frame */
+#define TERRIMPI_VIEW_TRIES 12u       /* ... steps a frame at most: of 10 times the tolerance */
 #define TERRIMPI_VIEW_SOON 90.0f      /* [frames] pages are asked for so long before their time */
 #define TERRIMPI_VIEW_AGED 0.95f      /* of STALE: the most that light makes a picture urgent */
 #define TERRIMPI_VIEW_LIGHT 0.0157f   /* [rad] tolerance of it, */
@@ -12021,14 +12018,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimp_mesh_info mesh;
     int is_known;
     memset(job, 0, sizeof *job);
-    if (c->is_short) { /* it wants the nodes that it stands for, and the ground that they show */
-        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 2.0f, 0.0f};
-        need.urgency = terrimpi_max(2.0f, terrimpi_view_sharpness(f, c->closest) /
-                                              TERRIMPI_CAPTURE_SOURCE_TEXELS *
-                                              terrimpi_tree_kept(&f->terrain->tree,
-                                                                 c->node.number)->rms);
-        need.urgency *= need.urgency;
-        need.reach = need.urgency * c->closest * c->closest;
+    if (c->is_short) { /* it wants the nodes that it stands for */
+        terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_PICTURE, 4.0f, 0.0f};
         f->terrain->tree.pages->calls->divides(f->terrain, &c->node, &need);
         v->late++;
         return 0;
@@ -12359,13 +12350,15 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
 }
 
 /* Finds what is in sight and what shows it: at the tolerance of the frame before, or a finer one if
-   that is predicted to fit max_ground and max_cost; coarser by steps until it does. */
+   that is predicted to fit max_ground and max_cost; coarser by steps until it does. Steps that go
+   on grow, so that a turn towards far more than was in sight is not dearer for many frames. */
 static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f,
                                         terrimpi_frame_sums *sums)
 {
     float max_cost = terrimpi_view_full(&v->desc) ? 0.0f : v->desc.max_cost;
     float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px, scale = v->ground_scale;
     float finer = max_cost > 0.0f ? TERRIMP_SQRTF(v->cost / max_cost) : TERRIMPI_VIEW_FINER;
+    float step = TERRIMPI_VIEW_DEARER;
     uint32_t tries, i;
     if (finer <= TERRIMPI_VIEW_FINER)
         v->ground_scale = terrimpi_max(1.0f, scale * terrimpi_max(finer, TERRIMPI_VIEW_FINEST));
@@ -12382,7 +12375,8 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
             tries == TERRIMPI_VIEW_TRIES)
             return TERRIMP_OK;
         finer = v->ground_scale;
-        v->ground_scale *= TERRIMPI_VIEW_DEARER;
+        step *= tries < TERRIMPI_VIEW_EVEN ? 1.0f : TERRIMPI_VIEW_DEARER;
+        v->ground_scale *= step;
         if (finer < scale)
             v->ground_scale = terrimpi_min(v->ground_scale, scale);
     }
@@ -12780,7 +12774,7 @@ TERRIMP_API terrimp_result terrimp_sorted_init(const terrimp_sorted_desc *desc,
     sorted->least_scale = terrimpi_sorted_least_scale(d.table, sorted->top);
     sorted->pages[0] = (d.field.width - 2u) / d.page_quads + 1u;
     sorted->pages[1] = (d.field.depth - 2u) / d.page_quads + 1u;
-    sorted->depth = -1;
+    sorted->level = sorted->top;
     return TERRIMP_OK;
 }
 
@@ -12905,21 +12899,19 @@ static void terrimpi_sorted_footprint(terrimp_sorted *s, const terrimpi_sorted_h
     } while (to != first && s->side_count < TERRIMP_SORTED_SIDES);
 }
 
-/* Which of a square's sides of the footprint cross it; -1: it is outside of one. */
-static int terrimpi_sorted_sides(const terrimp_sorted *s, const terrimp_sorted_cell *c,
-                                 uint32_t level)
+/* Whether a side of the footprint crosses a square; -1: it is outside of one. Without branches,
+   which nobody could foretell. */
+static int terrimpi_sorted_sides(const terrimp_sorted *s, const terrimp_sorted_cell *c)
 {
     terrimp_sorted_int x = s->corner[0] + c->at[0], z = s->corner[1] + c->at[1];
-    const terrimp_sorted_side *side = s->sides;
-    int bit, mask = c->sides, crossing = 0;
-    for (bit = 1; bit <= mask; bit <<= 1, side++)
-        if (mask & bit) {
-            terrimp_sorted_int here = side->x * x + side->z * z + side->at;
-            if (here + ((terrimp_sorted_int)side->rise << level) < 0)
-                return -1;
-            crossing |= here < (terrimp_sorted_int)side->fall << level ? bit : 0;
-        }
-    return crossing;
+    terrimp_sorted_int size = (terrimp_sorted_int)1 << s->level, outside = 0, crossing = 0;
+    const terrimp_sorted_side *side, *end = s->sides + s->side_count;
+    for (side = s->sides; side < end; side++) {
+        terrimp_sorted_int here = side->x * x + side->z * z + side->at;
+        outside |= here + side->rise * size;
+        crossing |= here - side->fall * size;
+    }
+    return outside < 0 ? -1 : crossing < 0;
 }
 
 /* First and last page of a row that the footprint can touch, or one more: sides are divided in
@@ -12978,30 +12970,21 @@ static void terrimpi_sorted_set_scale(terrimp_sorted *s, float scale)
     s->split[level] = s->whole[s->top] = TERRIMPI_SORTED_NEVER;
 }
 
-static uint32_t terrimpi_sorted_level(const terrimp_sorted *s)
-{
-    return s->top - (uint32_t)(s->depth + 1);
-}
-
 /* Which sides of the present square are split, for its neighbours are: bits as in the patterns of
    nodes. Only one that is closer than the square can be, across the side that faces the eye: one
    along each axis at most. */
 static uint32_t terrimpi_sorted_pattern(const terrimp_sorted *s)
 {
-    const terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    uint32_t level = terrimpi_sorted_level(s), pattern = 0;
-    terrimp_sorted_int away[2];
+    uint32_t pattern = 0;
     int k;
-    if (level == 0 || s->away > s->whole[level])
+    if (s->level == 0 || s->away > s->whole[s->level])
         return 0;
-    for (k = 0; k < 2; k++)
-        away[k] = terrimpi_sorted_nearest(c->away[k][0], c->away[k][2]);
     for (k = 0; k < 2; k++) {
-        terrimp_sorted_int size = c->away[k][2] - c->away[k][0];
-        terrimp_sorted_int beside = away[k] > 0 ? terrimpi_sorted_nearest(away[k] - size, away[k])
-                                                : terrimpi_sorted_nearest(away[k], away[k] + size);
-        if (beside * beside + away[1 - k] * away[1 - k] + s->rise < s->split[level])
-            pattern |= (away[k] > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
+        terrimp_sorted_int way = s->way[k], size = s->unit[k] << s->level;
+        terrimp_sorted_int beside = way > 0 ? terrimpi_sorted_nearest(way - size, way)
+                                             : terrimpi_sorted_nearest(way, way + size);
+        if (s->away - way * way + beside * beside < s->split[s->level])
+            pattern |= (way > 0 ? 1u : 2u) << (k == 0 ? 2 : 0);
     }
     return pattern;
 }
@@ -13013,13 +12996,16 @@ static int32_t terrimpi_sorted_clamp(const terrimp_sorted *s, int axis, int32_t 
     return at < s->last[axis] ? at : s->last[axis];
 }
 
-/* A sample of the page as it is stored. */
+/* A sample of the page as it is stored, or the last one of its row or column. */
 static terrimp_sorted_height terrimpi_sorted_sample(const terrimp_sorted *s, int32_t x, int32_t z)
 {
-    const void *row = (const char *)s->page.samples +
-                      (size_t)(terrimpi_sorted_clamp(s, 1, z) >> s->page.level) * s->page.row_bytes;
     const terrimp_sorted_height one = sizeof(terrimp_sorted_int) > 4 ? 1 : 256;
-    x = terrimpi_sorted_clamp(s, 0, x) >> s->page.level;
+    const void *row;
+    if (s->partial) {
+        x = terrimpi_sorted_clamp(s, 0, x) >> s->page.level;
+        z = terrimpi_sorted_clamp(s, 1, z) >> s->page.level;
+    }
+    row = (const char *)s->page.samples + (size_t)z * s->page.row_bytes;
     switch (s->desc.field.format) {
 #ifndef TERRIMP_FIXED
     case TERRIMP_FORMAT_F32: return ((const float *)row)[x];
@@ -13091,9 +13077,10 @@ static terrimp_sorted_height terrimpi_sorted_rest(const terrimp_sorted *s,
 static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell *c,
                                     const uint8_t *places, uint32_t count, uint32_t level)
 {
+    const int32_t size = 1 << level;
     for (; count > 0; count--, places++) {
         uint32_t place = *places, column = place & 3u, row = place >> 2;
-        int32_t x = c->at[0] + (int32_t)(column << level), z = c->at[1] + (int32_t)(row << level);
+        int32_t x = c->at[0] + (int32_t)column * size, z = c->at[1] + (int32_t)row * size;
         terrimp_sorted_int away = c->away[0][column] * c->away[0][column] +
                                   c->away[1][row] * c->away[1][row] + s->rise;
         terrimp_sorted_int left = s->split[level + 1u] - away;
@@ -13103,7 +13090,7 @@ static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell
             *height = terrimpi_sorted_sample(s, x, z);
             continue;
         }
-        *height = terrimpi_sorted_rest(s, c, place, x, z, 2 << level);
+        *height = terrimpi_sorted_rest(s, c, place, x, z, 2 * size);
         if (here && left > 0) {
 #ifdef TERRIMP_FIXED
             terrimp_sorted_int range = s->split[level + 1u] - s->whole[level];
@@ -13120,70 +13107,60 @@ static void terrimpi_sorted_heights(const terrimp_sorted *s, terrimp_sorted_cell
 
 /* ---- the order ---- */
 
-/* The k-th of count places from first on, from both ends towards that of the eye, or away from
-   it. */
-static int32_t terrimpi_sorted_outside_in(int32_t first, int32_t count, int32_t eye, int32_t k,
-                                          int away)
+/* The k-th of count places from first on, from both ends towards 0, or away from it. */
+static int32_t terrimpi_sorted_outside_in(int32_t first, int32_t count, int32_t k, int away)
 {
-    int32_t last = first + count - 1;
-    eye = eye < first ? first : eye > last ? last : eye;
+    int32_t last = first + count - 1, after = last < 0 ? 0 : first > 0 ? count - 1 : last;
     k = away ? count - 1 - k : k;
-    return k < last - eye ? last - k : first + (k - (last - eye));
+    return k < after ? last - k : first + k - after;
 }
 
 static void terrimpi_sorted_restart(terrimp_sorted *s)
 {
     s->rows = s->bounds[1 - s->row_axis][1] - s->bounds[1 - s->row_axis][0] + 1;
     s->row = s->col = s->cols = 0;
-    s->depth = -1;
+    s->level = s->top;
     s->triangle_count = 0;
 }
 
-/* Looks at the square above the stack, of which begin and level are known. Returns 1 if it is drawn
-   as a whole: then it is the present one; 0 after it has been pushed; -1 when it lies outside. */
-static int terrimpi_sorted_visit(terrimp_sorted *s)
+/* Looks at the present square, of which begin and level are known. Returns 1 if it is drawn as a
+   whole; 0 if it is split: then its first quarter is the next one; -1 when it lies outside. */
+static int terrimpi_sorted_visit(terrimp_sorted *s, terrimp_sorted_cell *c)
 {
-    uint32_t level = terrimpi_sorted_level(s);
-    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    int k, sides = c->sides ? terrimpi_sorted_sides(s, c, level) : 0;
-    if (sides < 0 || c->at[0] >= s->last[0] || c->at[1] >= s->last[1])
+    int k, crossed = c->crossed ? terrimpi_sorted_sides(s, c) : 0;
+    if (crossed < 0 || c->at[0] >= s->last[0] || c->at[1] >= s->last[1])
         return -1;
-    s->away = s->rise;
     for (k = 0; k < 2; k++) {
-        terrimp_sorted_int *away = c->away[k], size = s->unit[k] << level, nearest;
+        terrimp_sorted_int *away = c->away[k], size = s->unit[k] << s->level;
         away[1] = away[0] + (size >> 1);
         away[2] = away[0] + size;
-        nearest = terrimpi_sorted_nearest(away[0], away[2]);
-        s->away += nearest * nearest;
+        s->way[k] = terrimpi_sorted_nearest(away[0], away[2]);
     }
-    if (s->away >= s->split[level])
+    s->away = s->way[0] * s->way[0] + s->way[1] * s->way[1] + s->rise;
+    if (s->away >= s->split[s->level])
         return 1;
-    c->sides = (uint16_t)sides;
+    c->crossed = (uint8_t)crossed;
     c->child = 0;
-    c->order = (uint8_t)((c->away[s->row_axis][1] > 0) | (c->away[1 - s->row_axis][1] > 0) << 1);
+    c->order = (uint8_t)((c->away[0][1] > 0) | (c->away[1][1] > 0) << 1);
     c->order ^= s->desc.front_to_back ? 3 : 0;
-    s->depth++;
+    s->level--;
     return 0;
 }
 
-/* Goes to the next quarter of the square on top of the stack, of two the one first that the eye is
-   not at; rows come before columns. Returns its place; -1 after the last one. */
-static int terrimpi_sorted_quarter(terrimp_sorted *s)
+/* Goes to the next quarter of a square, of two the one first that the eye is not at; rows come
+   before columns. Returns its place. */
+static uint32_t terrimpi_sorted_quarter(const terrimp_sorted *s, terrimp_sorted_cell *whole)
 {
-    terrimp_sorted_cell *c = &s->stack[s->depth];
-    uint32_t level = terrimpi_sorted_level(s), k = c->child ^ (uint32_t)c->order, x, z;
-    if (c->child++ == 4) {
-        s->depth--;
-        return -1;
-    }
-    x = s->row_axis == 0 ? k & 1u : k >> 1;
-    z = s->row_axis == 0 ? k >> 1 : k & 1u;
-    c[1].at[0] = c->at[0] + (int32_t)(x << level);
-    c[1].at[1] = c->at[1] + (int32_t)(z << level);
-    c[1].away[0][0] = c->away[0][x];
-    c[1].away[1][0] = c->away[1][z];
-    c[1].sides = c->sides;
-    return (int)(x + 4u * z);
+    static const uint8_t turns[2][4] = { { 0, 1, 2, 3 }, { 0, 2, 1, 3 } };
+    uint32_t k = turns[s->row_axis][whole->child++] ^ (uint32_t)whole->order;
+    uint32_t x = k & 1u, z = k >> 1, size = 1u << s->level;
+    terrimp_sorted_cell *c = whole - 1;
+    c->at[0] = whole->at[0] + (int32_t)(x * size);
+    c->at[1] = whole->at[1] + (int32_t)(z * size);
+    c->away[0][0] = whole->away[0][x];
+    c->away[1][0] = whole->away[1][z];
+    c->crossed = whole->crossed;
+    return x + 4u * z;
 }
 
 /* ---- pages ---- */
@@ -13258,20 +13235,20 @@ static int terrimpi_sorted_ask(terrimp_sorted *s, terrimp_sorted_page *page)
 static int terrimpi_sorted_next_page(terrimp_sorted *s)
 {
     int along = s->row_axis, across = 1 - along, k;
-    terrimp_sorted_cell *c = &s->stack[0];
+    terrimp_sorted_cell *c = &s->cells[s->top];
     int32_t place[2];
     while (s->col >= s->cols) {
         int32_t last;
         if (s->row >= s->rows)
             return 0;
-        s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, 0, s->row++,
+        s->page_row = terrimpi_sorted_outside_in(s->bounds[across][0], s->rows, s->row++,
                                                  s->desc.front_to_back);
         terrimpi_sorted_row(s, s->page_row, &s->first_col, &last);
         s->cols = last - s->first_col + 1;
         s->col = 0;
     }
     place[across] = s->page_row;
-    place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, 0, s->col++,
+    place[along] = terrimpi_sorted_outside_in(s->first_col, s->cols, s->col++,
                                               s->desc.front_to_back);
     memset(&s->page, 0, sizeof s->page);
     s->page.x = place[0] + s->eye_page[0];
@@ -13282,7 +13259,7 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s)
         c->at[k] = 0;
         c->away[k][0] = s->corner[k] * s->unit[k] - s->eye[k];
     }
-    c->sides = (uint16_t)((1u << s->side_count) - 1u);
+    c->crossed = 1;
     if (!s->desc.page)
         terrimpi_sorted_field_page(s, &s->page);
     return 1;
@@ -13291,11 +13268,11 @@ static int terrimpi_sorted_next_page(terrimp_sorted *s)
 /* Readies a page to be drawn; 0: it is not here. Its corners have their own heights. */
 static int terrimpi_sorted_open(terrimp_sorted *s)
 {
-    terrimp_sorted_height *heights = s->stack[0].heights;
+    terrimp_sorted_height *heights = s->cells[s->top].heights;
     int32_t last = (int32_t)s->desc.page_quads;
     s->page.texture_level = terrimpi_sorted_texture_level(s);
     if (s->desc.page && !terrimpi_sorted_ask(s, &s->page)) {
-        s->depth = -1;
+        s->level = s->top;
         return 0;
     }
     heights[0] = terrimpi_sorted_sample(s, 0, 0);
@@ -13310,36 +13287,30 @@ static int terrimpi_sorted_open(terrimp_sorted *s)
 static int terrimpi_sorted_look(terrimp_sorted *s, int to_count)
 {
     static const uint8_t inner[5] = { 1, 4, 5, 6, 9 };
-    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    int is_page = s->depth < 0, place = 0, found;
+    terrimp_sorted_cell *c = &s->cells[s->level];
+    terrimp_sorted_height *from = c->heights;
+    int found, is_page;
+    for (; s->level < s->top && c[1].child == 4; c++)
+        s->level++;
+    is_page = s->level == s->top;
     if (is_page && !terrimpi_sorted_next_page(s))
         return -1;
-    if (!is_page && (place = terrimpi_sorted_quarter(s)) < 0)
-        return 0;
-    found = terrimpi_sorted_visit(s);
+    if (!is_page)
+        from = c[1].heights + terrimpi_sorted_quarter(s, c + 1);
+    found = terrimpi_sorted_visit(s, c);
     if (found < 0 || to_count)
         return found > 0;
     if (is_page && !terrimpi_sorted_open(s))
         return 0;
     if (!is_page) { /* its corners are places of the square that it is a quarter of */
-        c->heights[0] = c[-1].heights[place];
-        c->heights[2] = c[-1].heights[place + 1];
-        c->heights[8] = c[-1].heights[place + 4];
-        c->heights[10] = c[-1].heights[place + 5];
+        c->heights[0] = from[0];
+        c->heights[2] = from[1];
+        c->heights[8] = from[4];
+        c->heights[10] = from[5];
     }
     if (!found)
-        terrimpi_sorted_heights(s, c, inner, 5, terrimpi_sorted_level(s));
+        terrimpi_sorted_heights(s, c, inner, 5, s->level);
     return found;
-}
-
-/* Goes to the next square; 0: there is none. */
-static int terrimpi_sorted_step(terrimp_sorted *s, int to_count)
-{
-    int found;
-    do
-        found = terrimpi_sorted_look(s, to_count);
-    while (found == 0);
-    return found > 0;
 }
 
 /* ---- triangles ---- */
@@ -13372,7 +13343,7 @@ static void terrimpi_sorted_half(const terrimp_sorted *s, terrimp_sorted_square 
                                  int turned)
 {
     int a = begin, b = end ? end : 3;
-    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], places[a], places[b],
+    int first = terrimpi_sorted_corner_first(s, &s->cells[s->level], places[a], places[b],
                                              turned);
     if (first)
         terrimpi_sorted_triangle(out, a, b, corner, turned);
@@ -13389,7 +13360,7 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
                                       const uint8_t places[6], const int middle[4])
 {
     static const uint8_t plain[2][6] = { { 0, 2, 3, 0, 3, 1 }, { 0, 3, 1, 0, 2, 3 } };
-    int first = terrimpi_sorted_corner_first(s, &s->stack[s->depth + 1], 0, 10, 0), i;
+    int first = terrimpi_sorted_corner_first(s, &s->cells[s->level], 0, 10, 0), i;
     if (out->vertex_count == 4) {
         memcpy(out->indices, plain[first], sizeof plain[0]);
         out->triangle_count = 2;
@@ -13405,12 +13376,12 @@ static void terrimpi_sorted_triangles(const terrimp_sorted *s, terrimp_sorted_sq
 }
 
 /* Cuts off what of the present square is beyond the last sample. */
-static void terrimpi_sorted_trim(const terrimp_sorted *s, terrimp_sorted_cell *c, uint32_t level)
+static void terrimpi_sorted_trim(const terrimp_sorted *s, terrimp_sorted_cell *c)
 {
     int i, k;
     for (k = 0; k < 2; k++)
         for (i = 1; i < 3; i++) {
-            int32_t over = c->at[k] + ((i << level) >> 1) - s->last[k];
+            int32_t over = c->at[k] + (i << s->level >> 1) - s->last[k];
             c->away[k][i] -= over > 0 ? over * s->unit[k] : 0;
         }
 }
@@ -13420,9 +13391,9 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
 {
     static const uint8_t sides[4] = { 1, 9, 4, 6 };
     uint8_t places[6] = { 0, 2, 8, 10, 0, 0 };
-    terrimp_sorted_cell *c = &s->stack[s->depth + 1];
-    uint32_t pattern = terrimpi_sorted_pattern(s), level = terrimpi_sorted_level(s), count = 4, i;
-    int32_t quads = (int32_t)s->desc.page_quads;
+    terrimp_sorted_cell *c = &s->cells[s->level];
+    uint32_t pattern = terrimpi_sorted_pattern(s), count = 4, i;
+    int32_t x0, z0, quads = (int32_t)s->desc.page_quads;
     int middle[4] = { 0, 0, 0, 0 };
     for (i = 0; pattern >> i; i++)
         if (pattern >> i & 1u) {
@@ -13430,15 +13401,17 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
             places[count++] = sides[i];
         }
     if (count > 4u)
-        terrimpi_sorted_heights(s, c, places + 4, count - 4u, level - 1u);
+        terrimpi_sorted_heights(s, c, places + 4, count - 4u, s->level - 1u);
     if (s->partial)
-        terrimpi_sorted_trim(s, c, level);
+        terrimpi_sorted_trim(s, c);
+    x0 = s->page.x * quads;
+    z0 = s->page.z * quads;
     for (i = 0; i < count; i++) {
         terrimp_sorted_vertex *v = &out->vertices[i];
-        int32_t x = c->at[0] + ((places[i] & 3) << level >> 1);
-        int32_t z = c->at[1] + ((places[i] >> 2) << level >> 1);
-        v->x = s->page.x * quads + terrimpi_sorted_clamp(s, 0, x);
-        v->z = s->page.z * quads + terrimpi_sorted_clamp(s, 1, z);
+        int32_t x = c->at[0] + ((places[i] & 3) << s->level >> 1);
+        int32_t z = c->at[1] + ((places[i] >> 2) << s->level >> 1);
+        v->x = x0 + (s->partial ? terrimpi_sorted_clamp(s, 0, x) : x);
+        v->z = z0 + (s->partial ? terrimpi_sorted_clamp(s, 1, z) : z);
         v->height = c->heights[places[i]];
 #ifndef TERRIMP_FIXED
         v->height = terrimpi_field_world_height(&s->desc.field, v->height);
@@ -13446,21 +13419,36 @@ static void terrimpi_sorted_emit(terrimp_sorted *s, terrimp_sorted_square *out)
     }
     out->page_x = s->page.x;
     out->page_z = s->page.z;
-    out->level = (uint8_t)level;
+    out->level = (uint8_t)s->level;
     out->texture_level = (uint8_t)s->page.texture_level;
     out->vertex_count = (uint8_t)count;
     terrimpi_sorted_triangles(s, out, places, middle);
+    s->triangle_count += out->triangle_count;
+}
+
+/* Gives out the next squares, or counts them and their triangles. */
+static uint32_t terrimpi_sorted_walk(terrimp_sorted *s, terrimp_sorted_square *squares,
+                                     uint32_t capacity)
+{
+    uint32_t count = 0;
+    int found = 0;
+    while (count < capacity && found >= 0) {
+        found = terrimpi_sorted_look(s, !squares);
+        if (found <= 0)
+            continue;
+        if (squares)
+            terrimpi_sorted_emit(s, &squares[count]);
+        else
+            s->triangle_count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
+        count++;
+    }
+    return count;
 }
 
 TERRIMP_API uint32_t terrimp_sorted_next(terrimp_sorted *sorted, terrimp_sorted_square *squares,
                                          uint32_t capacity)
 {
-    uint32_t count = 0;
-    while (sorted && squares && count < capacity && terrimpi_sorted_step(sorted, 0)) {
-        terrimpi_sorted_emit(sorted, &squares[count]);
-        sorted->triangle_count += squares[count++].triangle_count;
-    }
-    return count;
+    return sorted && squares ? terrimpi_sorted_walk(sorted, squares, capacity) : 0;
 }
 
 TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
@@ -13474,14 +13462,6 @@ TERRIMP_API void terrimp_sorted_position(const terrimp_sorted *sorted,
 #else
     position[1] = vertex->height;
 #endif
-}
-
-TERRIMP_API uint32_t terrimp_sorted_pace(uint32_t triangles, float ms, float target_ms)
-{
-    float now = (float)(triangles ? triangles : 1u), next = terrimp_view_pace(now, ms, target_ms);
-    if (!(next > now || next < now) || next >= 4294967040.0f)
-        return triangles;
-    return next > now ? triangles + (uint32_t)(next - now) + 1u : (uint32_t)next;
 }
 
 /* The three texels of a line that are mixed at one of them: before, itself, after. At an end where
@@ -13527,12 +13507,10 @@ TERRIMP_API terrimp_result terrimp_sorted_halve(const uint8_t *texels, uint32_t 
 /* The triangles of the frame at a scale. */
 static uint32_t terrimpi_sorted_count(terrimp_sorted *s, float scale)
 {
-    uint32_t count = 0;
     terrimpi_sorted_set_scale(s, scale);
     terrimpi_sorted_restart(s);
-    while (terrimpi_sorted_step(s, 1))
-        count += 2u + terrimpi_mip_coarse_sides(terrimpi_sorted_pattern(s));
-    return count;
+    terrimpi_sorted_walk(s, NULL, 0xffffffffu);
+    return s->triangle_count;
 }
 
 /* Finds the scale whose triangles are 97 to 100 % of max_triangles, or the largest that does not
@@ -13625,7 +13603,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
     float eye[3], quads;
     int k;
     TERRIMPI_REFUSE(!sorted, TERRIMP_E_NULL);
-    sorted->depth = -1;
+    sorted->level = sorted->top;
     sorted->row = sorted->rows = sorted->col = sorted->cols = 0;
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     TERRIMPI_REFUSE(c.orthographic || c.z_far > TERRIMPI_CAMERA_FARTHEST, TERRIMP_E_RANGE);
@@ -13666,7 +13644,7 @@ TERRIMP_API terrimp_result terrimp_sorted_begin(terrimp_sorted *sorted,
 typedef struct terrimpi_sorted_block {
     terrimpi_mip_writer out;
     terrimpi_terrain_pattern part; /* quads that are drawn */
-    float x[3], z[3];      /* of the columns and rows of vertices, from the eye on */
+    const float *x, *z;    /* of its columns and rows of vertices, from the eye on */
 } terrimpi_sorted_block;
 
 /* The quads of a block, two bits each, first one lowest; by which of these is closer than the one
@@ -13688,19 +13666,16 @@ static uint32_t terrimpi_sorted_block_order(const terrimpi_sorted_block *b, uint
                                             uint32_t *sides)
 {
     uint32_t last = b->out.quads - 2u, coarse = b->out.pattern;
-    uint32_t right = b->x[1] < 0.0f ? 1u : 0u, below = b->z[1] < 0.0f ? 1u : 0u;
-    uint32_t bits = right * 3u + below * 12u;
+    uint32_t bits = (b->x[1] < 0.0f ? 3u : 0u) | (b->z[1] < 0.0f ? 12u : 0u), merged;
     coarse &= (z == 0 ? 1u : 0u) | (z == last ? 2u : 0u) | (x == 0 ? 4u : 0u) |
               (x == last ? 8u : 0u);
     *sides = coarse;
-    if (coarse & 9u) /* merged with the quad at the corner of +x, -z */
-        right = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? 1u : 0u;
-    if (coarse & 6u)
-        below = terrimpi_sorted_cross(b, 0, 2, 1, 1) > 0.0f ? 1u : 0u;
-    bits = coarse & 1u ? (bits & ~1u) | right : bits;
-    bits = coarse & 8u ? (bits & ~8u) | right << 3 : bits;
-    bits = coarse & 2u ? (bits & ~2u) | below << 1 : bits;
-    bits = coarse & 4u ? (bits & ~4u) | below << 2 : bits;
+    merged = coarse & 9u; /* with the quad at the corner of +x, -z */
+    if (merged)
+        bits = terrimpi_sorted_cross(b, 1, 1, 2, 0) > 0.0f ? bits | merged : bits & ~merged;
+    merged = coarse & 6u;
+    if (merged)
+        bits = terrimpi_sorted_cross(b, 0, 2, 1, 1) > 0.0f ? bits | merged : bits & ~merged;
     return terrimpi_sorted_quads[bits];
 }
 
@@ -13709,33 +13684,33 @@ static void terrimpi_sorted_write_block(terrimpi_sorted_block *b, uint32_t x, ui
     uint32_t k, sides, row = b->out.quads + 1u;
     uint32_t order = terrimpi_sorted_block_order(b, x, z, &sides);
     for (k = 0; k < 4u; k++, order >>= 2) {
-        uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz;
+        uint32_t dx = order & 1u, dz = order >> 1 & 1u, i = x + dx, j = z + dz, at = j * row + i;
         int first = terrimpi_sorted_cross(b, (int)dx, (int)dz, (int)dx + 1, (int)dz + 1) < 0.0f;
-        uint16_t v[4];
-        if (i < b->part.x0 || i >= b->part.x1 || j < b->part.z0 || j >= b->part.z1)
+        uint16_t v[6], *to = sides ? v : b->out.out;
+        uint16_t *one = to + (first ? 0 : 3), *other = to + (first ? 3 : 0);
+        if (i - b->part.x0 >= b->part.x1 - b->part.x0 || j - b->part.z0 >= b->part.z1 - b->part.z0)
             continue;
-        v[0] = (uint16_t)(j * row + i);
-        v[1] = (uint16_t)(v[0] + row);
-        v[2] = (uint16_t)(v[1] + 1u);
-        v[3] = (uint16_t)(v[0] + 1u);
+        one[0] = other[0] = (uint16_t)at;
+        one[1] = (uint16_t)(at + row);
+        one[2] = other[1] = (uint16_t)(at + row + 1u);
+        other[2] = (uint16_t)(at + 1u);
         if (sides) {
-            v[0] = terrimpi_mip_index(&b->out, i, j);
-            v[1] = terrimpi_mip_index(&b->out, i, j + 1u);
-            v[2] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
-            v[3] = terrimpi_mip_index(&b->out, i + 1u, j);
+            one[0] = other[0] = terrimpi_mip_index(&b->out, i, j);
+            one[1] = terrimpi_mip_index(&b->out, i, j + 1u);
+            one[2] = other[1] = terrimpi_mip_index(&b->out, i + 1u, j + 1u);
+            other[2] = terrimpi_mip_index(&b->out, i + 1u, j);
+            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
+            terrimpi_mip_triangle(&b->out, v[3], v[4], v[5]);
+        } else {
+            b->out.out += 6;
         }
-        if (first)
-            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
-        terrimpi_mip_triangle(&b->out, v[0], v[2], v[3]);
-        if (!first)
-            terrimpi_mip_triangle(&b->out, v[0], v[1], v[2]);
     }
 }
 
-/* The next of the blocks at *low to *high along an axis: from both ends towards the eye's. `past`
-   says that the eye lies behind the end of the block at *low. */
-static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
+/* The next of the blocks at *low to *high along an axis: from both ends towards the eye's, at 0. */
+static uint32_t terrimpi_sorted_turn(const float *places, uint32_t *low, uint32_t *high)
 {
+    int past = places[*low + 2u] <= 0.0f;
     uint32_t at = past ? *low : *high - 2u;
     *low += past ? 2u : 0u;
     *high -= past ? 0u : 2u;
@@ -13745,22 +13720,22 @@ static uint32_t terrimpi_sorted_turn(uint32_t *low, uint32_t *high, int past)
 static void terrimpi_sorted_write(terrimpi_sorted_block *b, const terrimp_quadtree *tree,
                                   const terrimp_node *n, const float eye[3])
 {
-    uint32_t i0 = n->x * tree->chunk_quads, j0 = n->z * tree->chunk_quads;
+    float xs[129], zs[129]; /* of the largest chunk */
     uint32_t rows[2], cols[2], k, x, z;
+    for (k = 0; k <= tree->chunk_quads; k++) {
+        xs[k] = terrimpi_tree_x(tree, n->level, n->x * tree->chunk_quads + k) - eye[0];
+        zs[k] = terrimpi_tree_z(tree, n->level, n->z * tree->chunk_quads + k) - eye[2];
+    }
     rows[0] = b->part.z0 & ~1u;
     rows[1] = (b->part.z1 + 1u) & ~1u;
     while (rows[0] < rows[1]) {
-        z = terrimpi_sorted_turn(&rows[0], &rows[1],
-                                 terrimpi_tree_z(tree, n->level, j0 + rows[0] + 2u) <= eye[2]);
-        for (k = 0; k < 3u; k++)
-            b->z[k] = terrimpi_tree_z(tree, n->level, j0 + z + k) - eye[2];
+        z = terrimpi_sorted_turn(zs, &rows[0], &rows[1]);
+        b->z = zs + z;
         cols[0] = b->part.x0 & ~1u;
         cols[1] = (b->part.x1 + 1u) & ~1u;
         while (cols[0] < cols[1]) {
-            x = terrimpi_sorted_turn(&cols[0], &cols[1],
-                                     terrimpi_tree_x(tree, n->level, i0 + cols[0] + 2u) <= eye[0]);
-            for (k = 0; k < 3u; k++)
-                b->x[k] = terrimpi_tree_x(tree, n->level, i0 + x + k) - eye[0];
+            x = terrimpi_sorted_turn(xs, &cols[0], &cols[1]);
+            b->x = xs + x;
             terrimpi_sorted_write_block(b, x, z);
         }
     }
@@ -14256,7 +14231,7 @@ static void terrimpi_simp_edge_moments(const terrimpi_simplifier *s, int32_t x, 
     for (; w.z < w.end; w.z++, w.at += w.slope, row += s->cols) {
         int32_t count = w.at >> 20;
         const terrimpi_simp_row_prefix *sum = row + count;
-        int32_t to_x = count * (count - 1) / 2; /* 0 + 1 + ... + (count - 1) */
+        int32_t to_x = count * (count - 1) >> 1; /* 0 + 1 + ... + (count - 1) */
         n += count;
         n1 += n;
         n2 += n1;
@@ -14318,6 +14293,7 @@ static void terrimpi_simp_update_edge(terrimpi_simplifier *s, int32_t e)
 typedef struct terrimpi_simp_local {
     float n, x, z, xx, xz, zz, h, hx, hz, hh;
     float gx, gz, wx, wz;
+    terrimpi_simp_quadric own; /* of the triangle alone, by the height of a */
 } terrimpi_simp_local;
 
 static void terrimpi_simp_recentre(const terrimpi_simplifier *s, const terrimpi_simp_moments *sums,
@@ -14363,14 +14339,17 @@ static float terrimpi_simp_square_error(const terrimpi_simplifier *s,
            d * (d * l.n + 2.0f * (gx * l.x + gz * l.z - l.h));
 }
 
-/* Adds the squared error over triangle abc as a function of a's height. */
-static void terrimpi_simp_add_triangle(const terrimpi_simp_local *l, terrimpi_simp_quadric *p)
+/* Finds the squared error over triangle abc as a function of a's height, and adds it. */
+static void terrimpi_simp_add_triangle(terrimpi_simp_local *l, terrimpi_simp_quadric *p)
 {
     float ux = l->gx * l->xx + l->gz * l->xz, uz = l->gx * l->xz + l->gz * l->zz;
-    p->a += l->n + 2.0f * (l->wx * l->x + l->wz * l->z) +
-            l->wx * (l->wx * l->xx + 2.0f * l->wz * l->xz) + l->wz * l->wz * l->zz;
-    p->b += l->h + l->wx * (l->hx - ux) + l->wz * (l->hz - uz) - l->gx * l->x - l->gz * l->z;
-    p->c += l->hh + l->gx * (ux - 2.0f * l->hx) + l->gz * (uz - 2.0f * l->hz);
+    l->own.a = l->n + 2.0f * (l->wx * l->x + l->wz * l->z) +
+               l->wx * (l->wx * l->xx + 2.0f * l->wz * l->xz) + l->wz * l->wz * l->zz;
+    l->own.b = l->h + l->wx * (l->hx - ux) + l->wz * (l->hz - uz) - l->gx * l->x - l->gz * l->z;
+    l->own.c = l->hh + l->gx * (ux - 2.0f * l->hx) + l->gz * (uz - 2.0f * l->hz);
+    p->a += l->own.a;
+    p->b += l->own.b;
+    p->c += l->own.c;
 }
 
 /* --- the triangles round an inner vertex --- */
@@ -14530,14 +14509,13 @@ static float terrimpi_simp_newton_step(terrimpi_simplifier *s, int32_t v,
     terrimpi_simp_forget_errors(s, ring);
     for (i = 0; i < ring->count; i++) {
         float gx = part[i].gx + d * part[i].wx, gz = part[i].gz + d * part[i].wz, residual;
-        terrimpi_simp_quadric own = {0.0f, 0.0f, 0.0f};
-        terrimpi_simp_add_triangle(part + i, &own);
-        residual = own.b - d * own.a;
-        xx += own.a * gx * gx;
-        xz += own.a * gx * gz;
-        zz += own.a * gz * gz;
-        xh += own.a * gx;
-        zh += own.a * gz;
+        float a = part[i].own.a;
+        residual = part[i].own.b - d * a;
+        xx += a * gx * gx;
+        xz += a * gx * gz;
+        zz += a * gz * gz;
+        xh += a * gx;
+        zh += a * gz;
         rx -= residual * gx;
         rz -= residual * gz;
     }
@@ -15580,12 +15558,13 @@ static void terrimpi_raise_segment(const terrimpi_raise *r, uint32_t a, uint32_t
     }
 }
 
-/* What each pass begins with, and what it does to a vertex: the first one raises, others lower. */
-static float terrimpi_raise_begin(int pass) { return pass ? TERRIMPI_FLOAT_MAX : 0.0f; }
+/* What each pass begins with, and what it does to a vertex: the first one raises, others lower, by
+   no more than the vertex is raised. */
+static float terrimpi_raise_begin(int pass, float raise) { return pass ? raise : 0.0f; }
 
 static float terrimpi_raise_end(int pass, float raise, float change)
 {
-    return pass ? terrimpi_max(0.0f, raise - change) : change;
+    return pass ? raise - change : change;
 }
 
 /* Raises the loop's vertices, border by border, but for the corners. */
@@ -15603,7 +15582,7 @@ static void terrimpi_raise_loop(const terrimpi_raise *r, float *raise, float *ch
             last--; /* the loop's end closes the last side itself */
         for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
             for (i = first; i <= last; i++)
-                change[i % n] = terrimpi_raise_begin(pass);
+                change[i % n] = terrimpi_raise_begin(pass, raise[i % n]);
             for (i = first; i < last; i++)
                 terrimpi_raise_segment(r, backwards ? (i + 1) % n : i, backwards ? i : (i + 1) % n,
                                        raise, change, pass > 0);
@@ -15692,8 +15671,8 @@ static void terrimpi_raise_find(const terrimpi_raise *r, float *raise)
         raise[i] = 0.0f;
     terrimpi_raise_loop(r, raise, change);
     for (pass = 0; pass <= TERRIMPI_RAISE_LOWER_PASSES; pass++) {
-        for (i = 0; i < n; i++)
-            change[i] = terrimpi_raise_begin(pass);
+        for (i = 0; i < n; i++) /* the border stays */
+            change[i] = i < mesh->border_vertex_count ? 0.0f : terrimpi_raise_begin(pass, raise[i]);
         for (i = 0; i < mesh->surface_index_count; i += 3)
             terrimpi_raise_triangle(r, mesh->indices + i, raise, change, pass > 0);
         for (i = mesh->border_vertex_count; i < n; i++)
@@ -16484,7 +16463,7 @@ static terrimp_result terrimpi_build_simplify(const terrimpi_terrain_tile *p, ui
         desc.borders[side].points = points[side];
     }
     return terrimpi_simp_run(&desc,
-                             (squeeze.last_x | squeeze.last_z) % squeeze.step ? &squeeze : NULL,
+                             ((squeeze.last_x | squeeze.last_z) % squeeze.step) ? &squeeze : NULL,
                              build->rest, build->rest_bytes, mesh);
 }
 

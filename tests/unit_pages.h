@@ -1283,8 +1283,8 @@ static void pages_fly_without_holes(void)
             result = terrimp_view_update(view, &camera);
             CHECK(result == (paged_is_here(p, p->info.node_count - 1u) ? TERRIMP_OK
                                                                        : TERRIMP_E_PAGE));
-            paged_serve(&host);
             host.at_rest = rests ? host.times + p->l.info.node_count : NULL;
+            paged_serve(&host);
             for (k = 0; k < p->l.info.node_count && i % 100u == 99u; k++) {
                 uint32_t *times = &host.at_rest[k];
                 rested += *times;
@@ -1379,19 +1379,23 @@ static uint32_t paged_check_reads(const paged_land *p, const terrimp_camera *cam
 }
 
 /* A far jump: what the eye needs is asked for at once and not one level after the other, so all of
-   it is here after half as many rounds, and one for each list that is full; and of eight jumps
+   it is here after half as many rounds, and one for each list that is full; and of all jumps
    together little else has come. */
 static void pages_of_a_jump_come_at_once(void)
 {
     paged_land *p = paged_wide();
     uint32_t turn, all_reads = 0, all_used = 0;
-    for (turn = 0; turn < 8u && check_bad == 0; turn++) {
+    for (turn = 0; turn < 12u && check_bad == 0; turn++) {
         static terrimp_want wants[512];
         terrimp_view *view;
-        terrimp_camera camera = paged_camera(&p->l, turn / 2u);
+        terrimp_camera camera = paged_camera(&p->l, turn < 8u ? turn / 2u : turn);
         uint32_t count = 1, rounds = 0, reads = 0, i;
-        int mode = turn % 2u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
+        int mode = turn % 2u || turn >= 8u ? TERRIMP_MODE_GEOMIP : TERRIMP_MODE_AUTO;
         unsigned char *needed = (unsigned char *)calloc(p->l.info.node_count, 1);
+        if (turn >= 8u) { /* few pixels: ground will do that is far above the finest */
+            camera.width_px /= 8u;
+            camera.height_px /= 8u;
+        }
         free(p->memory);
         paged_open(p, PAGED_ALL);
         CHECK(paged_fetch(p, p->l.info.node_count - 1u) == TERRIMP_OK);
@@ -1418,6 +1422,47 @@ static void pages_of_a_jump_come_at_once(void)
         terrimp_view_destroy(view);
     }
     CHECK(all_reads * 2u <= all_used * 3u);
+    free(p->memory);
+    p->memory = NULL;
+}
+
+/* What nobody knows is guessed from the last pages of each level, which may be of other places:
+   whatever these say, a guess is less sure from level to level, by half of its square. So it ends
+   soon, where all that is in sight could be asked for; and rougher children than parents count as
+   if both were alike. */
+static void guesses_of_pages_fall_from_level_to_level(void)
+{
+    paged_land *p = paged_wide();
+    uint32_t turn, guesses = 0, i, k;
+    for (turn = 0; turn < 9u && check_bad == 0; turn++) {
+        static terrimp_want wants[2][512];
+        terrimp_camera camera = paged_camera(&p->l, turn);
+        uint32_t count[2];
+        camera.eye[1] += 100.0f; /* above all: nothing is asked for just since it is below */
+        free(p->memory);
+        paged_open(p, PAGED_ALL);
+        CHECK(paged_fetch(p, p->l.info.node_count - 1u) == TERRIMP_OK);
+        for (k = 0; k < 2u; k++) {
+            terrimp_view *view = paged_view(p->opened, TERRIMP_MODE_GEOMIP, 0.0f, NULL);
+            for (i = 1; i < p->info.level_count && turn % 3u > 0; i++)
+                p->opened->tree.pages->held[i] = turn % 3u == 2u ? 1.0f + (float)(i % 2u) * 1000.0f
+                                                 : k             ? 1.0f
+                                                                 : (float)(1u << (20u - i % 20u));
+            CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
+            CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_pages_wants(p->opened, wants[k], 512, &count[k]) == TERRIMP_OK);
+            terrimp_view_destroy(view);
+        }
+        CHECK(count[0] == count[1] && memcmp(wants[0], wants[1], count[0] * sizeof *wants[0]) == 0);
+        for (i = 0; i < count[0]; i++)
+            for (k = 0; k < i && wants[0][i].level + 4u <= p->info.level_count; k++)
+                if (wants[0][k].node == paged_above(p, wants[0][i].node)) {
+                    float above = wants[0][k].urgency * wants[0][k].urgency;
+                    CHECK(wants[0][i].urgency * wants[0][i].urgency <= 0.5001f * above);
+                    guesses++;
+                }
+    }
+    CHECK(guesses > 0);
     free(p->memory);
     p->memory = NULL;
 }
@@ -1493,6 +1538,7 @@ static inline void pages_flights(void)
     RUN(pages_fly_without_holes);
     RUN(pages_asked_for_are_in_use);
     RUN(pages_of_a_jump_come_at_once);
+    RUN(guesses_of_pages_fall_from_level_to_level);
     RUN(pages_are_wanted_by_all_views);
 }
 
