@@ -2722,10 +2722,11 @@ TERRIMP_API size_t terrimp_depth_mesh_scratch_bytes(const terrimp_depth_mesh_des
 /* Makes one mesh of all layers: as many triangles as the shape needs, however many layers that
    reaches through. Texels are connected where layers touch; then edges collapse, short ones first,
    as long as the mesh stays within the tolerance of the texels and they of it. Its border and the
-   seams between sheets only move along themselves, a border by a texel at most: of 97,000 lines of
-   sight that meet a layer one misses the mesh. The texture needs no perspective: it is the
-   picture, as terrimp_texture_matrix projects it. Texels at a sheet's border may be wanted that
-   have no colour: hosts fill them from their neighbours, as gutters.
+   seams between sheets only move along themselves, a border by a texel at most. Where sheets fold
+   slivers are lost: of lines of sight that meet the layers of a sheet of waves 24 of 364,000, of
+   walls, boxes and slopes none. The texture needs no perspective: it is the picture, as
+   terrimp_texture_matrix projects it. Texels at a sheet's border may be wanted that have no colour:
+   hosts fill them from their neighbours, as gutters.
 
    scratch    aligned to 8 bytes
    mesh       in: arrays; out: the rest

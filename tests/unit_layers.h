@@ -1139,7 +1139,7 @@ static void depth_meshes_keep_to_their_layers_and_these_to_them(void)
         CHECK(m.index_count / 3 < m.first_triangle_count / (i == 1 ? 500 : 4));
         gaps = depth_mesh_gaps(&m, DEPTH_RAYS, &met);
         CHECK(met > DEPTH_RAYS / 2);
-        CHECK(gaps <= (i == 0 ? met / 2500 : 0)); /* borders of folds move by a texel */
+        CHECK(gaps <= (i == 0 ? met / 2500 : 0)); /* slivers where waves fold */
         CHECK_NOTE(i == 0 ? "rays that miss the waves" : i == 1 ? "slope" : "wall and boxes",
                    (double)gaps);
         CHECK_NOTE("of so many", (double)met);
