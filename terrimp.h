@@ -10404,7 +10404,8 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
     TERRIMPI_CULL_IMPOSTOR = 2, /* the impostor cut does, */
-    TERRIMPI_CULL_SHORT = 4     /* ... only because pages of its children are missing */
+    TERRIMPI_CULL_SHORT = 4,    /* ... only because pages of its children are missing */
+    TERRIMPI_CULL_EMPTY = 8     /* alone: it is in sight as a whole, but none of its parts are */
 };
 
 /* A node in sight. */
@@ -10491,15 +10492,18 @@ static int terrimpi_cull_shows_ground(const terrimpi_frame *f, const terrimpi_mi
     return terrimp_frustum_test(&f->frustum, &box, planes) != TERRIMP_PLANES_OUTSIDE;
 }
 
-/* Says of each node where those in it end. */
+/* Says of each node where those in it end, and whether it is empty: then it need not be drawn. */
 static void terrimpi_cull_close(terrimpi_cull *cull)
 {
     uint32_t i, end;
     for (i = cull->count; i-- > 0;) {
-        const terrimpi_cull_node *n = cull->nodes;
-        for (end = i + 1u; end < cull->count && n[end].level < n[i].level;)
-            end = n[end].end;
-        cull->nodes[i].end = end;
+        terrimpi_cull_node *n = cull->nodes;
+        for (end = i + 1u; end < cull->count && n[end].level < n[i].level; end = n[end].end)
+            if (n[end].cuts != TERRIMPI_CULL_EMPTY)
+                n[i].cuts &= (uint8_t)~TERRIMPI_CULL_EMPTY;
+        n[i].end = end;
+        if (n[i].cuts & TERRIMPI_CULL_EMPTY)
+            n[i].cuts = TERRIMPI_CULL_EMPTY;
     }
 }
 
@@ -10575,8 +10579,10 @@ static int terrimpi_cull_walk(terrimpi_cull *cull, const terrimpi_frame *f,
         if (cull->ground_count > f->desc->max_ground)
             return 0;
         v.planes = planes + done * below;
-        if (done != TERRIMPI_CULL_GROUND + TERRIMPI_CULL_IMPOSTOR)
-            terrimpi_tree_enter(&walk, &v);
+        if (done == TERRIMPI_CULL_GROUND + TERRIMPI_CULL_IMPOSTOR)
+            continue;
+        n->cuts |= TERRIMPI_CULL_EMPTY; /* until its parts are listed */
+        terrimpi_tree_enter(&walk, &v);
     }
     terrimpi_cull_close(cull);
     return 1;
@@ -11492,7 +11498,7 @@ static void terrimpi_regions_make(const terrimpi_frame *f, const terrimpi_cull *
     regions->count = regions->candidate_count = 0;
     ground->draws_needed = ground->triangle_count = 0;
     while (i < cull->count)
-        if (cull->nodes[i].cuts) {
+        if (cull->nodes[i].cuts & ~TERRIMPI_CULL_EMPTY) {
             terrimpi_regions_add(f, cull->nodes, i, ground, mip, regions);
             i = cull->nodes[i].end;
         } else {
