@@ -20338,7 +20338,6 @@ static void terrimpi_place_drop(terrimpi_place_work *p, uint32_t candidate)
     }
 }
 
-
 static int terrimpi_place_smaller(const void *candidates, uint32_t a, uint32_t b)
 {
     const terrimp_place_candidate *c = (const terrimp_place_candidate *)candidates;
