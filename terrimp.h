@@ -3235,21 +3235,19 @@ typedef struct terrimpi_trouble_field {
 
 #define TERRIMPI_TROUBLE(type, field) {#field, offsetof(type, field), sizeof(((type *)0)->field)}
 
-/* Takes fields of a good descriptor for those of a bad one, one after the other, until it is good:
-   the last one was wrong. NULL when none was. */
-static const char *terrimpi_trouble(void *bad, const void *good,
-                                    const terrimpi_trouble_field *fields, size_t count,
-                                    terrimp_result (*resolve)(const void *context, void *desc),
-                                    const void *context)
-{
-    const char *name = NULL;
-    size_t i;
-    for (i = 0; i < count && resolve(context, bad) != TERRIMP_OK; i++) {
-        name = fields[i].name;
-        memcpy((char *)bad + fields[i].at, (const char *)good + fields[i].at, fields[i].bytes);
-    }
-    return name;
-}
+/* Takes fields of a good descriptor for those of a bad one, one after the other, until `resolve`
+   finds it good; returns the last one, which was wrong, or NULL when none was. */
+#define TERRIMPI_FIND_TROUBLE(fields, good, bad, resolve)                                          \
+    do {                                                                                           \
+        const char *name = NULL;                                                                   \
+        size_t i;                                                                                  \
+        for (i = 0; i < sizeof(fields) / sizeof *(fields) && (resolve) != TERRIMP_OK; i++) {       \
+            name = fields[i].name;                                                                 \
+            memcpy((char *)&bad + fields[i].at, (const char *)&good + fields[i].at,                \
+                   fields[i].bytes);                                                               \
+        }                                                                                          \
+        return name;                                                                               \
+    } while (0)
 
 #endif /* TERRIMP_NO_TROUBLE */
 
@@ -3949,13 +3947,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_field_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_heightfield_resolve((const terrimp_heightfield *)desc,
-                                       (terrimp_heightfield *)desc);
-}
-
 TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -3979,8 +3970,7 @@ TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *f
     good.samples = &good; /* aligned for any */
     good.width = good.depth = 2;
     bad = *field;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_field_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_heightfield_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -4053,12 +4043,6 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_camera_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_camera_resolve((const terrimp_camera *)desc, (terrimp_camera *)desc);
-}
-
 TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -4077,8 +4061,7 @@ TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
     good.width_px = good.height_px = 1;
     good.z_near = 1.0f;
     bad = *camera;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_camera_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_camera_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -6652,13 +6635,6 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_terrain_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_terrain_desc_resolve((const terrimp_terrain_desc *)desc,
-                                        (terrimp_terrain_desc *)desc);
-}
-
 TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -6675,8 +6651,7 @@ TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc 
         return terrimp_heightfield_trouble(&desc->field);
     memset(&good, 0, sizeof good);
     bad = *desc;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_terrain_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_terrain_desc_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -10137,13 +10112,6 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_view_try(const void *context, void *desc)
-{
-    return terrimp_view_desc_resolve((const terrimp_terrain *)context,
-                                     (const terrimp_view_desc *)desc,
-                                     (terrimp_view_desc *)desc);
-}
-
 TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
                                                   const terrimp_view_desc *desc)
 {
@@ -10176,8 +10144,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     memset(&good, 0, sizeof good);
     good.endless = terrimp_view_endless();
     bad = *desc;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_view_try, terrain);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_view_desc_resolve(terrain, &bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
