@@ -3485,6 +3485,13 @@ static terrimp_result terrimpi_field_scan_tile(const terrimp_heightfield *field,
     return TERRIMP_OK;
 }
 
+/* Whether a rectangle of samples has any that the field has, too. */
+static int terrimpi_field_has(const terrimp_heightfield *f, const terrimp_rect *samples)
+{
+    return samples->x < f->width && samples->y < f->depth && samples->width > 0 &&
+           samples->height > 0;
+}
+
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z)
 {
@@ -3542,10 +3549,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
                                                       float *low, float *high)
 {
     terrimp_heightfield f;
+    terrimp_rect samples = terrimpi_rect(x, z, cols, rows);
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(low == NULL || high == NULL, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0, TERRIMP_E_RANGE);
-    return terrimpi_field_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&f, &samples), TERRIMP_E_RANGE);
+    return terrimpi_field_range(&f, samples, 1, low, high);
 }
 
 /* ---- queries on the surface ---- */
@@ -6991,22 +6999,30 @@ static void terrimpi_terrain_touched_along(uint32_t first, uint32_t count, uint3
     *to = terrimpi_min_u32(last / side, nodes - 1u);
 }
 
+static terrimpi_terrain_touched terrimpi_terrain_touched_within(const terrimp_quadtree *t,
+                                                                const terrimp_rect *rect,
+                                                                uint32_t level, uint32_t margin)
+{
+    uint32_t side = t->chunk_quads << level;
+    terrimpi_terrain_touched out;
+    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->field.width,
+                                   t->level_x[level], &out.x0, &out.x1);
+    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->field.depth,
+                                   t->level_z[level], &out.z0, &out.z1);
+    return out;
+}
+
 /* What vertices move by hangs on the triangles of two levels above; errors, and how far down skirts
    reach, on what a finer neighbour draws next to the border. */
 static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_terrain *t,
                                                                const terrimp_rect *rect,
                                                                uint32_t level, int morph)
 {
-    uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
-    terrimpi_terrain_touched out;
     if (t->tree.pages && level > t->tree.pages->block_level)
-        margin += side / 2u; /* errors are of whole nodes beside it, see terrimpi_paging_build */
-    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
-                                   t->tree.level_x[level], &out.x0, &out.x1);
-    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
-                                   t->tree.level_z[level], &out.z0, &out.z1);
-    return out;
+        margin += (t->desc.chunk_quads << level) / 2u; /* errors are of whole nodes beside it, see
+                                                          terrimpi_paging_build */
+    return terrimpi_terrain_touched_within(&t->tree, rect, level, margin);
 }
 
 static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
@@ -7014,9 +7030,7 @@ static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
 {
     TERRIMPI_REFUSE(!t || !rect, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!t->built, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
-                    rect->y >= t->desc.field.depth, TERRIMP_E_RANGE);
-    return TERRIMP_OK;
+    return terrimpi_field_has(&t->desc.field, rect) ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
@@ -7301,18 +7315,23 @@ static void terrimpi_floor_wall_place(const terrimp_terrain *t, uint32_t k, uint
     *z = terrimpi_min_u32(row * quads / TERRIMPI_FLOOR_WALL_POINTS, t->desc.field.depth - 1u);
 }
 
-/* The lowest sample of a rectangle that two of its corners span. */
-static float terrimpi_terrain_lowest(const terrimp_terrain *t, const uint32_t a[2],
-                                     const uint32_t b[2])
+/* The samples below the walls from point k to the next one: one column or row. */
+static terrimp_rect terrimpi_floor_wall(const terrimp_terrain *t, uint32_t k)
+{
+    uint32_t a[2], b[2], x, z;
+    terrimpi_floor_wall_place(t, k, &a[0], &a[1]);
+    terrimpi_floor_wall_place(t, k + 1u, &b[0], &b[1]);
+    x = terrimpi_min_u32(a[0], b[0]);
+    z = terrimpi_min_u32(a[1], b[1]);
+    return terrimpi_rect(x, z, terrimpi_max_u32(a[0], b[0]) - x + 1u,
+                         terrimpi_max_u32(a[1], b[1]) - z + 1u);
+}
+
+static float terrimpi_floor_lowest(const terrimp_terrain *t, uint32_t wall)
 {
     float low, high;
-    terrimp_rect r;
-    r.x = terrimpi_min_u32(a[0], b[0]);
-    r.y = terrimpi_min_u32(a[1], b[1]);
-    r.width = terrimpi_max_u32(a[0], b[0]) - r.x + 1u;
-    r.height = terrimpi_max_u32(a[1], b[1]) - r.y + 1u;
-    return terrimpi_field_range(&t->desc.field, r, 0, &low, &high) == TERRIMP_OK
-               ? low : t->sample_low;
+    return terrimpi_field_range(&t->desc.field, terrimpi_floor_wall(t, wall), 0, &low, &high) ==
+                   TERRIMP_OK ? low : t->sample_low;
 }
 
 /* Writes the floor and its walls. These stand on the outer border and face inwards, from below the
@@ -7325,17 +7344,15 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
     terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
-        uint32_t before[2], at[2], after[2];
+        uint32_t at[2];
         float *top = xyz + 3u * (points + k);
-        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
         xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
         top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
-                               : terrimpi_min(terrimpi_terrain_lowest(t, before, at),
-                                              terrimpi_terrain_lowest(t, at, after));
+                               : terrimpi_min(terrimpi_floor_lowest(t, k + points - 1u),
+                                              terrimpi_floor_lowest(t, k));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
     for (i = first; i < f.indices; i++)
@@ -15322,12 +15339,9 @@ static terrimp_result terrimpi_simp_check_desc(const terrimp_simplify_desc *desc
     TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows) ||
                     desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
-    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
-        terrimp_result r = terrimpi_simp_check_border(
-            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
-        if (r != TERRIMP_OK)
-            return r;
-    }
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
+        TERRIMPI_TRY(terrimpi_simp_check_border(
+            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows));
     for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
         uint32_t x_end = i & 1u, z_end = i >> 1;
         const terrimp_border *p = b + (z_end ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_Z0);
@@ -17547,10 +17561,7 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     for (i = 0; i < 4u; i++) {
         if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        ground->low = terrimpi_min(ground->low, t->tree.nodes[child.number].low);
-        ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
-        ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
-        terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
+        terrimpi_build_hold_node(t, n->number, child.number);
         w->held[n->number] = terrimpi_max(w->held[n->number],
                                           terrimpi_page_held_by(w->desc->morph_ratio,
                                                                 w->held[child.number]));
@@ -17711,23 +17722,23 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
     return TERRIMP_OK;
 }
 
-/* The lowest sample of a rectangle that two of its corners span, through `read`. */
-static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uint32_t a[2],
-                                             const uint32_t b[2], float *lowest)
+/* The lowest sample below one of the floor's walls, through `read`. */
+static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, uint32_t wall,
+                                             float *lowest)
 {
+    terrimp_rect r = terrimpi_floor_wall(&w->whole, wall);
     terrimp_heightfield f = w->desc->terrain.field;
     terrimpi_field_scan scan;
-    uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
-    uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
-    uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
-    float line[256]; /* of any format; either is 1 */
-    for (k = 0; k < cols * rows; k += 256u) {
-        f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
-        f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
+    float line[256]; /* of any format */
+    uint32_t k, along_x = r.width > 1u;
+    for (k = 0; k < r.width * r.height; k += 256u) {
+        f.width = along_x ? terrimpi_min_u32(r.width - k, 256u) : 1u;
+        f.depth = along_x ? 1u : terrimpi_min_u32(r.height - k, 256u);
         f.row_bytes = f.width * terrimpi_field_sample_bytes(f.format);
         f.samples = line;
-        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, cols > 1u ? x + k : x, rows > 1u ? z + k : z,
-                                       f.width, f.depth, line, f.row_bytes), TERRIMP_E_PAGE);
+        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, along_x ? r.x + k : r.x,
+                                       along_x ? r.y : r.y + k, f.width, f.depth, line,
+                                       f.row_bytes), TERRIMP_E_PAGE);
         scan.skip_voids = 0;
         TERRIMPI_TRY(terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
         *lowest = terrimpi_min(*lowest, terrimpi_field_world_height(&f, scan.low));
@@ -17755,12 +17766,8 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
         }
     lows += terrimpi_floor_of(t).ground_vertices;
     for (k = 0; k < points; k++) {
-        uint32_t before[2], at[2], after[2];
-        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
-        terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &lows[k]));
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, k + points - 1u, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, k, &lows[k]));
     }
     return TERRIMP_OK;
 }
@@ -17951,44 +17958,19 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
     return TERRIMP_OK;
 }
 
-/* The nodes of a level that samples from `at` on belong to: those at a border belong to both. */
-static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uint32_t nodes,
-                                uint32_t range[2])
-{
-    range[0] = terrimpi_min_u32((at > 0 ? at - 1u : 0u) / quads, nodes - 1u);
-    range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
-}
-
-/* A rectangle of samples, NULL for all, cut at the far edges; `cut` may be NULL. Returns 0 when it
-   is empty or outside. */
-static int terrimpi_walls_rect(const terrimp_quadtree *tree, const terrimp_rect *samples,
-                               terrimp_rect *cut)
-{
-    uint32_t width = tree->field.width, depth = tree->field.depth;
-    terrimp_rect all = samples ? *samples : terrimpi_rect(0, 0, width, depth);
-    if (all.width < 1u || all.height < 1u || all.x >= width || all.y >= depth)
-        return 0;
-    all.width = terrimpi_min_u32(all.width, width - all.x);
-    all.height = terrimpi_min_u32(all.height, depth - all.y);
-    if (cut)
-        *cut = all;
-    return 1;
-}
-
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls)
 {
-    terrimp_rect all;
-    uint32_t level, x[2], z[2], i, j;
+    const terrimp_rect all = {0, 0, TERRIMP_MAX_DIM, TERRIMP_MAX_DIM};
+    uint32_t level, x, z;
+    samples = samples ? samples : &all;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
-    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, &all), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&tree->field, samples), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++) {
-        uint32_t quads = tree->chunk_quads << level;
-        terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
-        terrimpi_wall_range(all.y, all.height, quads, tree->level_z[level], z);
-        for (j = z[0]; j <= z[1]; j++)
-            for (i = x[0]; i <= x[1]; i++)
-                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_within(tree, samples, level, 0);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++)
+                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, x, z),
                                     (unsigned char *)walls);
     }
     return TERRIMP_OK;
@@ -18259,7 +18241,7 @@ TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, con
     tree = sets->hider.tree;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_REFUSE(cell >= terrimpi_sets_level_nodes(tree, sets->cell_level) ||
-                    (samples && !terrimpi_walls_rect(tree, samples, NULL)), TERRIMP_E_RANGE);
+                    (samples && !terrimpi_field_has(&tree->field, samples)), TERRIMP_E_RANGE);
     memset(&b, 0, sizeof b);
     node = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + cell);
     b.sets = sets;
@@ -18285,7 +18267,7 @@ TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
     uint32_t i;
     TERRIMPI_REFUSE(!sets || !samples || !sets->hider.tree, TERRIMP_E_NULL);
     tree = sets->hider.tree;
-    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, NULL), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&tree->field, samples), TERRIMP_E_RANGE);
     memset(&b, 0, sizeof b);
     b.sets = sets;
     for (i = 0; i < terrimpi_sets_level_nodes(tree, sets->cell_level); i++) {
@@ -20797,12 +20779,9 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
                         set->view_count > set->view_capacity,
                     TERRIMP_E_CAPACITY);
     terrimpi_prepare_gains(&p, 1);
-    for (i = 0; i < p.nodes; i++) {
-        terrimp_node n = terrimpi_tree_node(&p.desc.terrain->tree, i);
+    for (i = 0; i < p.nodes; i++)
         set->parents[i] = i + 1u == p.nodes
-                              ? i
-                              : terrimpi_tree_parent(&p.desc.terrain->tree, &n).number;
-    }
+                              ? i : terrimpi_tree_parent_number(&p.desc.terrain->tree, i);
     return TERRIMP_OK;
 }
 
