@@ -2985,16 +2985,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
-   since compilers may take every number for finite (-ffast-math). */
-#define TERRIMPI_INFINITE 0x7f800000u
-static uint32_t terrimpi_bits(float value)
+static uint32_t terrimpi_float_bits(float value)
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
-    return bits & 0x7fffffffu;
+    return bits;
 }
 
+/* But for the sign infinity has the bits TERRIMPI_INFINITE, and NaN has more. Told by bits, since
+   compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value) { return terrimpi_float_bits(value) & 0x7fffffffu; }
 static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
@@ -6999,6 +7000,7 @@ static void terrimpi_terrain_touched_along(uint32_t first, uint32_t count, uint3
     *to = terrimpi_min_u32(last / side, nodes - 1u);
 }
 
+/* The same along both. */
 static terrimpi_terrain_touched terrimpi_terrain_touched_within(const terrimp_quadtree *t,
                                                                 const terrimp_rect *rect,
                                                                 uint32_t level, uint32_t margin)
@@ -7549,24 +7551,24 @@ static uint32_t terrimpi_bake_hash_word(uint32_t hash, uint32_t word)
     return (hash ^ word) * 16777619u;
 }
 
-static uint32_t terrimpi_bake_float_bits(float value)
+/* The hash of a block from its byte `from` on. Words are copied, since a float may not be looked at
+   as an integer. */
+static uint32_t terrimpi_bake_hash_from(const void *block, uint32_t from, uint32_t bytes)
 {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-/* The checksum of a bake. Words are copied, since a float may not be looked at as an integer. */
-static uint32_t terrimpi_bake_hash(const void *block)
-{
-    const unsigned char *at = (const unsigned char *)block + offsetof(terrimpi_bake, width);
-    uint32_t hash = 2166136261u, word, bytes;
-    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
-    for (bytes -= (uint32_t)offsetof(terrimpi_bake, width); bytes >= 4u; bytes -= 4u, at += 4) {
-        memcpy(&word, at, sizeof word);
+    uint32_t hash = 2166136261u, word;
+    for (; from + 4u <= bytes; from += 4u) {
+        memcpy(&word, (const unsigned char *)block + from, sizeof word);
         hash = terrimpi_bake_hash_word(hash, word);
     }
     return hash;
+}
+
+/* The checksum of a bake. */
+static uint32_t terrimpi_bake_hash(const void *block)
+{
+    uint32_t bytes;
+    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
+    return terrimpi_bake_hash_from(block, (uint32_t)offsetof(terrimpi_bake, width), bytes);
 }
 
 /* The checksum of a heightfield's samples, whatever their byte order and the length of rows. */
@@ -7576,7 +7578,7 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
     for (z = 0; z < field->depth; z++)
         for (x = 0; x < field->width; x++)
             hash = terrimpi_bake_hash_word(hash,
-                                           terrimpi_bake_float_bits(terrimpi_field_raw(field, x,
+                                           terrimpi_float_bits(terrimpi_field_raw(field, x,
                                                                                        z)));
     return hash;
 }
@@ -7688,25 +7690,40 @@ static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_ter
     return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
 
+/* Whether heights and errors of a node could be those of one. */
+static int terrimpi_bake_heights_ok(const terrimp_geomip_node *ground, const terrimpi_mesh *mesh)
+{
+    const float most = TERRIMPI_FLOAT_MAX;
+    return terrimpi_within(ground->error, 0.0f, most) && terrimpi_within(ground->rms, 0.0f, most) &&
+           terrimpi_within(mesh->error, 0.0f, most) &&
+           terrimpi_within(mesh->error_rms, 0.0f, most) &&
+           terrimpi_within(mesh->low, -most, most) &&
+           terrimpi_within(mesh->high, mesh->low, most) &&
+           terrimpi_within(ground->low, mesh->low, mesh->high) &&
+           terrimpi_within(ground->high, ground->low, mesh->high);
+}
+
+/* Whether a node's are held by those of its parent. */
+static int terrimpi_bake_heights_held(const terrimp_geomip_node *ground, const terrimpi_mesh *mesh,
+                                      const terrimp_geomip_node *above,
+                                      const terrimpi_mesh *mesh_above)
+{
+    return ground->low >= above->low && ground->high <= above->high &&
+           ground->error <= above->error && mesh->low >= mesh_above->low &&
+           mesh->high <= mesh_above->high;
+}
+
 /* Whether all numbers of one node are what building could have made. */
 static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
 {
-    const terrimp_geomip_node *ground = terrimpi_tree_kept(&t->tree, node);
     const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
-    const float most = TERRIMPI_FLOAT_MAX;
     float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
     uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
     uint32_t triangles = terrimpi_mesh_triangles(mesh);
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
-    if (!terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
-        !terrimpi_within(mesh->error, 0.0f, most) ||
-        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
-        !terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
-        !terrimpi_within(ground->low, mesh->low, mesh->high) ||
-        !terrimpi_within(ground->high, ground->low, mesh->high))
-        return 0;
-    if (border < 4u || border > t->border_limit || vertices < border ||
-        vertices > t->vertex_limit || triangles < 2u || triangles > t->desc.triangle_budget)
+    if (!terrimpi_bake_heights_ok(terrimpi_tree_kept(&t->tree, node), mesh) || border < 4u ||
+        border > t->border_limit || vertices < border || vertices > t->vertex_limit ||
+        triangles < 2u || triangles > t->desc.triangle_budget)
         return 0;
     for (i = 0; i < vertices; i++) {
         terrimpi_mesh_point_steps point = terrimpi_mesh_point(t, &p, node, i);
@@ -7717,16 +7734,12 @@ static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
     return terrimpi_bake_loop_ok(t, &p, node) && terrimpi_bake_corners_ok(t, &p, node);
 }
 
-/* Whether a node is held by its parent. */
 static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
 {
     uint32_t parent =
         node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
-    const terrimp_geomip_node *c = terrimpi_tree_kept(&t->tree, node);
-    const terrimp_geomip_node *p = terrimpi_tree_kept(&t->tree, parent);
-    return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
-           terrimpi_mesh_of(t, node)->low >= terrimpi_mesh_of(t, parent)->low &&
-           terrimpi_mesh_of(t, node)->high <= terrimpi_mesh_of(t, parent)->high;
+    return terrimpi_bake_heights_held(&t->tree.nodes[node], &t->meshes[node],
+                                      &t->tree.nodes[parent], &t->meshes[parent]);
 }
 
 /* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
@@ -8636,14 +8649,9 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 }
 
 /* The checksum of a page: of all but its first word. */
-static uint32_t terrimpi_page_hash(const unsigned char *page, uint32_t bytes)
+static uint32_t terrimpi_page_hash(const void *page, uint32_t bytes)
 {
-    uint32_t at, hash = 2166136261u, word;
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
-    return hash;
+    return terrimpi_bake_hash_from(page, 4u, bytes);
 }
 
 /* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
@@ -8692,16 +8700,8 @@ static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_le
 
 static int terrimpi_record_ok(const terrimpi_record *r)
 {
-    const float most = TERRIMPI_FLOAT_MAX;
-    return terrimpi_within(r->ground.error, 0.0f, most) &&
-           terrimpi_within(r->ground.rms, 0.0f, most) &&
-           terrimpi_within(r->held, r->ground.rms, most) &&
-           terrimpi_within(r->mesh.error, 0.0f, most) &&
-           terrimpi_within(r->mesh.error_rms, 0.0f, most) &&
-           terrimpi_within(r->mesh.low, -most, most) &&
-           terrimpi_within(r->mesh.high, r->mesh.low, most) &&
-           terrimpi_within(r->ground.low, r->mesh.low, r->mesh.high) &&
-           terrimpi_within(r->ground.high, r->ground.low, r->mesh.high);
+    return terrimpi_bake_heights_ok(&r->ground, &r->mesh) &&
+           terrimpi_within(r->held, r->ground.rms, TERRIMPI_FLOAT_MAX);
 }
 
 /* Reads a header into a terrain, all but its memory. */
@@ -8884,9 +8884,8 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
             continue;
         memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
                        i * TERRIMPI_PAGE_RECORD, sizeof r);
-        if (!terrimpi_record_ok(&r) || r.ground.low < own->ground.low ||
-            r.ground.high > own->ground.high || r.ground.error > own->ground.error ||
-            r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
+        if (!terrimpi_record_ok(&r) ||
+            !terrimpi_bake_heights_held(&r.ground, &r.mesh, &own->ground, &own->mesh) ||
             terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
         slot = terrimpi_page_slot_of(t->tree.pages, child.number);
@@ -10013,18 +10012,10 @@ static float terrimpi_view_distance(const terrimpi_frame *f, const terrimp_box *
 
 /* ---- settings ---- */
 
-/* Impostors of a mode. */
-enum {
-    TERRIMPI_VIEW_IMPOSTORS_NEVER = 0,
-    TERRIMPI_VIEW_IMPOSTORS_ALWAYS, /* from the fade band on, each chunk, of its full resolution */
-    TERRIMPI_VIEW_IMPOSTORS_CHEAPER /* where they cost less than ground */
-};
-
+/* Whether there are impostors: always from the fade band on, or in AUTO where they cost less. */
 static int terrimpi_view_impostors(const terrimp_view_desc *d)
 {
-    return d->mode == TERRIMP_MODE_AUTO       ? TERRIMPI_VIEW_IMPOSTORS_CHEAPER
-           : d->mode == TERRIMP_MODE_IMPOSTOR ? TERRIMPI_VIEW_IMPOSTORS_ALWAYS
-                                              : TERRIMPI_VIEW_IMPOSTORS_NEVER;
+    return d->mode == TERRIMP_MODE_AUTO || d->mode == TERRIMP_MODE_IMPOSTOR;
 }
 
 /* Whether ground is drawn at its full resolution, else at a tolerance. */
@@ -10438,9 +10429,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     const terrimp_heightfield *field = &f->terrain->desc.field;
     terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f, 0.0f};
     const struct terrimp_pages *pages = f->terrain->tree.pages;
-    int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
+    if (!terrimpi_view_impostors(f->desc) || closest < f->desc->fade_start)
         return 0;
     if (f->camera.reach > 0.0f &&
         f->camera.reach > terrimpi_view_sine(f, node->number, closest) * closest)
@@ -10452,7 +10442,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
+    if (f->desc->mode == TERRIMP_MODE_AUTO &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
     return smallest || !pages || pages->calls->divides(f->terrain, node, &need)
@@ -10504,13 +10494,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
-        if (closest < f->desc->fade_start ||
-            terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
+        if (closest < f->desc->fade_start || !terrimpi_view_impostors(f->desc))
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     if (*done & TERRIMPI_CULL_IMPOSTOR)
         return cuts;
-    smallest = *done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER &&
+    smallest = *done && f->desc->mode == TERRIMP_MODE_AUTO &&
                terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u;
     impostor = terrimpi_cull_impostor(
         f, node, closest, cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE,
@@ -10594,7 +10583,7 @@ static void terrimpi_cull_begin_hiders(const terrimpi_cull *cull, const terrimpi
         else
             error = terrimpi_max(error, off / cull->nodes[i].closest);
     }
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_NEVER)
+    if (terrimpi_view_impostors(f->desc))
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
     for (hider = f->desc->hider; hider; hider = hider->next)
         hider->blind = 2.0f * error > 0.5f || !hider->begin(hider, &f->camera, 2.0f * error, low);
@@ -10656,7 +10645,7 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
                                      float closest, int *is_known)
 {
     *is_known = 1;
-    if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (f->desc->mode == TERRIMP_MODE_IMPOSTOR)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
@@ -11718,7 +11707,7 @@ static int terrimpi_candidate_list(const terrimpi_frame *f, terrimpi_cache *cach
     if (terrimpi_view_impostor_add(f, cache, &node, list))
         return 1;
     list->waiting++;
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
+    if (f->desc->mode != TERRIMP_MODE_AUTO)
         return 0;
     if (terrimpi_view_impostor_add_children(f, cache, &node, list))
         return 1;
@@ -11898,8 +11887,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     }
     if (possible[before] && total[before] < total[best] * TERRIMPI_VIEW_FLIP)
         best = before;
-    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
-        terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] && v->desc.mode == TERRIMP_MODE_IMPOSTOR)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = (uint8_t)best;
     for (i = 0; i < region->candidate_count; i++)
@@ -11940,8 +11928,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
-    if (f->desc->no_splits || f->camera.orthographic ||
-        terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER ||
+    if (f->desc->no_splits || f->camera.orthographic || f->desc->mode != TERRIMP_MODE_AUTO ||
         !(sine * closest > 0.0f) ||
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
@@ -16610,7 +16597,7 @@ static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terri
 {
     float most = terrimpi_terrain_border_height(t, TERRIMPI_MESH_BORDER_STEPS), low = most, step;
     float high = t->range_low;
-    uint32_t i, bits;
+    uint32_t i;
     for (i = mesh->border_vertex_count; i < mesh->surface_vertex_count; i++) {
         mesh->vertices[i].height = terrimpi_clamp(mesh->vertices[i].height, t->range_low, most);
         low = terrimpi_min(low, mesh->vertices[i].height);
@@ -16618,8 +16605,7 @@ static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terri
     }
     *base = low;
     step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_MESH_INNER_STEPS;
-    memcpy(&bits, &step, sizeof bits);
-    return (bits + 0x7fffffu) >> 23;
+    return (terrimpi_float_bits(step) + 0x7fffffu) >> 23;
 }
 
 /* A vertex of a surface as it is stored. */
@@ -17414,7 +17400,7 @@ static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terr
     w->head.block_level = d->block_level;
     w->head.morph_ratio = d->morph_ratio;
     w->head.stamp = d->stamp;
-    w->head.stamp = terrimpi_page_hash((const unsigned char *)&w->head, sizeof w->head);
+    w->head.stamp = terrimpi_page_hash(&w->head, sizeof w->head);
     return TERRIMP_OK;
 }
 
