@@ -7734,14 +7734,6 @@ static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
     return terrimpi_bake_loop_ok(t, &p, node) && terrimpi_bake_corners_ok(t, &p, node);
 }
 
-static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
-{
-    uint32_t parent =
-        node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
-    return terrimpi_bake_heights_held(&t->tree.nodes[node], &t->meshes[node],
-                                      &t->tree.nodes[parent], &t->meshes[parent]);
-}
-
 /* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
    could have been made of. */
 static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
@@ -7765,7 +7757,11 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
                               field->height_offset != f->height_offset), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
     for (node = 0; node < t->tree.node_count; node++) {
-        if (!terrimpi_bake_node_ok(t, node) || !terrimpi_bake_parent_ok(t, node))
+        uint32_t above = node + 1u < t->tree.node_count
+                             ? terrimpi_tree_parent_number(&t->tree, node) : node;
+        if (!terrimpi_bake_node_ok(t, node) ||
+            !terrimpi_bake_heights_held(&t->tree.nodes[node], &t->meshes[node],
+                                        &t->tree.nodes[above], &t->meshes[above]))
             return TERRIMP_E_BAKE;
         triangles += terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     }
@@ -8452,26 +8448,16 @@ static float terrimpi_horizon_draw_error(const terrimp_quadtree *tree,
     return error;
 }
 
-/* The two bounds that a horizon wants: close to the eye one of height, else one over distance. */
-static void terrimpi_horizon_draws_error(const terrimp_quadtree *tree,
-                                         const terrimp_geomip_view *view,
-                                         const float eye[3], float *error, float *low)
+/* Adds a node that may be drawn so far off to the two bounds that a horizon wants: close to the eye
+   one of height, else one over distance. */
+static void terrimpi_horizon_add_error(const terrimp_quadtree *tree, float off, float distance,
+                                       float *error, float *low)
 {
-    float side = (float)tree->chunk_quads *
-                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
-    uint32_t i;
-    *error = *low = 0.0f;
-    for (i = 0; i < view->draw_count; i++) {
-        float off = terrimpi_horizon_draw_error(tree, &view->draws[i],
-                                                view->morph_ratio > 1.0f), distance;
-        terrimp_box box;
-        terrimpi_mip_box(tree, &view->draws[i].node, &box);
-        distance = terrimp_box_distance(&box, eye);
-        if (distance < side)
-            *low = terrimpi_max(*low, off);
-        else
-            *error = terrimpi_max(*error, off / distance);
-    }
+    if (distance < (float)tree->chunk_quads *
+                       terrimpi_max(tree->field.spacing_x, tree->field.spacing_z))
+        *low = terrimpi_max(*low, off);
+    else
+        *error = terrimpi_max(*error, off / distance);
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
@@ -8480,17 +8466,22 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 {
     const terrimp_quadtree *tree;
     terrimp_camera c;
-    float error, low;
+    float error = 0.0f, low = 0.0f, off;
     uint32_t i, count = 0;
     TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     tree = horizon->hider.tree;
-    terrimpi_horizon_draws_error(tree, view, c.eye, &error, &low);
+    for (i = 0; i < view->draw_count; i++) {
+        terrimp_box box;
+        off = terrimpi_horizon_draw_error(tree, &view->draws[i], view->morph_ratio > 1.0f);
+        terrimpi_mip_box(tree, &view->draws[i].node, &box);
+        terrimpi_horizon_add_error(tree, off, terrimp_box_distance(&box, c.eye), &error, &low);
+    }
     terrimpi_horizon_begin(horizon, &c, terrimpi_min(error, 0.5f), low);
     horizon->blind |= error > 0.5f;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
-        float off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
+        off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
         if (terrimpi_horizon_hides_node(horizon, &draw->node, off))
             view->triangle_count -= terrimpi_mip_triangles(tree->chunk_quads, draw->pattern);
         else
@@ -10569,19 +10560,14 @@ static void terrimpi_cull_begin_hiders(const terrimpi_cull *cull, const terrimpi
 {
     terrimp_hider *hider;
     const terrimp_quadtree *tree = &f->terrain->tree;
-    float side = (float)tree->chunk_quads *
-                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
     float error = 0.0f, low = 0.0f;
     uint32_t i;
     for (i = 0; i < cull->count && !full; i++) {
         terrimp_node n = terrimpi_tree_node(tree, cull->nodes[i].number);
-        float off = terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f);
-        if (!(cull->nodes[i].cuts & TERRIMPI_CULL_GROUND))
-            continue;
-        if (cull->nodes[i].closest < side)
-            low = terrimpi_max(low, off);
-        else
-            error = terrimpi_max(error, off / cull->nodes[i].closest);
+        if (cull->nodes[i].cuts & TERRIMPI_CULL_GROUND)
+            terrimpi_horizon_add_error(
+                tree, terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f),
+                cull->nodes[i].closest, &error, &low);
     }
     if (terrimpi_view_impostors(f->desc))
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
