@@ -5800,8 +5800,7 @@ static terrimp_result terrimpi_impostor_check_eyes(const terrimp_box *box,
     TERRIMPI_REFUSE(!box || !captured_eye || !eye || !out, TERRIMP_E_NULL);
     return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
                    terrimpi_finite3(captured_eye) && terrimpi_finite3(eye)
-               ? TERRIMP_OK
-               : TERRIMP_E_NOT_FINITE;
+               ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
 
 /* The functions of this room that a view calls check nothing; those of the API do. */
@@ -18330,20 +18329,17 @@ static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
 {
     int k;
     TERRIMPI_REFUSE(!terrimpi_finite(d->distance) || !terrimpi_finite(d->texel) ||
-                        !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
-                        d->cell_depth != d->cell_depth,
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
+                    d->cell_depth != d->cell_depth, TERRIMP_E_NOT_FINITE);
     for (k = 0; k < 2; k++) {
         float sum = d->cell_tan[k] + d->view_tan[k];
         TERRIMPI_REFUSE(!terrimpi_finite2(d->cell_size[k], sum), TERRIMP_E_NOT_FINITE);
         TERRIMPI_REFUSE(!(d->cell_size[k] >= 0.0f) || !(d->cell_tan[k] >= 0.0f) ||
-                            !(d->view_tan[k] > 0.0f),
-                        TERRIMP_E_RANGE);
+                        !(d->view_tan[k] > 0.0f), TERRIMP_E_RANGE);
     }
     TERRIMPI_REFUSE(!(d->distance > 0.0f) || !terrimpi_finite(1.0f / d->distance) ||
-                        !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
-                        !(d->tolerance_rad >= 0.0f),
-                    TERRIMP_E_RANGE);
+                    !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
+                    !(d->tolerance_rad >= 0.0f), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -18739,9 +18735,8 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->desc = *desc;
     TERRIMPI_DEFAULT(c->desc.quad_cost, 20u);
     TERRIMPI_REFUSE(!terrimpi_within_u32(desc->width, 1, 16384) || desc->gutter > 64u ||
-                        !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
-                        c->desc.quad_cost > 1u << 24,
-                    TERRIMP_E_RANGE);
+                    !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
+                    c->desc.quad_cost > 1u << 24, TERRIMP_E_RANGE);
     c->node_count = 0;
     c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
     c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
@@ -18814,8 +18809,7 @@ TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_l
     TERRIMPI_REFUSE(!atlas || !quads || !rects || !order, TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
-                            !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
-                        TERRIMP_E_RANGE);
+                        !terrimpi_within_u32(quads[i].texels.height, 1, 65536), TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
         rects[i] = quads[i].texels;
         rects[i].width += 2u * gutter;
@@ -18876,8 +18870,7 @@ static terrimp_result terrimpi_record_check(const terrimp_layer_record *r)
     TERRIMPI_REFUSE(!r || !r->layers || !r->picture || !r->masks, TERRIMP_E_NULL);
     return terrimpi_within_u32(r->width, 1, 16384) && terrimpi_within_u32(r->height, 1, 16384) &&
                    r->layers->count
-               ? TERRIMP_OK
-               : TERRIMP_E_RANGE;
+               ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 static uint32_t *terrimpi_record_row(const terrimp_layer_record *r, uint32_t layer, uint32_t y)
@@ -19870,8 +19863,7 @@ static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, 
                    terrimpi_within_u32(desc->height, 1, 16384) &&
                    terrimpi_within_u32(desc->layers, 1, 65535) &&
                    terrimpi_within(d->tolerance, 0.75f, 64.0f)
-               ? TERRIMP_OK
-               : TERRIMP_E_RANGE;
+               ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 /* Lays out the scratch memory, for cells and texels that have been counted. */
@@ -19915,8 +19907,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
     size_t needed;
     TERRIMPI_TRY(terrimpi_depth_check(desc, &d));
     TERRIMPI_REFUSE(!scratch || !mesh || !mesh->vertices || !mesh->indices || !mesh->sheets ||
-                        !mesh->texel_layers,
-                    TERRIMP_E_NULL);
+                    !mesh->texel_layers, TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     terrimpi_depth_cells(&d, 0);
     needed = terrimpi_depth_layout(&d, scratch);
@@ -19934,8 +19925,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
                    mesh->index_count > mesh->index_capacity ||
                    mesh->sheet_count > mesh->sheet_capacity ||
                    mesh->texel_count > mesh->texel_capacity
-               ? TERRIMP_E_CAPACITY
-               : TERRIMP_OK;
+               ? TERRIMP_E_CAPACITY : TERRIMP_OK;
 }
 
 /* --- layers all round a cell, and for all views of an object --- */
@@ -19983,8 +19973,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
     int k;
     TERRIMPI_REFUSE(!box || !counts, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-                        !terrimpi_finite2(texel, slope),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite2(texel, slope), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!(texel > 0.0f) || !(slope >= 1.0f), TERRIMP_E_RANGE);
     for (k = 0; k < 3; k++) {
         needed[k] = (box->max[k] - box->min[k]) * slope / texel;
@@ -20304,9 +20293,8 @@ static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
         const terrimp_place_candidate *c = &d->candidates[i];
         TERRIMPI_REFUSE(!terrimpi_finite(c->memory), TERRIMP_E_NOT_FINITE);
         TERRIMPI_REFUSE(!(c->memory > 0.0f) || c->cluster >= d->cluster_count ||
-                            c->first_gain > d->gain_count ||
-                            c->gain_count > d->gain_count - c->first_gain,
-                        TERRIMP_E_RANGE);
+                        c->first_gain > d->gain_count ||
+                        c->gain_count > d->gain_count - c->first_gain, TERRIMP_E_RANGE);
     }
     return TERRIMP_OK;
 }
@@ -20376,8 +20364,7 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     TERRIMPI_TRY(terrimpi_place_check(desc));
     TERRIMPI_REFUSE(bytes < terrimp_place_scratch_bytes(desc) ||
-                        !terrimpi_place_layout(desc, scratch, &p),
-                    TERRIMP_E_MEMORY);
+                    !terrimpi_place_layout(desc, scratch, &p), TERRIMP_E_MEMORY);
     p.costs = costs;
     p.shown = shown;
     memset(p.wish, 0, desc->candidate_count);
@@ -20686,18 +20673,16 @@ static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *d
     *d = *desc;
     TERRIMPI_DEFAULT(d->directions, 8u);
     TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
-                        !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
-                        !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
-                        !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
-                        !terrimpi_finite(d->texels_per_px),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
+                    !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
+                    !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
+                    !terrimpi_finite(d->texels_per_px), TERRIMP_E_NOT_FINITE);
     for (k = 0; k < 3; k++)
         TERRIMPI_REFUSE(d->eyes.min[k] > d->eyes.max[k], TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(d->cell_levels > 6u || d->directions > 64u ||
-                        !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
-                        d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f ||
-                        d->texels_per_px < 0.0f || d->draw_cost < 0.0f || d->triangle_cost < 0.0f,
-                    TERRIMP_E_RANGE);
+                    !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
+                    d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f || d->texels_per_px < 0.0f ||
+                    d->draw_cost < 0.0f || d->triangle_cost < 0.0f, TERRIMP_E_RANGE);
     d->tolerance_px = d->tolerance_px > 0.0f ? d->tolerance_px : 1.0f;
     d->max_angle_rad = d->max_angle_rad > 0.0f ? d->max_angle_rad : 0.1f;
     d->texels_per_px = d->texels_per_px > 0.0f ? d->texels_per_px : 1.0f;
@@ -20734,9 +20719,8 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare p;
     size_t needed;
     uint32_t i;
-    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains ||
-                        !set->parents || !set->costs,
-                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains || !set->parents ||
+                    !set->costs, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
     p.set = set;
@@ -20746,10 +20730,9 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare_gains(&p, 0);
     terrimpi_prepare_pictures(&p, 1);
     TERRIMPI_REFUSE(set->candidate_count > set->candidate_capacity ||
-                        set->gain_count > set->gain_capacity ||
-                        set->cluster_count > set->cluster_capacity ||
-                        set->view_count > set->view_capacity,
-                    TERRIMP_E_CAPACITY);
+                    set->gain_count > set->gain_capacity ||
+                    set->cluster_count > set->cluster_capacity ||
+                    set->view_count > set->view_capacity, TERRIMP_E_CAPACITY);
     terrimpi_prepare_gains(&p, 1);
     for (i = 0; i < p.nodes; i++)
         set->parents[i] = i + 1u == p.nodes
