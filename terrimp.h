@@ -4593,7 +4593,7 @@ struct terrimp_pages {
     float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit + 1] of this frame */
-    uint32_t want_count, want_limit;
+    uint32_t want_count, want_limit, want_first; /* first: of this update */
     const struct terrimpi_page_calls *calls;
 };
 
@@ -4613,12 +4613,13 @@ typedef struct terrimpi_page_need {
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
-    int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
+    int (*begin)(const terrimp_quadtree *t);
+    int (*want)(const terrimp_quadtree *t, uint32_t node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
                    const struct terrimpi_page_need *need);
-    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
+    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip, int strays);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
-                       const float away[3]);
+                       const float away[3], float times);
     struct terrimpi_mip_ground (*ground)(const terrimp_quadtree *t, const terrimp_node *node);
     terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
                          uint32_t *level);
@@ -9023,22 +9024,30 @@ static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node,
 
 /* Notes that a page is of use in this frame. If it is missing, it is wanted at an urgency above 0,
    and those above it up to the one that is here. Returns whether it is here itself. */
-static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
-                              float urgency)
+static int terrimpi_page_want(const terrimp_quadtree *t, uint32_t node, int reason, float urgency)
 {
     struct terrimp_pages *p = t->pages;
-    terrimp_node n = *node;
+    uint32_t number = node;
     for (;;) {
-        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, number);
+        terrimp_node n;
         if (slot)
             slot->used = p->frame; /* or it might be given up for this */
         if (slot && slot->page)
-            return n.number == node->number;
+            return number == node;
+        n = terrimpi_tree_node(t, number);
         if ((!slot && urgency > 0.0f && !terrimpi_page_list(p, &n, reason, urgency)) ||
             n.level + 1u == t->level_count)
             return 0;
-        n = terrimpi_tree_parent(t, &n);
+        number = terrimpi_tree_parent(t, &n).number;
     }
+}
+
+/* Begins a view's update; returns 0 when the root's page is not here: then there is none. */
+static int terrimpi_page_begin(const terrimp_quadtree *t)
+{
+    t->pages->want_first = t->pages->want_count;
+    return terrimpi_page_want(t, t->node_count - 1u, TERRIMP_WANT_GROUND, 1e6f);
 }
 
 /* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
@@ -9076,7 +9085,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     }
     below = *need;
     urgency = TERRIMP_SQRTF(need->urgency);
-    all = terrimpi_page_want(&t->tree, node, need->reason, urgency);
+    all = terrimpi_page_want(&t->tree, node->number, need->reason, urgency);
     for (i = 0; i < 4u && (all || need->urgency > 0.0f); i++) {
         if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
             (!uses && terrimpi_page_of(p, child.number)))
@@ -9084,7 +9093,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
         terrimpi_page_box(t, &child, &box);
         if (terrimp_frustum_test(need->frustum, &box, TERRIMP_PLANES_ALL) ==
                 TERRIMP_PLANES_OUTSIDE ||
-            terrimpi_page_want(&t->tree, &child, need->reason, urgency))
+            terrimpi_page_want(&t->tree, child.number, need->reason, urgency))
             continue;
         if (all && !uses) { /* it does not come to them: once more */
             uses = 1;
@@ -9121,15 +9130,18 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
 
 /* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
    neighbours still differ by one level at most. All that the split would need is wanted; and the
-   ground below the eye, which says whether it is over it. Returns how many are joined. */
-static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
+   ground below the eye, which says whether it is over it. Returns how many are joined. What a try
+   before this one wanted is of no use. */
+static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip, int strays)
 {
     terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f, 0.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
+    t->tree.pages->want_count = t->tree.pages->want_first;
+    t->tree.pages->strays = strays;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
         terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
-        terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
+        terrimpi_page_want(&t->tree, below.number, TERRIMP_WANT_GROUND, 1.0f);
     for (level = t->tree.level_count; level-- > 1u;)
         for (number = mip->first[level]; number != t->tree.node_count;
              number = mip->view->marks[number].next) {
@@ -9150,17 +9162,17 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
     return late;
 }
 
-/* Asks for the pages that ground will need when the eye has gone on by `away`. */
+/* Asks for the pages that ground will need when the eye has gone on by `away`, so many times. */
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
-                                     const float away[3])
+                                     const float away[3], float times)
 {
     terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f, 0.0f};
     float eye[3];
     uint32_t i;
     for (i = 0; i < 3u; i++)
-        eye[i] = mip->eye[i] + away[i];
+        eye[i] = mip->eye[i] + away[i] * times;
     need.eye = eye;
-    for (i = 0; i < mip->view->draw_count; i++) {
+    for (i = 0; i < mip->view->draw_count && terrimpi_length(away) > 0.0f; i++) {
         const terrimp_geomip_draw *draw = &mip->view->draws[i];
         float error = draw->error_px / mip->view->tolerance_px;
         terrimp_box box;
@@ -9278,9 +9290,9 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain)
 {
     static const terrimpi_page_calls calls = {
-        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
-        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_ground,
-        terrimpi_page_at,         terrimpi_page_sample};
+        terrimpi_page_record, terrimpi_page_begin,      terrimpi_page_want,  terrimpi_page_divides,
+        terrimpi_page_settle, terrimpi_page_look_ahead, terrimpi_page_ground, terrimpi_page_at,
+        terrimpi_page_sample};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages p;
@@ -9980,7 +9992,6 @@ typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
-    uint32_t wants;                /* of pages, before this update */
     terrimp_camera camera;         /* resolved */
     float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
     float pixel_factor;            /* K from there */
@@ -11471,7 +11482,6 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
 {
     struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
-    uint32_t i;
     mip.whole = 0.0f;
     if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
         const terrimp_heightfield *field = &f->terrain->desc.field;
@@ -11488,11 +11498,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
-        if (pages) {
-            pages->want_count = f->wants; /* those of a try before are of no use */
-            pages->strays = f->desc->hider != NULL;
-            v->late = pages->calls->settle(f->terrain, &mip);
-        }
+        if (pages)
+            v->late = pages->calls->settle(f->terrain, &mip, f->desc->hider != NULL);
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most || mip.whole < 0.0f)
@@ -11501,13 +11508,9 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     }
     terrimpi_regions_make(f, &v->cull, &v->ground,
                           mip.whole < 0.0f && v->late == 0 ? NULL : &mip, &v->regions);
-    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
-        float ahead[3];
-        for (i = 0; i < 3u; i++)
-            ahead[i] = f->motion.away[0][i] * (TERRIMPI_VIEW_SOON / f->motion.frames[0]);
-        if (terrimpi_length(ahead) > 0.0f)
-            pages->calls->look_ahead(f->terrain, &mip, ahead);
-    }
+    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f)
+        pages->calls->look_ahead(f->terrain, &mip, f->motion.away[0],
+                                 TERRIMPI_VIEW_SOON / f->motion.frames[0]);
     return TERRIMP_OK;
 }
 
@@ -11643,7 +11646,7 @@ static int terrimpi_view_impostor_add(const terrimpi_frame *f, terrimpi_cache *c
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(cache, node->number);
     const terrimp_quadtree *tree = &f->terrain->tree;
-    if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
+    if (!p || (tree->pages && !tree->pages->calls->want(tree, node->number, 0, 0.0f)))
         return 0;
     if (p->listed == f->number) {
         list->items[p->draw].alpha = 1.0f;
@@ -11936,10 +11939,8 @@ static int terrimpi_capture_has_pages(const terrimp_quadtree *t, const terrimpi_
 {
     int reason = urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE, all = 1;
     uint32_t i;
-    for (i = 0; i < count && t->pages; i++) {
-        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
-        all &= t->pages->calls->want(t, &node, reason, terrimpi_min(urgency, 2.0f));
-    }
+    for (i = 0; i < count && t->pages; i++)
+        all &= t->pages->calls->want(t, draws[i].node, reason, terrimpi_min(urgency, 2.0f));
     *late += all ? 0u : 1u;
     return all;
 }
@@ -12350,6 +12351,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimp_camera resolved;
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
+    const struct terrimp_pages *pages;
     float reuse, middle[2] = {0.0f, 0.0f};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
@@ -12357,13 +12359,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
-    if (view->terrain->tree.pages) {
-        const terrimp_quadtree *tree = &view->terrain->tree;
-        terrimp_node root = terrimpi_tree_root(tree);
-        frame.wants = tree->pages->want_count;
-        TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
-                        TERRIMP_E_PAGE);
-    }
+    pages = view->terrain->tree.pages;
+    TERRIMPI_REFUSE(pages && !pages->calls->begin(&view->terrain->tree), TERRIMP_E_PAGE);
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
