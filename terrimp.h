@@ -171,13 +171,12 @@
          TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
                                before the API)
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
-         TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 36 KB of code at -Os on
-       a Cortex-M4, 33 KB without the three options that follow it above, if its linker drops
+       a Cortex-M4, 33 KB without the two options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -620,6 +619,10 @@ typedef enum terrimp_geomip_rule {
     TERRIMP_GEOMIP_DISTANCE, /* the same promise by distance alone, at the steepest angle */
     TERRIMP_GEOMIP_RULE_COUNT
 } terrimp_geomip_rule;
+
+/* What a view needs for BOUND, in its settings: a linker leaves it out where none does. */
+typedef struct terrimp_bound terrimp_bound;
+TERRIMP_API const terrimp_bound *terrimp_geomip_bound(void);
 
 typedef struct terrimp_geomip_draw {
     terrimp_node node;
@@ -1533,6 +1536,7 @@ typedef struct terrimp_view_desc {
     float ground_tolerance_px; /* error of ground in GEOMIP and AUTO, by ground_rule
                                [Limits: 0.05..100] [Default 0 -> half of tolerance_px] */
     int ground_rule;        /* terrimp_geomip_rule */
+    const terrimp_bound *bound; /* (required for ground_rule BOUND) terrimp_geomip_bound() */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
     float fade_start;       /* [wu] from the eye: nodes that come closer are ground
@@ -4755,11 +4759,6 @@ static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_vi
 #else
 #define TERRIMPI_MIP_MORPH_MOST 1.0f
 #endif
-#ifndef TERRIMP_NO_BOUND
-#define TERRIMPI_MIP_HAS_BOUND 1
-#else
-#define TERRIMPI_MIP_HAS_BOUND 0
-#endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
 /* ---- patterns ---- */
@@ -5032,8 +5031,7 @@ static float terrimpi_mip_height(const terrimpi_mip_ground *g, uint32_t level, u
 
 static int terrimpi_mip_rule_fits(int rule)
 {
-    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT &&
-           (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
+    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT;
 }
 
 /* ---- selection ---- */
@@ -5053,20 +5051,25 @@ typedef struct terrimpi_mip_frame {
     float along, across;       /* largest tangents on the screen, in the direction in which y is
                                   seen there, and across it */
     float cos2;                /* square of the cosine between forward and the screen's corner */
-    int exact;                 /* BOUND */
+    const terrimp_bound *bound; /* for that rule; else NULL */
     float relief;              /* what measures are multiplied with */
     float whole;               /* [wu] so close to the eye all is split; below 0: all in sight */
     float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
+/* What only BOUND needs: what follows from the camera, and what D^2 is to be multiplied with. */
+struct terrimp_bound {
+    void (*begin)(terrimpi_mip_frame *f, const terrimp_camera *camera, float tan_x, float tan_y);
+    float (*factor)(const terrimpi_mip_frame *f, const terrimp_box *box, float distance2);
+};
+
 /* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
    at its edge may be drawn that far outside. */
 static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera *camera,
                                     float margin)
 {
-    float right[3], seen[3], aside[3], tan_x = 0.0f, tan_y = 0.0f;
-    terrimpi_cross(camera->forward, camera->up, right);
+    float tan_x = 0.0f, tan_y = 0.0f;
     if (camera->orthographic)
         margin = 1.0f / 65536.0f; /* see terrimpi_camera_stand */
     else
@@ -5075,8 +5078,15 @@ static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera 
     tan_y += margin;
     f->reach = camera->reach;
     f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
-    if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
-        return;
+    if (f->bound)
+        f->bound->begin(f, camera, tan_x, tan_y);
+}
+
+static void terrimpi_mip_bound_begin(terrimpi_mip_frame *f, const terrimp_camera *camera,
+                                     float tan_x, float tan_y)
+{
+    float right[3], seen[3], aside[3];
+    terrimpi_cross(camera->forward, camera->up, right);
     memcpy(f->forward, camera->forward, sizeof f->forward);
     f->steep = f->forward[1];
     f->level = TERRIMP_SQRTF(f->forward[0] * f->forward[0] + f->forward[2] * f->forward[2]);
@@ -5123,11 +5133,11 @@ static float terrimpi_mip_stretch(const terrimpi_mip_frame *f, float p_min, floa
     return terrimpi_max(terrimpi_max(most, behind), 0.0f);
 }
 
-/* What D^2 is to be multiplied with: the square of the most pixels that a vertical error of
+/* The square of the most pixels that a vertical error of
    K^-1 shows as anywhere in a box. It changes continuously with the camera, and never grows from a
    box to a part of it. */
-static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
-                                      float distance2)
+static float terrimpi_mip_bound_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
+                                       float distance2)
 {
     float c[3], h[3], p, p_half, q_most, z, z2, far2 = 0.0f, a, b;
     int k;
@@ -5150,6 +5160,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
                              TERRIMP_SQRTF(far2));
     b = terrimpi_min(f->across * f->across, q_most * q_most / z2) * f->steep * f->steep;
     return (a * a + b) / z2 * 1.00001f; /* more than all rounding here */
+}
+
+TERRIMP_API const terrimp_bound *terrimp_geomip_bound(void)
+{
+    static const terrimp_bound calls = {terrimpi_mip_bound_begin, terrimpi_mip_bound_factor};
+    return &calls;
 }
 
 /* D of one node, squared, before its children have a say. */
@@ -5204,8 +5220,7 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
     terrimpi_camera_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
-    measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
-                                                 : split2 / d2;
+    measure = f->bound ? split2 * f->bound->factor(f, &box, d2) : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
 }
 
@@ -5416,7 +5431,6 @@ static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tre
     terrimpi_camera_frustum(camera, &f->frustum);
     f->tree = tree;
     f->view = view;
-    f->exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
     f->relief = view->rule == TERRIMP_GEOMIP_PICTURE ? 1.0f / scale : 1.0f / (scale * scale);
     for (level = 0; level < tree->level_count; level++)
         f->first[level] = tree->node_count;
@@ -5433,6 +5447,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_
 {
     terrimpi_mip_frame f;
     f.whole = 0.0f;
+    f.bound = view->rule == TERRIMP_GEOMIP_BOUND ? terrimp_geomip_bound() : NULL;
     terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
@@ -10104,7 +10119,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
-                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
+                    (d.ground_rule == TERRIMP_GEOMIP_BOUND && !d.bound) || d.atlas_size < 64u ||
+                    d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
                     (d.max_cost > 0.0f && !d.cost_limit) ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
@@ -10113,8 +10129,7 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                         TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages && d.morph_ratio > 1.0f &&
                     (d.morph_ratio > terrain->tree.pages->morph_ratio ||
-                     (d.ground_rule != TERRIMP_GEOMIP_PICTURE &&
-                      d.ground_rule != TERRIMP_GEOMIP_DEFAULT)), TERRIMP_E_RANGE);
+                     d.ground_rule != TERRIMP_GEOMIP_PICTURE), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
@@ -11483,6 +11498,7 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
     mip.whole = 0.0f;
+    mip.bound = v->desc.ground_rule == TERRIMP_GEOMIP_BOUND ? v->desc.bound : NULL;
     if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
         const terrimp_heightfield *field = &f->terrain->desc.field;
         mip.whole = v->desc.mode == TERRIMP_MODE_FULL
@@ -20750,12 +20766,13 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
    0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
           have an alpha, the share of the pixels in the fade band; texture matrices and
           terrimp_texture_coordinates take positions relative to the eye of the picture;
-          exact_depth, endless and cost_limit, asked for by functions of their own, so that others
-          do not link what they need; terrimp_view_set; a hider, which hides what lies behind
+          exact_depth, endless, cost_limit and bound, asked for by functions of their own, so that
+          others do not link what they need; terrimp_view_set; a hider, which hides what lies behind
           ridges; statistics are counted when they are asked for; first what draws, then what
           builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement. Gone: the pair of
           atlases (a benchmark has it), evict, query, rect, reset and room of the live atlas, fitted
-          heights, stitched patterns, upper_skirts, terrimp_capture_rate, terrimp_heightfield_sample
+          heights, stitched patterns, upper_skirts, TERRIMP_NO_BOUND, terrimp_capture_rate,
+          terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any
    0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of
