@@ -2946,6 +2946,14 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 #define TERRIMPI_INFINITY HUGE_VALF
 
+/* A function that compilers take to be as small as a call of it, but is not: it is called where
+   bytes count. */
+#if defined(__GNUC__) && defined(__OPTIMIZE_SIZE__)
+#define TERRIMPI_CALL __attribute__((noinline))
+#else
+#define TERRIMPI_CALL
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -3030,7 +3038,7 @@ static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
-static float terrimpi_clamp(float value, float low, float high)
+static TERRIMPI_CALL float terrimpi_clamp(float value, float low, float high)
 {
     return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
 }
@@ -6438,7 +6446,8 @@ static uint32_t terrimpi_atlas_find(const terrimp_live_atlas *atlas, uint32_t wi
 }
 
 /* Length that the ranges [a, a + a_size] and [b, b + b_size] have in common. */
-static uint32_t terrimpi_atlas_shared(uint32_t a, uint32_t a_size, uint32_t b, uint32_t b_size)
+static TERRIMPI_CALL uint32_t terrimpi_atlas_shared(uint32_t a, uint32_t a_size, uint32_t b,
+                                                    uint32_t b_size)
 {
     uint32_t low = terrimpi_max_u32(a, b), high = terrimpi_min_u32(a + a_size, b + b_size);
     return high > low ? high - low : 0u;
@@ -6923,7 +6932,7 @@ static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32
 
 /* How far the skirts of a level's meshes end below all ground, and their borders are over it: see
    terrimpi_mesh_skirt_foot, terrimpi_build_lift_border. */
-static float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
+static TERRIMPI_CALL float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
 {
     return TERRIMPI_MESH_UNDER * (float)(t->desc.chunk_quads << level) *
            terrimpi_min(t->desc.field.spacing_x, t->desc.field.spacing_z);
@@ -7668,7 +7677,7 @@ static uint32_t terrimpi_bake_edge_hash(uint32_t from, uint32_t to)
 }
 
 /* What an edge adds to the sum over a surface; the same edge the other way takes it off. */
-static uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
+static TERRIMPI_CALL uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
 {
     return terrimpi_bake_edge_hash(from, to) - terrimpi_bake_edge_hash(to, from);
 }
