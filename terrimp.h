@@ -6858,8 +6858,8 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
 /* What a view does with a terrain that wraps: see terrimp_view_endless. */
 struct terrimp_endless {
     int (*fits)(const terrimp_terrain *built, const terrimp_view_desc *desc);
-    void (*begin)(terrimp_view *v, terrimp_terrain *t);
-    void (*layout)(terrimp_view *v, terrimpi_arena *l);
+    void (*begin)(const terrimp_terrain *built, uint32_t tiles, terrimp_terrain *t);
+    terrimp_terrain *(*layout)(terrimp_terrain *t, const terrimp_terrain *built, terrimpi_arena *l);
     void (*fill)(terrimp_terrain *t, const terrimp_terrain *built);
     void (*enter)(terrimp_view *v, terrimp_camera *camera, float middle[2]);
     terrimp_node (*place)(const terrimp_terrain *t, const terrimp_node *node,
@@ -11021,7 +11021,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
         sizeof *v->draws.items);
     if (v->tiled)
-        v->desc.endless->layout(v, &l);
+        v->terrain = v->tiled = v->desc.endless->layout(v->tiled, v->built, &l);
     return l.ok && slots ? l.bytes : 0;
 }
 
@@ -11031,8 +11031,11 @@ static void terrimpi_view_begin(terrimp_view *v, const terrimp_terrain *terrain,
 {
     v->terrain = v->built = terrain;
     v->tiled = NULL;
-    if (terrain->desc.field.wrap)
-        v->desc.endless->begin(v, tiled);
+    if (!terrain->desc.field.wrap)
+        return;
+    v->desc.endless->begin(terrain, v->desc.wrap_tiles, tiled);
+    tiled->endless = v->desc.endless;
+    v->terrain = v->tiled = tiled;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -11151,13 +11154,11 @@ static int terrimpi_tiled_fits(const terrimp_terrain *built, const terrimp_view_
            rows * d->wrap_tiles < TERRIMP_MAX_DIM;
 }
 
-static void terrimpi_tiled_begin(terrimp_view *v, terrimp_terrain *t)
+static void terrimpi_tiled_begin(const terrimp_terrain *built, uint32_t tiles, terrimp_terrain *t)
 {
-    terrimp_heightfield field = v->built->desc.field;
-    v->terrain = v->tiled = t;
-    *t = *v->built;
-    t->tiles = v->desc.wrap_tiles;
-    t->endless = v->desc.endless;
+    terrimp_heightfield field = built->desc.field;
+    *t = *built;
+    t->tiles = tiles;
     field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
     field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
     field.width = (field.width - 1u) * t->tiles + 1u;
@@ -11185,19 +11186,20 @@ static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
     }
 }
 
-static void terrimpi_tiled_layout(terrimp_view *v, terrimpi_arena *l)
+/* Lays it out and fills it in, if there is memory; returns where it is then. */
+static terrimp_terrain *terrimpi_tiled_layout(terrimp_terrain *t, const terrimp_terrain *built,
+                                              terrimpi_arena *l)
 {
-    size_t nodes = v->tiled->tree.node_count;
-    terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *t);
-    terrimp_terrain made = *v->tiled;
+    size_t nodes = t->tree.node_count;
+    terrimp_terrain *to = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *to), made = *t;
     made.real = (uint32_t *)terrimpi_take(l, nodes, sizeof *made.real);
     made.meshes = (terrimpi_mesh *)terrimpi_take(l, nodes, sizeof *made.meshes);
     made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(l, nodes, sizeof *made.tree.nodes);
-    if (!t)
-        return;
-    *t = made;
-    terrimpi_tiled_fill(t, v->built);
-    v->terrain = v->tiled = t;
+    if (!to)
+        return t;
+    *to = made;
+    terrimpi_tiled_fill(to, built);
+    return to;
 }
 
 static terrimp_node terrimpi_tiled_place(const terrimp_terrain *t, const terrimp_node *node,
@@ -11602,21 +11604,21 @@ static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cach
     }
 }
 
-static int terrimpi_view_ground_estimate(const terrimp_view *v, const terrimpi_region *region,
+static int terrimpi_view_ground_estimate(const terrimpi_frame *f, const terrimpi_region *region,
                                          terrimpi_region_offer *offer)
 {
-    const terrimp_costs *costs = &v->desc.costs;
-    float quads = (float)v->terrain->desc.chunk_quads;
+    const terrimp_costs *costs = &f->desc->costs;
+    float quads = (float)f->terrain->desc.chunk_quads;
     offer->draw = (float)region->ground_count * terrimpi_cost_draw(costs, 2.0f * quads * quads) +
                   terrimpi_cost_shading(region->pixels, costs->ground_px, costs->impostor_px);
     offer->upkeep = 0.0f;
     return 1;
 }
 
-static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi_region *region,
+static int terrimpi_view_impostor_estimate(const terrimpi_frame *f, const terrimpi_region *region,
                                            terrimpi_region_offer *offer)
 {
-    const terrimp_costs *costs = &v->desc.costs;
+    const terrimp_costs *costs = &f->desc->costs;
     const terrimpi_candidate *c = region->candidates;
     uint32_t i;
     offer->draw = offer->upkeep = 0.0f;
@@ -11855,7 +11857,7 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
 /* What can show a region. */
 typedef struct terrimpi_view_kind {
     /* What it costs; returns 0 when it cannot show the region. */
-    int (*estimate)(const terrimp_view *v, const terrimpi_region *region,
+    int (*estimate)(const terrimpi_frame *f, const terrimpi_region *region,
                     terrimpi_region_offer *offer);
     /* Whether it can do so in this frame, before captures. */
     int (*ready)(const terrimpi_region *region);
@@ -11882,39 +11884,40 @@ typedef struct terrimpi_frame_sums {
 
 /* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
    TERRIMPI_VIEW_FLIP. Adds it to the frame's sums. */
-static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
+static void terrimpi_view_decide(const terrimpi_frame *f, const terrimpi_cache *cache,
+                                 uint8_t *kind_of, terrimpi_region *region,
                                  terrimpi_frame_sums *sums)
 {
     terrimpi_region_offer offers[TERRIMPI_VIEW_KIND_SHOWS];
     int possible[TERRIMPI_VIEW_KIND_SHOWS], kind, best = TERRIMPI_VIEW_KIND_GROUND;
-    int before = v->kind_of[region->node];
+    int before = kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
     int is_known = !region->kind;
-    terrimpi_region_measure(&v->frame, &v->cache, region);
+    terrimpi_region_measure(f, cache, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
-        possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
+        possible[kind] = terrimpi_view_kinds[kind].estimate(f, region, &offers[kind]);
         total[kind] = offers[kind].draw + offers[kind].upkeep;
         if (possible[kind] && total[kind] < total[best])
             best = kind;
     }
     if (possible[before] && total[before] < total[best] * TERRIMPI_VIEW_FLIP)
         best = before;
-    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] && v->desc.mode == TERRIMP_MODE_IMPOSTOR)
+    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] && f->desc->mode == TERRIMP_MODE_IMPOSTOR)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = (uint8_t)best;
     for (i = 0; i < region->candidate_count; i++)
         is_known &= region->candidates[i].is_known &&
                     !region->candidates[i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
-        v->kind_of[region->node] = (uint8_t)best;
+        kind_of[region->node] = (uint8_t)best;
     sums->spread += offers[best].upkeep;
     sums->drawn += offers[terrimpi_view_kinds[best].ready(region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
         const terrimpi_candidate *c = &region->candidates[i];
         sums->pixels += c->pixels;
         if (c->picture)
-            c->picture->seen = v->frame.number;
+            c->picture->seen = f->number;
     }
 }
 
@@ -12184,27 +12187,20 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_job *j
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
-/* Asks for the pages of a picture that has to wait: so they come meanwhile, and stay. */
-static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
-{
-    terrimpi_job job;
-    if (v->terrain->tree.pages && (c->urgency >= 1.0f || c->is_short))
-        terrimpi_job_prepare(v, c, 0, &job);
-}
-
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
 {
     const terrimp_view_desc *d = &v->desc;
-    terrimpi_job *job = &v->jobs.items[v->jobs.count];
+    terrimpi_job *job = &v->jobs.items[v->jobs.count], none;
     uint32_t room = terrimpi_spending_left(&v->frame, s), triangles;
     if (v->jobs.count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
         (d->max_capture_texels && s->texels >= d->max_capture_texels)) {
-        terrimpi_view_await(v, c);
+        if (v->terrain->tree.pages && (c->urgency >= 1.0f || c->is_short))
+            terrimpi_job_prepare(v, c, 0, &none); /* so its pages come meanwhile, and stay */
         return 0;
     }
     if (!terrimpi_job_prepare(v, c, room, job))
@@ -12288,23 +12284,23 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* ---- a frame ---- */
 
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
-static void terrimpi_view_list(terrimp_view *v)
+static void terrimpi_view_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                               const terrimpi_regions *regions, terrimpi_view_draws *list)
 {
-    terrimpi_view_draws *list = &v->draws;
-    uint32_t i;
+    uint32_t i, tiles = f->terrain->real ? f->terrain->tiles : 1u;
     memset(list->kind_count, 0, sizeof list->kind_count);
     list->count = list->waiting = 0;
-    for (i = 0; i < v->regions.count; i++) {
-        int kind = v->regions.items[i].kind;
-        while (!terrimpi_view_kinds[kind].list(&v->frame, &v->cache, &v->regions.items[i], list))
+    for (i = 0; i < regions->count; i++) {
+        int kind = regions->items[i].kind;
+        while (!terrimpi_view_kinds[kind].list(f, cache, &regions->items[i], list))
             kind--;
     }
     for (i = 0; i < list->count; i++)
         list->kind_count[list->items[i].kind]++;
     if ((list->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
-         (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
-        terrimpi_view_over(&v->frame, v->frame.camera.eye))
-        for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
+         (f->desc->joined && f->desc->mode != TERRIMP_MODE_FULL)) &&
+        terrimpi_view_over(f, f->camera.eye))
+        for (i = 0; i < tiles * tiles; i++)
             terrimpi_view_add(list, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
@@ -12358,7 +12354,7 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         v->frame = *f;
         memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->regions.count; i++)
-            terrimpi_view_decide(v, &v->regions.items[i], sums);
+            terrimpi_view_decide(f, &v->cache, v->kind_of, &v->regions.items[i], sums);
         v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
@@ -12397,21 +12393,21 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
-    terrimpi_view_list(view);
+    terrimpi_view_list(&view->frame, &view->cache, &view->regions, &view->draws);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
 
-/* Notes that a picture has been made. */
-static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
+/* Notes that a picture has been made, and for how many frames the one before was drawn. */
+static void terrimpi_view_finish(const terrimpi_frame *f, terrimpi_cache *cache,
+                                 const terrimpi_job *job, float *reuse)
 {
     terrimpi_cache_picture *p = job->picture;
-    uint32_t i;
+    uint32_t i, side = f->desc->atlas_size;
     if (p->layer_count > 0) {
-        float frames = (float)p->drawn_count;
-        v->stats.reuse += (frames - v->stats.reuse) * (v->stats.reuse > 0.0f ? 0.02f : 1.0f);
+        *reuse += ((float)p->drawn_count - *reuse) * (*reuse > 0.0f ? 0.02f : 1.0f);
         if (memcmp(job->slots, p->slots, sizeof p->slots) != 0)
-            terrimpi_cache_free(&v->cache, p->slots, p->layer_count);
+            terrimpi_cache_free(cache, p->slots, p->layer_count);
     }
     p->layer_count = (uint8_t)job->plan.layer_count;
     memcpy(p->slots, job->slots, sizeof p->slots);
@@ -12423,29 +12419,17 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
     memcpy(p->eye, job->plan.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
-        terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
-        if (v->frame.camera.rows_from_top) {
+        terrimp_rect rect = terrimpi_cache_rect(cache, &p->slots[i]);
+        if (f->camera.rows_from_top) {
             camera.tan_up = job->plan.camera.tan_down;
             camera.tan_down = job->plan.camera.tan_up;
         }
-        terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                         p->texture_matrix[i]);
+        terrimpi_impostor_texture_matrix(&camera, &rect, side, side, p->texture_matrix[i]);
         camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
-        if (v->cache.places)
-            v->cache.exact->make(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                 v->cache.places[p - v->cache.pictures].matrix[i]);
+        if (cache->places)
+            cache->exact->make(&camera, &rect, side, side,
+                               cache->places[p - cache->pictures].matrix[i]);
     }
-}
-
-/* Lists the frame without the pictures that could not be made. */
-static void terrimpi_view_list_again(terrimp_view *v)
-{
-    uint32_t i;
-    for (i = 0; i < v->draws.count; i++)
-        if (v->draws.items[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
-            v->cache.pictures[v->draws.items[i].index].listed = 0;
-    terrimpi_jobs_lose(&v->cache, &v->jobs);
-    terrimpi_view_list(v);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -12468,7 +12452,7 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
     job->from = job->to;
     if (job->to < job->end)
         return;
-    terrimpi_view_finish(v, job);
+    terrimpi_view_finish(&v->frame, &v->cache, job, &v->stats.reuse);
     if (v->jobs.open && &v->jobs.items[v->jobs.open - 1u] == job)
         v->jobs.open = 0;
 }
@@ -12489,8 +12473,13 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     for (i = 0; i < view->jobs.count; i++)
         terrimpi_view_capture(view, &view->jobs.items[i], callbacks);
     view->jobs.count = 0;
-    if (view->lost)
-        terrimpi_view_list_again(view);
+    if (view->lost) { /* it is listed anew, without the pictures that could not be made */
+        for (i = 0; i < view->draws.count; i++)
+            if (view->draws.items[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+                view->cache.pictures[view->draws.items[i].index].listed = 0;
+        terrimpi_jobs_lose(&view->cache, &view->jobs);
+        terrimpi_view_list(&view->frame, &view->cache, &view->regions, &view->draws);
+    }
     view->capturing = view->lost = 0;
     for (i = view->desc.sorted ? view->draws.count : 0u; i-- > 0;)
         terrimpi_view_kinds[view->draws.items[i].kind].emit(view, &view->draws.items[i], callbacks);
