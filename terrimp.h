@@ -6874,6 +6874,11 @@ static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_
     return t->real ? t->endless->place(t, node, middle, offset) : *node;
 }
 
+/* Says in a command which node that is: the same names in those of all kinds. */
+#define TERRIMPI_COMMAND_NODE(command, place)                                                  \
+    ((command)->node = (place).number, (command)->level = (place).level,                     \
+     (command)->x = (place).x, (command)->z = (place).z)
+
 /* Vertex i of a node's mesh. */
 static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
                                                      const terrimpi_terrain_tile *p,
@@ -9871,10 +9876,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
-    command->node = place.number;
-    command->level = place.level;
-    command->x = place.x;
-    command->z = place.z;
+    TERRIMPI_COMMAND_NODE(command, place);
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
@@ -9883,7 +9885,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
     command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
-    ground.level = plan->source;
     for (i = from / rows; i * rows < to; i++) {
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
         uint32_t first = terrimpi_max_u32(from, i * rows) - i * rows;
@@ -9891,9 +9892,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
         place = terrimpi_real_place(t, &node, middle, ground.offset);
-        ground.node = place.number;
-        ground.x = place.x;
-        ground.z = place.z;
+        TERRIMPI_COMMAND_NODE(&ground, place);
         ground.first_index = draws[i].first_index;
         ground.index_count = draws[i].index_count;
         if (last - first < rows)
@@ -11779,10 +11778,7 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
     place = terrimpi_real_place(v->terrain, &ground->node, v->frame.middle, command.offset);
-    command.node = place.number;
-    command.level = place.level;
-    command.x = place.x;
-    command.z = place.z;
+    TERRIMPI_COMMAND_NODE(&command, place);
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -11803,10 +11799,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
     place = terrimpi_real_place(v->terrain, &picture->node, v->frame.middle, command.offset);
-    command.node = place.number;
-    command.level = place.level;
-    command.x = place.x;
-    command.z = place.z;
+    TERRIMPI_COMMAND_NODE(&command, place);
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
