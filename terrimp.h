@@ -172,13 +172,12 @@
          TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
                                before the API)
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
-         TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 36 KB of code at -Os on
-       a Cortex-M4, 33 KB without the three options that follow it above, if its linker drops
+       a Cortex-M4, 33 KB without the two options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -621,6 +620,10 @@ typedef enum terrimp_geomip_rule {
     TERRIMP_GEOMIP_DISTANCE, /* the same promise by distance alone, at the steepest angle */
     TERRIMP_GEOMIP_RULE_COUNT
 } terrimp_geomip_rule;
+
+/* What a view needs for BOUND, in its settings: a linker leaves it out where none does. */
+typedef struct terrimp_bound terrimp_bound;
+TERRIMP_API const terrimp_bound *terrimp_geomip_bound(void);
 
 typedef struct terrimp_geomip_draw {
     terrimp_node node;
@@ -1534,6 +1537,7 @@ typedef struct terrimp_view_desc {
     float ground_tolerance_px; /* error of ground in GEOMIP and AUTO, by ground_rule
                                [Limits: 0.05..100] [Default 0 -> half of tolerance_px] */
     int ground_rule;        /* terrimp_geomip_rule */
+    const terrimp_bound *bound; /* (required for ground_rule BOUND) terrimp_geomip_bound() */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
     float fade_start;       /* [wu] from the eye: nodes that come closer are ground
@@ -2987,16 +2991,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
-   since compilers may take every number for finite (-ffast-math). */
-#define TERRIMPI_INFINITE 0x7f800000u
-static uint32_t terrimpi_bits(float value)
+static uint32_t terrimpi_float_bits(float value)
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
-    return bits & 0x7fffffffu;
+    return bits;
 }
 
+/* But for the sign infinity has the bits TERRIMPI_INFINITE, and NaN has more. Told by bits, since
+   compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value) { return terrimpi_float_bits(value) & 0x7fffffffu; }
 static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
@@ -3237,21 +3242,19 @@ typedef struct terrimpi_trouble_field {
 
 #define TERRIMPI_TROUBLE(type, field) {#field, offsetof(type, field), sizeof(((type *)0)->field)}
 
-/* Takes fields of a good descriptor for those of a bad one, one after the other, until it is good:
-   the last one was wrong. NULL when none was. */
-static const char *terrimpi_trouble(void *bad, const void *good,
-                                    const terrimpi_trouble_field *fields, size_t count,
-                                    terrimp_result (*resolve)(const void *context, void *desc),
-                                    const void *context)
-{
-    const char *name = NULL;
-    size_t i;
-    for (i = 0; i < count && resolve(context, bad) != TERRIMP_OK; i++) {
-        name = fields[i].name;
-        memcpy((char *)bad + fields[i].at, (const char *)good + fields[i].at, fields[i].bytes);
-    }
-    return name;
-}
+/* Takes fields of a good descriptor for those of a bad one, one after the other, until `resolve`
+   finds it good; returns the last one, which was wrong, or NULL when none was. */
+#define TERRIMPI_FIND_TROUBLE(fields, good, bad, resolve)                                          \
+    do {                                                                                           \
+        const char *name = NULL;                                                                   \
+        size_t i;                                                                                  \
+        for (i = 0; i < sizeof(fields) / sizeof *(fields) && (resolve) != TERRIMP_OK; i++) {       \
+            name = fields[i].name;                                                                 \
+            memcpy((char *)&bad + fields[i].at, (const char *)&good + fields[i].at,                \
+                   fields[i].bytes);                                                               \
+        }                                                                                          \
+        return name;                                                                               \
+    } while (0)
 
 #endif /* TERRIMP_NO_TROUBLE */
 
@@ -3489,6 +3492,13 @@ static terrimp_result terrimpi_field_scan_tile(const terrimp_heightfield *field,
     return TERRIMP_OK;
 }
 
+/* Whether a rectangle of samples has any that the field has, too. */
+static int terrimpi_field_has(const terrimp_heightfield *f, const terrimp_rect *samples)
+{
+    return samples->x < f->width && samples->y < f->depth && samples->width > 0 &&
+           samples->height > 0;
+}
+
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z)
 {
@@ -3546,10 +3556,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
                                                       float *low, float *high)
 {
     terrimp_heightfield f;
+    terrimp_rect samples = terrimpi_rect(x, z, cols, rows);
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(low == NULL || high == NULL, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0, TERRIMP_E_RANGE);
-    return terrimpi_field_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&f, &samples), TERRIMP_E_RANGE);
+    return terrimpi_field_range(&f, samples, 1, low, high);
 }
 
 /* ---- queries on the surface ---- */
@@ -3951,13 +3962,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_field_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_heightfield_resolve((const terrimp_heightfield *)desc,
-                                       (terrimp_heightfield *)desc);
-}
-
 TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -3981,8 +3985,7 @@ TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *f
     good.samples = &good; /* aligned for any */
     good.width = good.depth = 2;
     bad = *field;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_field_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_heightfield_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -4055,12 +4058,6 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_camera_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_camera_resolve((const terrimp_camera *)desc, (terrimp_camera *)desc);
-}
-
 TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -4079,8 +4076,7 @@ TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
     good.width_px = good.height_px = 1;
     good.z_near = 1.0f;
     bad = *camera;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_camera_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_camera_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -4603,7 +4599,7 @@ struct terrimp_pages {
     float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit + 1] of this frame */
-    uint32_t want_count, want_limit;
+    uint32_t want_count, want_limit, want_first; /* first: of this update */
     const struct terrimpi_page_calls *calls;
 };
 
@@ -4623,12 +4619,13 @@ typedef struct terrimpi_page_need {
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
-    int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
+    int (*begin)(const terrimp_quadtree *t);
+    int (*want)(const terrimp_quadtree *t, uint32_t node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
                    const struct terrimpi_page_need *need);
-    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
+    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip, int strays);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
-                       const float away[3]);
+                       const float away[3], float times);
     struct terrimpi_mip_ground (*ground)(const terrimp_quadtree *t, const terrimp_node *node);
     terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
                          uint32_t *level);
@@ -4763,11 +4760,6 @@ static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_vi
 #define TERRIMPI_MIP_MORPH_MOST 4.0f
 #else
 #define TERRIMPI_MIP_MORPH_MOST 1.0f
-#endif
-#ifndef TERRIMP_NO_BOUND
-#define TERRIMPI_MIP_HAS_BOUND 1
-#else
-#define TERRIMPI_MIP_HAS_BOUND 0
 #endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
@@ -5041,8 +5033,7 @@ static float terrimpi_mip_height(const terrimpi_mip_ground *g, uint32_t level, u
 
 static int terrimpi_mip_rule_fits(int rule)
 {
-    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT &&
-           (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
+    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT;
 }
 
 /* ---- selection ---- */
@@ -5062,20 +5053,25 @@ typedef struct terrimpi_mip_frame {
     float along, across;       /* largest tangents on the screen, in the direction in which y is
                                   seen there, and across it */
     float cos2;                /* square of the cosine between forward and the screen's corner */
-    int exact;                 /* BOUND */
+    const terrimp_bound *bound; /* for that rule; else NULL */
     float relief;              /* what measures are multiplied with */
     float whole;               /* [wu] so close to the eye all is split; below 0: all in sight */
     float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
+/* What only BOUND needs: what follows from the camera, and what D^2 is to be multiplied with. */
+struct terrimp_bound {
+    void (*begin)(terrimpi_mip_frame *f, const terrimp_camera *camera, float tan_x, float tan_y);
+    float (*factor)(const terrimpi_mip_frame *f, const terrimp_box *box, float distance2);
+};
+
 /* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
    at its edge may be drawn that far outside. */
 static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera *camera,
                                     float margin)
 {
-    float right[3], seen[3], aside[3], tan_x = 0.0f, tan_y = 0.0f;
-    terrimpi_cross(camera->forward, camera->up, right);
+    float tan_x = 0.0f, tan_y = 0.0f;
     if (camera->orthographic)
         margin = 1.0f / 65536.0f; /* see terrimpi_camera_stand */
     else
@@ -5084,8 +5080,15 @@ static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera 
     tan_y += margin;
     f->reach = camera->reach;
     f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
-    if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
-        return;
+    if (f->bound)
+        f->bound->begin(f, camera, tan_x, tan_y);
+}
+
+static void terrimpi_mip_bound_begin(terrimpi_mip_frame *f, const terrimp_camera *camera,
+                                     float tan_x, float tan_y)
+{
+    float right[3], seen[3], aside[3];
+    terrimpi_cross(camera->forward, camera->up, right);
     memcpy(f->forward, camera->forward, sizeof f->forward);
     f->steep = f->forward[1];
     f->level = TERRIMP_SQRTF(f->forward[0] * f->forward[0] + f->forward[2] * f->forward[2]);
@@ -5132,11 +5135,11 @@ static float terrimpi_mip_stretch(const terrimpi_mip_frame *f, float p_min, floa
     return terrimpi_max(terrimpi_max(most, behind), 0.0f);
 }
 
-/* What D^2 is to be multiplied with: the square of the most pixels that a vertical error of
+/* The square of the most pixels that a vertical error of
    K^-1 shows as anywhere in a box. It changes continuously with the camera, and never grows from a
    box to a part of it. */
-static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
-                                      float distance2)
+static float terrimpi_mip_bound_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
+                                       float distance2)
 {
     float c[3], h[3], p, p_half, q_most, z, z2, far2 = 0.0f, a, b;
     int k;
@@ -5159,6 +5162,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
                              TERRIMP_SQRTF(far2));
     b = terrimpi_min(f->across * f->across, q_most * q_most / z2) * f->steep * f->steep;
     return (a * a + b) / z2 * 1.00001f; /* more than all rounding here */
+}
+
+TERRIMP_API const terrimp_bound *terrimp_geomip_bound(void)
+{
+    static const terrimp_bound calls = {terrimpi_mip_bound_begin, terrimpi_mip_bound_factor};
+    return &calls;
 }
 
 /* D of one node, squared, before its children have a say. */
@@ -5213,8 +5222,7 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
     terrimpi_camera_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
-    measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
-                                                 : split2 / d2;
+    measure = f->bound ? split2 * f->bound->factor(f, &box, d2) : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
 }
 
@@ -5425,7 +5433,6 @@ static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tre
     terrimpi_camera_frustum(camera, &f->frustum);
     f->tree = tree;
     f->view = view;
-    f->exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
     f->relief = view->rule == TERRIMP_GEOMIP_PICTURE ? 1.0f / scale : 1.0f / (scale * scale);
     for (level = 0; level < tree->level_count; level++)
         f->first[level] = tree->node_count;
@@ -5442,6 +5449,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_
 {
     terrimpi_mip_frame f;
     f.whole = 0.0f;
+    f.bound = view->rule == TERRIMP_GEOMIP_BOUND ? terrimp_geomip_bound() : NULL;
     terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
@@ -5810,8 +5818,7 @@ static terrimp_result terrimpi_impostor_check_eyes(const terrimp_box *box,
     TERRIMPI_REFUSE(!box || !captured_eye || !eye || !out, TERRIMP_E_NULL);
     return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
                    terrimpi_finite3(captured_eye) && terrimpi_finite3(eye)
-               ? TERRIMP_OK
-               : TERRIMP_E_NOT_FINITE;
+               ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
 
 /* The functions of this room that a view calls check nothing; those of the API do. */
@@ -6655,13 +6662,6 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_terrain_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_terrain_desc_resolve((const terrimp_terrain_desc *)desc,
-                                        (terrimp_terrain_desc *)desc);
-}
-
 TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -6678,8 +6678,7 @@ TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc 
         return terrimp_heightfield_trouble(&desc->field);
     memset(&good, 0, sizeof good);
     bad = *desc;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_terrain_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_terrain_desc_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -7019,22 +7018,31 @@ static void terrimpi_terrain_touched_along(uint32_t first, uint32_t count, uint3
     *to = terrimpi_min_u32(last / side, nodes - 1u);
 }
 
+/* The same along both. */
+static terrimpi_terrain_touched terrimpi_terrain_touched_within(const terrimp_quadtree *t,
+                                                                const terrimp_rect *rect,
+                                                                uint32_t level, uint32_t margin)
+{
+    uint32_t side = t->chunk_quads << level;
+    terrimpi_terrain_touched out;
+    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->field.width,
+                                   t->level_x[level], &out.x0, &out.x1);
+    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->field.depth,
+                                   t->level_z[level], &out.z0, &out.z1);
+    return out;
+}
+
 /* What vertices move by hangs on the triangles of two levels above; errors, and how far down skirts
    reach, on what a finer neighbour draws next to the border. */
 static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_terrain *t,
                                                                const terrimp_rect *rect,
                                                                uint32_t level, int morph)
 {
-    uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
-    terrimpi_terrain_touched out;
     if (t->tree.pages && level > t->tree.pages->block_level)
-        margin += side / 2u; /* errors are of whole nodes beside it, see terrimpi_paging_build */
-    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
-                                   t->tree.level_x[level], &out.x0, &out.x1);
-    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
-                                   t->tree.level_z[level], &out.z0, &out.z1);
-    return out;
+        margin += (t->desc.chunk_quads << level) / 2u; /* errors are of whole nodes beside it, see
+                                                          terrimpi_paging_build */
+    return terrimpi_terrain_touched_within(&t->tree, rect, level, margin);
 }
 
 static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
@@ -7042,9 +7050,7 @@ static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
 {
     TERRIMPI_REFUSE(!t || !rect, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!t->built, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
-                    rect->y >= t->desc.field.depth, TERRIMP_E_RANGE);
-    return TERRIMP_OK;
+    return terrimpi_field_has(&t->desc.field, rect) ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
@@ -7329,18 +7335,23 @@ static void terrimpi_floor_wall_place(const terrimp_terrain *t, uint32_t k, uint
     *z = terrimpi_min_u32(row * quads / TERRIMPI_FLOOR_WALL_POINTS, t->desc.field.depth - 1u);
 }
 
-/* The lowest sample of a rectangle that two of its corners span. */
-static float terrimpi_terrain_lowest(const terrimp_terrain *t, const uint32_t a[2],
-                                     const uint32_t b[2])
+/* The samples below the walls from point k to the next one: one column or row. */
+static terrimp_rect terrimpi_floor_wall(const terrimp_terrain *t, uint32_t k)
+{
+    uint32_t a[2], b[2], x, z;
+    terrimpi_floor_wall_place(t, k, &a[0], &a[1]);
+    terrimpi_floor_wall_place(t, k + 1u, &b[0], &b[1]);
+    x = terrimpi_min_u32(a[0], b[0]);
+    z = terrimpi_min_u32(a[1], b[1]);
+    return terrimpi_rect(x, z, terrimpi_max_u32(a[0], b[0]) - x + 1u,
+                         terrimpi_max_u32(a[1], b[1]) - z + 1u);
+}
+
+static float terrimpi_floor_lowest(const terrimp_terrain *t, uint32_t wall)
 {
     float low, high;
-    terrimp_rect r;
-    r.x = terrimpi_min_u32(a[0], b[0]);
-    r.y = terrimpi_min_u32(a[1], b[1]);
-    r.width = terrimpi_max_u32(a[0], b[0]) - r.x + 1u;
-    r.height = terrimpi_max_u32(a[1], b[1]) - r.y + 1u;
-    return terrimpi_field_range(&t->desc.field, r, 0, &low, &high) == TERRIMP_OK
-               ? low : t->sample_low;
+    return terrimpi_field_range(&t->desc.field, terrimpi_floor_wall(t, wall), 0, &low, &high) ==
+                   TERRIMP_OK ? low : t->sample_low;
 }
 
 /* The samples between which quad i of the floor lies, of its ground or its walls, in the order of
@@ -7378,17 +7389,15 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
     terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
-        uint32_t before[2], at[2], after[2];
+        uint32_t at[2];
         float *top = xyz + 3u * (points + k);
-        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
         xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
         top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
-                               : terrimpi_min(terrimpi_terrain_lowest(t, before, at),
-                                              terrimpi_terrain_lowest(t, at, after));
+                               : terrimpi_min(terrimpi_floor_lowest(t, k + points - 1u),
+                                              terrimpi_floor_lowest(t, k));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
     for (i = first; i < f.indices; i++)
@@ -7585,24 +7594,24 @@ static uint32_t terrimpi_bake_hash_word(uint32_t hash, uint32_t word)
     return (hash ^ word) * 16777619u;
 }
 
-static uint32_t terrimpi_bake_float_bits(float value)
+/* The hash of a block from its byte `from` on. Words are copied, since a float may not be looked at
+   as an integer. */
+static uint32_t terrimpi_bake_hash_from(const void *block, uint32_t from, uint32_t bytes)
 {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-/* The checksum of a bake. Words are copied, since a float may not be looked at as an integer. */
-static uint32_t terrimpi_bake_hash(const void *block)
-{
-    const unsigned char *at = (const unsigned char *)block + offsetof(terrimpi_bake, width);
-    uint32_t hash = 2166136261u, word, bytes;
-    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
-    for (bytes -= (uint32_t)offsetof(terrimpi_bake, width); bytes >= 4u; bytes -= 4u, at += 4) {
-        memcpy(&word, at, sizeof word);
+    uint32_t hash = 2166136261u, word;
+    for (; from + 4u <= bytes; from += 4u) {
+        memcpy(&word, (const unsigned char *)block + from, sizeof word);
         hash = terrimpi_bake_hash_word(hash, word);
     }
     return hash;
+}
+
+/* The checksum of a bake. */
+static uint32_t terrimpi_bake_hash(const void *block)
+{
+    uint32_t bytes;
+    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
+    return terrimpi_bake_hash_from(block, (uint32_t)offsetof(terrimpi_bake, width), bytes);
 }
 
 /* The checksum of a heightfield's samples, whatever their byte order and the length of rows. */
@@ -7612,7 +7621,7 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
     for (z = 0; z < field->depth; z++)
         for (x = 0; x < field->width; x++)
             hash = terrimpi_bake_hash_word(hash,
-                                           terrimpi_bake_float_bits(terrimpi_field_raw(field, x,
+                                           terrimpi_float_bits(terrimpi_field_raw(field, x,
                                                                                        z)));
     return hash;
 }
@@ -7724,25 +7733,40 @@ static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_ter
     return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
 
+/* Whether heights and errors of a node could be those of one. */
+static int terrimpi_bake_heights_ok(const terrimp_geomip_node *ground, const terrimpi_mesh *mesh)
+{
+    const float most = TERRIMPI_FLOAT_MAX;
+    return terrimpi_within(ground->error, 0.0f, most) && terrimpi_within(ground->rms, 0.0f, most) &&
+           terrimpi_within(mesh->error, 0.0f, most) &&
+           terrimpi_within(mesh->error_rms, 0.0f, most) &&
+           terrimpi_within(mesh->low, -most, most) &&
+           terrimpi_within(mesh->high, mesh->low, most) &&
+           terrimpi_within(ground->low, mesh->low, mesh->high) &&
+           terrimpi_within(ground->high, ground->low, mesh->high);
+}
+
+/* Whether a node's are held by those of its parent. */
+static int terrimpi_bake_heights_held(const terrimp_geomip_node *ground, const terrimpi_mesh *mesh,
+                                      const terrimp_geomip_node *above,
+                                      const terrimpi_mesh *mesh_above)
+{
+    return ground->low >= above->low && ground->high <= above->high &&
+           ground->error <= above->error && mesh->low >= mesh_above->low &&
+           mesh->high <= mesh_above->high;
+}
+
 /* Whether all numbers of one node are what building could have made. */
 static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
 {
-    const terrimp_geomip_node *ground = terrimpi_tree_kept(&t->tree, node);
     const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
-    const float most = TERRIMPI_FLOAT_MAX;
     float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
     uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
     uint32_t triangles = terrimpi_mesh_triangles(mesh);
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
-    if (!terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
-        !terrimpi_within(mesh->error, 0.0f, most) ||
-        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
-        !terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
-        !terrimpi_within(ground->low, mesh->low, mesh->high) ||
-        !terrimpi_within(ground->high, ground->low, mesh->high))
-        return 0;
-    if (border < 4u || border > t->border_limit || vertices < border ||
-        vertices > t->vertex_limit || triangles < 2u || triangles > t->desc.triangle_budget)
+    if (!terrimpi_bake_heights_ok(terrimpi_tree_kept(&t->tree, node), mesh) || border < 4u ||
+        border > t->border_limit || vertices < border || vertices > t->vertex_limit ||
+        triangles < 2u || triangles > t->desc.triangle_budget)
         return 0;
     for (i = 0; i < vertices; i++) {
         terrimpi_mesh_point_steps point = terrimpi_mesh_point(t, &p, node, i);
@@ -7751,18 +7775,6 @@ static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
             return 0;
     }
     return terrimpi_bake_loop_ok(t, &p, node) && terrimpi_bake_corners_ok(t, &p, node);
-}
-
-/* Whether a node is held by its parent. */
-static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
-{
-    uint32_t parent =
-        node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
-    const terrimp_geomip_node *c = terrimpi_tree_kept(&t->tree, node);
-    const terrimp_geomip_node *p = terrimpi_tree_kept(&t->tree, parent);
-    return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
-           terrimpi_mesh_of(t, node)->low >= terrimpi_mesh_of(t, parent)->low &&
-           terrimpi_mesh_of(t, node)->high <= terrimpi_mesh_of(t, parent)->high;
 }
 
 /* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
@@ -7788,7 +7800,11 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
                               field->height_offset != f->height_offset), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
     for (node = 0; node < t->tree.node_count; node++) {
-        if (!terrimpi_bake_node_ok(t, node) || !terrimpi_bake_parent_ok(t, node))
+        uint32_t above = node + 1u < t->tree.node_count
+                             ? terrimpi_tree_parent_number(&t->tree, node) : node;
+        if (!terrimpi_bake_node_ok(t, node) ||
+            !terrimpi_bake_heights_held(&t->tree.nodes[node], &t->meshes[node],
+                                        &t->tree.nodes[above], &t->meshes[above]))
             return TERRIMP_E_BAKE;
         triangles += terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     }
@@ -8475,26 +8491,16 @@ static float terrimpi_horizon_draw_error(const terrimp_quadtree *tree,
     return error;
 }
 
-/* The two bounds that a horizon wants: close to the eye one of height, else one over distance. */
-static void terrimpi_horizon_draws_error(const terrimp_quadtree *tree,
-                                         const terrimp_geomip_view *view,
-                                         const float eye[3], float *error, float *low)
+/* Adds a node that may be drawn so far off to the two bounds that a horizon wants: close to the eye
+   one of height, else one over distance. */
+static void terrimpi_horizon_add_error(const terrimp_quadtree *tree, float off, float distance,
+                                       float *error, float *low)
 {
-    float side = (float)tree->chunk_quads *
-                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
-    uint32_t i;
-    *error = *low = 0.0f;
-    for (i = 0; i < view->draw_count; i++) {
-        float off = terrimpi_horizon_draw_error(tree, &view->draws[i],
-                                                view->morph_ratio > 1.0f), distance;
-        terrimp_box box;
-        terrimpi_mip_box(tree, &view->draws[i].node, &box);
-        distance = terrimp_box_distance(&box, eye);
-        if (distance < side)
-            *low = terrimpi_max(*low, off);
-        else
-            *error = terrimpi_max(*error, off / distance);
-    }
+    if (distance < (float)tree->chunk_quads *
+                       terrimpi_max(tree->field.spacing_x, tree->field.spacing_z))
+        *low = terrimpi_max(*low, off);
+    else
+        *error = terrimpi_max(*error, off / distance);
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
@@ -8503,17 +8509,22 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 {
     const terrimp_quadtree *tree;
     terrimp_camera c;
-    float error, low;
+    float error = 0.0f, low = 0.0f, off;
     uint32_t i, count = 0;
     TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     tree = horizon->hider.tree;
-    terrimpi_horizon_draws_error(tree, view, c.eye, &error, &low);
+    for (i = 0; i < view->draw_count; i++) {
+        terrimp_box box;
+        off = terrimpi_horizon_draw_error(tree, &view->draws[i], view->morph_ratio > 1.0f);
+        terrimpi_mip_box(tree, &view->draws[i].node, &box);
+        terrimpi_horizon_add_error(tree, off, terrimp_box_distance(&box, c.eye), &error, &low);
+    }
     terrimpi_horizon_begin(horizon, &c, terrimpi_min(error, 0.5f), low);
     horizon->blind |= error > 0.5f;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
-        float off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
+        off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
         if (terrimpi_horizon_hides_node(horizon, &draw->node, off))
             view->triangle_count -= terrimpi_mip_triangles(tree->chunk_quads, draw->pattern);
         else
@@ -8672,14 +8683,9 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 }
 
 /* The checksum of a page: of all but its first word. */
-static uint32_t terrimpi_page_hash(const unsigned char *page, uint32_t bytes)
+static uint32_t terrimpi_page_hash(const void *page, uint32_t bytes)
 {
-    uint32_t at, hash = 2166136261u, word;
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
-    return hash;
+    return terrimpi_bake_hash_from(page, 4u, bytes);
 }
 
 /* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
@@ -8728,16 +8734,8 @@ static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_le
 
 static int terrimpi_record_ok(const terrimpi_record *r)
 {
-    const float most = TERRIMPI_FLOAT_MAX;
-    return terrimpi_within(r->ground.error, 0.0f, most) &&
-           terrimpi_within(r->ground.rms, 0.0f, most) &&
-           terrimpi_within(r->held, r->ground.rms, most) &&
-           terrimpi_within(r->mesh.error, 0.0f, most) &&
-           terrimpi_within(r->mesh.error_rms, 0.0f, most) &&
-           terrimpi_within(r->mesh.low, -most, most) &&
-           terrimpi_within(r->mesh.high, r->mesh.low, most) &&
-           terrimpi_within(r->ground.low, r->mesh.low, r->mesh.high) &&
-           terrimpi_within(r->ground.high, r->ground.low, r->mesh.high);
+    return terrimpi_bake_heights_ok(&r->ground, &r->mesh) &&
+           terrimpi_within(r->held, r->ground.rms, TERRIMPI_FLOAT_MAX);
 }
 
 /* Reads a header into a terrain, all but its memory. */
@@ -8920,9 +8918,8 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
             continue;
         memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
                        i * TERRIMPI_PAGE_RECORD, sizeof r);
-        if (!terrimpi_record_ok(&r) || r.ground.low < own->ground.low ||
-            r.ground.high > own->ground.high || r.ground.error > own->ground.error ||
-            r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
+        if (!terrimpi_record_ok(&r) ||
+            !terrimpi_bake_heights_held(&r.ground, &r.mesh, &own->ground, &own->mesh) ||
             terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
         slot = terrimpi_page_slot_of(t->tree.pages, child.number);
@@ -9070,22 +9067,30 @@ static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node,
 
 /* Notes that a page is of use in this frame. If it is missing, it is wanted at an urgency above 0,
    and those above it up to the one that is here. Returns whether it is here itself. */
-static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
-                              float urgency)
+static int terrimpi_page_want(const terrimp_quadtree *t, uint32_t node, int reason, float urgency)
 {
     struct terrimp_pages *p = t->pages;
-    terrimp_node n = *node;
+    uint32_t number = node;
     for (;;) {
-        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, number);
+        terrimp_node n;
         if (slot)
             slot->used = p->frame; /* or it might be given up for this */
         if (slot && slot->page)
-            return n.number == node->number;
+            return number == node;
+        n = terrimpi_tree_node(t, number);
         if ((!slot && urgency > 0.0f && !terrimpi_page_list(p, &n, reason, urgency)) ||
             n.level + 1u == t->level_count)
             return 0;
-        n = terrimpi_tree_parent(t, &n);
+        number = terrimpi_tree_parent(t, &n).number;
     }
+}
+
+/* Begins a view's update; returns 0 when the root's page is not here: then there is none. */
+static int terrimpi_page_begin(const terrimp_quadtree *t)
+{
+    t->pages->want_first = t->pages->want_count;
+    return terrimpi_page_want(t, t->node_count - 1u, TERRIMP_WANT_GROUND, 1e6f);
 }
 
 /* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
@@ -9123,7 +9128,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     }
     below = *need;
     urgency = TERRIMP_SQRTF(need->urgency);
-    all = terrimpi_page_want(&t->tree, node, need->reason, urgency);
+    all = terrimpi_page_want(&t->tree, node->number, need->reason, urgency);
     for (i = 0; i < 4u && (all || need->urgency > 0.0f); i++) {
         if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
             (!uses && terrimpi_page_of(p, child.number)))
@@ -9131,7 +9136,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
         terrimpi_page_box(t, &child, &box);
         if (terrimp_frustum_test(need->frustum, &box, TERRIMP_PLANES_ALL) ==
                 TERRIMP_PLANES_OUTSIDE ||
-            terrimpi_page_want(&t->tree, &child, need->reason, urgency))
+            terrimpi_page_want(&t->tree, child.number, need->reason, urgency))
             continue;
         if (all && !uses) { /* it does not come to them: once more */
             uses = 1;
@@ -9168,15 +9173,18 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
 
 /* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
    neighbours still differ by one level at most. All that the split would need is wanted; and the
-   ground below the eye, which says whether it is over it. Returns how many are joined. */
-static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
+   ground below the eye, which says whether it is over it. Returns how many are joined. What a try
+   before this one wanted is of no use. */
+static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip, int strays)
 {
     terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f, 0.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
+    t->tree.pages->want_count = t->tree.pages->want_first;
+    t->tree.pages->strays = strays;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
         terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
-        terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
+        terrimpi_page_want(&t->tree, below.number, TERRIMP_WANT_GROUND, 1.0f);
     for (level = t->tree.level_count; level-- > 1u;)
         for (number = mip->first[level]; number != t->tree.node_count;
              number = mip->view->marks[number].next) {
@@ -9197,17 +9205,17 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
     return late;
 }
 
-/* Asks for the pages that ground will need when the eye has gone on by `away`. */
+/* Asks for the pages that ground will need when the eye has gone on by `away`, so many times. */
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
-                                     const float away[3])
+                                     const float away[3], float times)
 {
     terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f, 0.0f};
     float eye[3];
     uint32_t i;
     for (i = 0; i < 3u; i++)
-        eye[i] = mip->eye[i] + away[i];
+        eye[i] = mip->eye[i] + away[i] * times;
     need.eye = eye;
-    for (i = 0; i < mip->view->draw_count; i++) {
+    for (i = 0; i < mip->view->draw_count && terrimpi_length(away) > 0.0f; i++) {
         const terrimp_geomip_draw *draw = &mip->view->draws[i];
         float error = draw->error_px / mip->view->tolerance_px;
         terrimp_box box;
@@ -9325,9 +9333,9 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain)
 {
     static const terrimpi_page_calls calls = {
-        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
-        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_ground,
-        terrimpi_page_at,         terrimpi_page_sample};
+        terrimpi_page_record, terrimpi_page_begin,      terrimpi_page_want,  terrimpi_page_divides,
+        terrimpi_page_settle, terrimpi_page_look_ahead, terrimpi_page_ground, terrimpi_page_at,
+        terrimpi_page_sample};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages p;
@@ -10030,7 +10038,6 @@ typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
-    uint32_t wants;                /* of pages, before this update */
     terrimp_camera camera;         /* resolved */
     float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
     float pixel_factor;            /* K from there */
@@ -10052,18 +10059,10 @@ static float terrimpi_view_distance(const terrimpi_frame *f, const terrimp_box *
 
 /* ---- settings ---- */
 
-/* Impostors of a mode. */
-enum {
-    TERRIMPI_VIEW_IMPOSTORS_NEVER = 0,
-    TERRIMPI_VIEW_IMPOSTORS_ALWAYS, /* from the fade band on, each chunk, of its full resolution */
-    TERRIMPI_VIEW_IMPOSTORS_CHEAPER /* where they cost less than ground */
-};
-
+/* Whether there are impostors: always from the fade band on, or in AUTO where they cost less. */
 static int terrimpi_view_impostors(const terrimp_view_desc *d)
 {
-    return d->mode == TERRIMP_MODE_AUTO       ? TERRIMPI_VIEW_IMPOSTORS_CHEAPER
-           : d->mode == TERRIMP_MODE_IMPOSTOR ? TERRIMPI_VIEW_IMPOSTORS_ALWAYS
-                                              : TERRIMPI_VIEW_IMPOSTORS_NEVER;
+    return d->mode == TERRIMP_MODE_AUTO || d->mode == TERRIMP_MODE_IMPOSTOR;
 }
 
 /* Whether ground is drawn at its full resolution, else at a tolerance. */
@@ -10151,7 +10150,8 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
     TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
                     !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
-                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
+                    (d.ground_rule == TERRIMP_GEOMIP_BOUND && !d.bound) || d.atlas_size < 64u ||
+                    d.atlas_size > 32768u || d.atlas_count > 16u ||
                     d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
                     (d.max_cost > 0.0f && !d.cost_limit) ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
@@ -10160,20 +10160,12 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
                         TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages && d.morph_ratio > 1.0f &&
                     (d.morph_ratio > terrain->tree.pages->morph_ratio ||
-                     (d.ground_rule != TERRIMP_GEOMIP_PICTURE &&
-                      d.ground_rule != TERRIMP_GEOMIP_DEFAULT)), TERRIMP_E_RANGE);
+                     d.ground_rule != TERRIMP_GEOMIP_PICTURE), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
 
 #ifndef TERRIMP_NO_TROUBLE
-
-static terrimp_result terrimpi_view_try(const void *context, void *desc)
-{
-    return terrimp_view_desc_resolve((const terrimp_terrain *)context,
-                                     (const terrimp_view_desc *)desc,
-                                     (terrimp_view_desc *)desc);
-}
 
 TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
                                                   const terrimp_view_desc *desc)
@@ -10207,8 +10199,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     memset(&good, 0, sizeof good);
     good.endless = terrimp_view_endless();
     bad = *desc;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_view_try, terrain);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_view_desc_resolve(terrain, &bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -10485,9 +10476,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     const terrimp_heightfield *field = &f->terrain->desc.field;
     terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f, 0.0f};
     const struct terrimp_pages *pages = f->terrain->tree.pages;
-    int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
+    if (!terrimpi_view_impostors(f->desc) || closest < f->desc->fade_start)
         return 0;
     if (f->camera.reach > 0.0f &&
         f->camera.reach > terrimpi_view_sine(f, node->number, closest) * closest)
@@ -10499,7 +10489,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
+    if (f->desc->mode == TERRIMP_MODE_AUTO &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
     return smallest || !pages || pages->calls->divides(f->terrain, node, &need)
@@ -10551,13 +10541,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
-        if (closest < f->desc->fade_start ||
-            terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
+        if (closest < f->desc->fade_start || !terrimpi_view_impostors(f->desc))
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     if (*done & TERRIMPI_CULL_IMPOSTOR)
         return cuts;
-    smallest = *done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER &&
+    smallest = *done && f->desc->mode == TERRIMP_MODE_AUTO &&
                terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u;
     impostor = terrimpi_cull_impostor(
         f, node, closest, cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE,
@@ -10627,21 +10616,16 @@ static void terrimpi_cull_begin_hiders(const terrimpi_cull *cull, const terrimpi
 {
     terrimp_hider *hider;
     const terrimp_quadtree *tree = &f->terrain->tree;
-    float side = (float)tree->chunk_quads *
-                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
     float error = 0.0f, low = 0.0f;
     uint32_t i;
     for (i = 0; i < cull->count && !full; i++) {
         terrimp_node n = terrimpi_tree_node(tree, cull->nodes[i].number);
-        float off = terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f);
-        if (!(cull->nodes[i].cuts & TERRIMPI_CULL_GROUND))
-            continue;
-        if (cull->nodes[i].closest < side)
-            low = terrimpi_max(low, off);
-        else
-            error = terrimpi_max(error, off / cull->nodes[i].closest);
+        if (cull->nodes[i].cuts & TERRIMPI_CULL_GROUND)
+            terrimpi_horizon_add_error(
+                tree, terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f),
+                cull->nodes[i].closest, &error, &low);
     }
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_NEVER)
+    if (terrimpi_view_impostors(f->desc))
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
     for (hider = f->desc->hider; hider; hider = hider->next)
         hider->blind = 2.0f * error > 0.5f || !hider->begin(hider, &f->camera, 2.0f * error, low);
@@ -10703,7 +10687,7 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
                                      float closest, int *is_known)
 {
     *is_known = 1;
-    if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (f->desc->mode == TERRIMP_MODE_IMPOSTOR)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
@@ -11556,8 +11540,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
 {
     struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
-    uint32_t i;
     mip.whole = 0.0f;
+    mip.bound = v->desc.ground_rule == TERRIMP_GEOMIP_BOUND ? v->desc.bound : NULL;
     if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
         const terrimp_heightfield *field = &f->terrain->desc.field;
         mip.whole = v->desc.mode == TERRIMP_MODE_FULL
@@ -11573,11 +11557,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
-        if (pages) {
-            pages->want_count = f->wants; /* those of a try before are of no use */
-            pages->strays = f->desc->hider != NULL;
-            v->late = pages->calls->settle(f->terrain, &mip);
-        }
+        if (pages)
+            v->late = pages->calls->settle(f->terrain, &mip, f->desc->hider != NULL);
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most || mip.whole < 0.0f)
@@ -11586,13 +11567,9 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     }
     terrimpi_regions_make(f, &v->cull, &v->ground,
                           mip.whole < 0.0f && v->late == 0 ? NULL : &mip, &v->regions);
-    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
-        float ahead[3];
-        for (i = 0; i < 3u; i++)
-            ahead[i] = f->motion.away[0][i] * (TERRIMPI_VIEW_SOON / f->motion.frames[0]);
-        if (terrimpi_length(ahead) > 0.0f)
-            pages->calls->look_ahead(f->terrain, &mip, ahead);
-    }
+    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f)
+        pages->calls->look_ahead(f->terrain, &mip, f->motion.away[0],
+                                 TERRIMPI_VIEW_SOON / f->motion.frames[0]);
     return TERRIMP_OK;
 }
 
@@ -11728,7 +11705,7 @@ static int terrimpi_view_impostor_add(const terrimpi_frame *f, terrimpi_cache *c
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(cache, node->number);
     const terrimp_quadtree *tree = &f->terrain->tree;
-    if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
+    if (!p || (tree->pages && !tree->pages->calls->want(tree, node->number, 0, 0.0f)))
         return 0;
     if (p->listed == f->number) {
         list->items[p->draw].alpha = 1.0f;
@@ -11777,7 +11754,7 @@ static int terrimpi_candidate_list(const terrimpi_frame *f, terrimpi_cache *cach
     if (terrimpi_view_impostor_add(f, cache, &node, list))
         return 1;
     list->waiting++;
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
+    if (f->desc->mode != TERRIMP_MODE_AUTO)
         return 0;
     if (terrimpi_view_impostor_add_children(f, cache, &node, list))
         return 1;
@@ -12029,8 +12006,7 @@ static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
     }
     if (possible[before] && total[before] < total[best] * TERRIMPI_VIEW_FLIP)
         best = before;
-    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
-        terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] && v->desc.mode == TERRIMP_MODE_IMPOSTOR)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = (uint8_t)best;
     for (i = 0; i < region->candidate_count; i++)
@@ -12071,8 +12047,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
-    if (f->desc->no_splits || f->camera.orthographic ||
-        terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER ||
+    if (f->desc->no_splits || f->camera.orthographic || f->desc->mode != TERRIMP_MODE_AUTO ||
         !(sine * closest > 0.0f) ||
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
@@ -12095,10 +12070,8 @@ static int terrimpi_capture_has_pages(const terrimp_quadtree *t, const terrimpi_
 {
     int reason = urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE, all = 1;
     uint32_t i;
-    for (i = 0; i < count && t->pages; i++) {
-        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
-        all &= t->pages->calls->want(t, &node, reason, terrimpi_min(urgency, 2.0f));
-    }
+    for (i = 0; i < count && t->pages; i++)
+        all &= t->pages->calls->want(t, draws[i].node, reason, terrimpi_min(urgency, 2.0f));
     *late += all ? 0u : 1u;
     return all;
 }
@@ -12511,6 +12484,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimp_camera resolved;
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
+    const struct terrimp_pages *pages;
     float reuse, middle[2] = {0.0f, 0.0f};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
@@ -12518,13 +12492,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
-    if (view->terrain->tree.pages) {
-        const terrimp_quadtree *tree = &view->terrain->tree;
-        terrimp_node root = terrimpi_tree_root(tree);
-        frame.wants = tree->pages->want_count;
-        TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
-                        TERRIMP_E_PAGE);
-    }
+    pages = view->terrain->tree.pages;
+    TERRIMPI_REFUSE(pages && !pages->calls->begin(&view->terrain->tree), TERRIMP_E_PAGE);
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
@@ -15473,12 +15442,9 @@ static terrimp_result terrimpi_simp_check_desc(const terrimp_simplify_desc *desc
     TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows) ||
                     desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
-    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
-        terrimp_result r = terrimpi_simp_check_border(
-            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
-        if (r != TERRIMP_OK)
-            return r;
-    }
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
+        TERRIMPI_TRY(terrimpi_simp_check_border(
+            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows));
     for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
         uint32_t x_end = i & 1u, z_end = i >> 1;
         const terrimp_border *p = b + (z_end ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_Z0);
@@ -16747,7 +16713,7 @@ static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terri
 {
     float most = terrimpi_terrain_border_height(t, TERRIMPI_MESH_BORDER_STEPS), low = most, step;
     float high = t->range_low;
-    uint32_t i, bits;
+    uint32_t i;
     for (i = mesh->border_vertex_count; i < mesh->surface_vertex_count; i++) {
         mesh->vertices[i].height = terrimpi_clamp(mesh->vertices[i].height, t->range_low, most);
         low = terrimpi_min(low, mesh->vertices[i].height);
@@ -16755,8 +16721,7 @@ static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terri
     }
     *base = low;
     step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_MESH_INNER_STEPS;
-    memcpy(&bits, &step, sizeof bits);
-    return (bits + 0x7fffffu) >> 23;
+    return (terrimpi_float_bits(step) + 0x7fffffu) >> 23;
 }
 
 /* A vertex of a surface as it is stored. */
@@ -17551,7 +17516,7 @@ static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terr
     w->head.block_level = d->block_level;
     w->head.morph_ratio = d->morph_ratio;
     w->head.stamp = d->stamp;
-    w->head.stamp = terrimpi_page_hash((const unsigned char *)&w->head, sizeof w->head);
+    w->head.stamp = terrimpi_page_hash(&w->head, sizeof w->head);
     return TERRIMP_OK;
 }
 
@@ -17698,10 +17663,7 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     for (i = 0; i < 4u; i++) {
         if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        ground->low = terrimpi_min(ground->low, t->tree.nodes[child.number].low);
-        ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
-        ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
-        terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
+        terrimpi_build_hold_node(t, n->number, child.number);
         w->held[n->number] = terrimpi_max(w->held[n->number],
                                           terrimpi_page_held_by(w->desc->morph_ratio,
                                                                 w->held[child.number]));
@@ -17862,23 +17824,23 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
     return TERRIMP_OK;
 }
 
-/* The lowest sample of a rectangle that two of its corners span, through `read`. */
-static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uint32_t a[2],
-                                             const uint32_t b[2], float *lowest)
+/* The lowest sample below one of the floor's walls, through `read`. */
+static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, uint32_t wall,
+                                             float *lowest)
 {
+    terrimp_rect r = terrimpi_floor_wall(&w->whole, wall);
     terrimp_heightfield f = w->desc->terrain.field;
     terrimpi_field_scan scan;
-    uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
-    uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
-    uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
-    float line[256]; /* of any format; either is 1 */
-    for (k = 0; k < cols * rows; k += 256u) {
-        f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
-        f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
+    float line[256]; /* of any format */
+    uint32_t k, along_x = r.width > 1u;
+    for (k = 0; k < r.width * r.height; k += 256u) {
+        f.width = along_x ? terrimpi_min_u32(r.width - k, 256u) : 1u;
+        f.depth = along_x ? 1u : terrimpi_min_u32(r.height - k, 256u);
         f.row_bytes = f.width * terrimpi_field_sample_bytes(f.format);
         f.samples = line;
-        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, cols > 1u ? x + k : x, rows > 1u ? z + k : z,
-                                       f.width, f.depth, line, f.row_bytes), TERRIMP_E_PAGE);
+        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, along_x ? r.x + k : r.x,
+                                       along_x ? r.y : r.y + k, f.width, f.depth, line,
+                                       f.row_bytes), TERRIMP_E_PAGE);
         scan.skip_voids = 0;
         TERRIMPI_TRY(terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
         *lowest = terrimpi_min(*lowest, terrimpi_field_world_height(&f, scan.low));
@@ -17906,12 +17868,8 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
         }
     lows += terrimpi_floor_of(t).ground_vertices;
     for (k = 0; k < points; k++) {
-        uint32_t before[2], at[2], after[2];
-        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
-        terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &lows[k]));
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, k + points - 1u, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, k, &lows[k]));
     }
     return TERRIMP_OK;
 }
@@ -18102,44 +18060,19 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
     return TERRIMP_OK;
 }
 
-/* The nodes of a level that samples from `at` on belong to: those at a border belong to both. */
-static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uint32_t nodes,
-                                uint32_t range[2])
-{
-    range[0] = terrimpi_min_u32((at > 0 ? at - 1u : 0u) / quads, nodes - 1u);
-    range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
-}
-
-/* A rectangle of samples, NULL for all, cut at the far edges; `cut` may be NULL. Returns 0 when it
-   is empty or outside. */
-static int terrimpi_walls_rect(const terrimp_quadtree *tree, const terrimp_rect *samples,
-                               terrimp_rect *cut)
-{
-    uint32_t width = tree->field.width, depth = tree->field.depth;
-    terrimp_rect all = samples ? *samples : terrimpi_rect(0, 0, width, depth);
-    if (all.width < 1u || all.height < 1u || all.x >= width || all.y >= depth)
-        return 0;
-    all.width = terrimpi_min_u32(all.width, width - all.x);
-    all.height = terrimpi_min_u32(all.height, depth - all.y);
-    if (cut)
-        *cut = all;
-    return 1;
-}
-
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls)
 {
-    terrimp_rect all;
-    uint32_t level, x[2], z[2], i, j;
+    const terrimp_rect all = {0, 0, TERRIMP_MAX_DIM, TERRIMP_MAX_DIM};
+    uint32_t level, x, z;
+    samples = samples ? samples : &all;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
-    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, &all), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&tree->field, samples), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++) {
-        uint32_t quads = tree->chunk_quads << level;
-        terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
-        terrimpi_wall_range(all.y, all.height, quads, tree->level_z[level], z);
-        for (j = z[0]; j <= z[1]; j++)
-            for (i = x[0]; i <= x[1]; i++)
-                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_within(tree, samples, level, 0);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++)
+                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, x, z),
                                     (unsigned char *)walls);
     }
     return TERRIMP_OK;
@@ -18410,7 +18343,7 @@ TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, con
     tree = sets->hider.tree;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_REFUSE(cell >= terrimpi_sets_level_nodes(tree, sets->cell_level) ||
-                    (samples && !terrimpi_walls_rect(tree, samples, NULL)), TERRIMP_E_RANGE);
+                    (samples && !terrimpi_field_has(&tree->field, samples)), TERRIMP_E_RANGE);
     memset(&b, 0, sizeof b);
     node = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + cell);
     b.sets = sets;
@@ -18436,7 +18369,7 @@ TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
     uint32_t i;
     TERRIMPI_REFUSE(!sets || !samples || !sets->hider.tree, TERRIMP_E_NULL);
     tree = sets->hider.tree;
-    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, NULL), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&tree->field, samples), TERRIMP_E_RANGE);
     memset(&b, 0, sizeof b);
     b.sets = sets;
     for (i = 0; i < terrimpi_sets_level_nodes(tree, sets->cell_level); i++) {
@@ -18527,20 +18460,17 @@ static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
 {
     int k;
     TERRIMPI_REFUSE(!terrimpi_finite(d->distance) || !terrimpi_finite(d->texel) ||
-                        !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
-                        d->cell_depth != d->cell_depth,
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
+                    d->cell_depth != d->cell_depth, TERRIMP_E_NOT_FINITE);
     for (k = 0; k < 2; k++) {
         float sum = d->cell_tan[k] + d->view_tan[k];
         TERRIMPI_REFUSE(!terrimpi_finite2(d->cell_size[k], sum), TERRIMP_E_NOT_FINITE);
         TERRIMPI_REFUSE(!(d->cell_size[k] >= 0.0f) || !(d->cell_tan[k] >= 0.0f) ||
-                            !(d->view_tan[k] > 0.0f),
-                        TERRIMP_E_RANGE);
+                        !(d->view_tan[k] > 0.0f), TERRIMP_E_RANGE);
     }
     TERRIMPI_REFUSE(!(d->distance > 0.0f) || !terrimpi_finite(1.0f / d->distance) ||
-                        !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
-                        !(d->tolerance_rad >= 0.0f),
-                    TERRIMP_E_RANGE);
+                    !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
+                    !(d->tolerance_rad >= 0.0f), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -18936,9 +18866,8 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->desc = *desc;
     TERRIMPI_DEFAULT(c->desc.quad_cost, 20u);
     TERRIMPI_REFUSE(!terrimpi_within_u32(desc->width, 1, 16384) || desc->gutter > 64u ||
-                        !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
-                        c->desc.quad_cost > 1u << 24,
-                    TERRIMP_E_RANGE);
+                    !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
+                    c->desc.quad_cost > 1u << 24, TERRIMP_E_RANGE);
     c->node_count = 0;
     c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
     c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
@@ -19011,8 +18940,7 @@ TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_l
     TERRIMPI_REFUSE(!atlas || !quads || !rects || !order, TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
-                            !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
-                        TERRIMP_E_RANGE);
+                        !terrimpi_within_u32(quads[i].texels.height, 1, 65536), TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
         rects[i] = quads[i].texels;
         rects[i].width += 2u * gutter;
@@ -19073,8 +19001,7 @@ static terrimp_result terrimpi_record_check(const terrimp_layer_record *r)
     TERRIMPI_REFUSE(!r || !r->layers || !r->picture || !r->masks, TERRIMP_E_NULL);
     return terrimpi_within_u32(r->width, 1, 16384) && terrimpi_within_u32(r->height, 1, 16384) &&
                    r->layers->count
-               ? TERRIMP_OK
-               : TERRIMP_E_RANGE;
+               ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 static uint32_t *terrimpi_record_row(const terrimp_layer_record *r, uint32_t layer, uint32_t y)
@@ -20067,8 +19994,7 @@ static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, 
                    terrimpi_within_u32(desc->height, 1, 16384) &&
                    terrimpi_within_u32(desc->layers, 1, 65535) &&
                    terrimpi_within(d->tolerance, 0.75f, 64.0f)
-               ? TERRIMP_OK
-               : TERRIMP_E_RANGE;
+               ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 /* Lays out the scratch memory, for cells and texels that have been counted. */
@@ -20112,8 +20038,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
     size_t needed;
     TERRIMPI_TRY(terrimpi_depth_check(desc, &d));
     TERRIMPI_REFUSE(!scratch || !mesh || !mesh->vertices || !mesh->indices || !mesh->sheets ||
-                        !mesh->texel_layers,
-                    TERRIMP_E_NULL);
+                    !mesh->texel_layers, TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     terrimpi_depth_cells(&d, 0);
     needed = terrimpi_depth_layout(&d, scratch);
@@ -20131,8 +20056,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
                    mesh->index_count > mesh->index_capacity ||
                    mesh->sheet_count > mesh->sheet_capacity ||
                    mesh->texel_count > mesh->texel_capacity
-               ? TERRIMP_E_CAPACITY
-               : TERRIMP_OK;
+               ? TERRIMP_E_CAPACITY : TERRIMP_OK;
 }
 
 /* --- layers all round a cell, and for all views of an object --- */
@@ -20180,8 +20104,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
     int k;
     TERRIMPI_REFUSE(!box || !counts, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-                        !terrimpi_finite2(texel, slope),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite2(texel, slope), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!(texel > 0.0f) || !(slope >= 1.0f), TERRIMP_E_RANGE);
     for (k = 0; k < 3; k++) {
         needed[k] = (box->max[k] - box->min[k]) * slope / texel;
@@ -20501,9 +20424,8 @@ static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
         const terrimp_place_candidate *c = &d->candidates[i];
         TERRIMPI_REFUSE(!terrimpi_finite(c->memory), TERRIMP_E_NOT_FINITE);
         TERRIMPI_REFUSE(!(c->memory > 0.0f) || c->cluster >= d->cluster_count ||
-                            c->first_gain > d->gain_count ||
-                            c->gain_count > d->gain_count - c->first_gain,
-                        TERRIMP_E_RANGE);
+                        c->first_gain > d->gain_count ||
+                        c->gain_count > d->gain_count - c->first_gain, TERRIMP_E_RANGE);
     }
     return TERRIMP_OK;
 }
@@ -20573,8 +20495,7 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     TERRIMPI_TRY(terrimpi_place_check(desc));
     TERRIMPI_REFUSE(bytes < terrimp_place_scratch_bytes(desc) ||
-                        !terrimpi_place_layout(desc, scratch, &p),
-                    TERRIMP_E_MEMORY);
+                    !terrimpi_place_layout(desc, scratch, &p), TERRIMP_E_MEMORY);
     p.costs = costs;
     p.shown = shown;
     memset(p.wish, 0, desc->candidate_count);
@@ -20883,18 +20804,16 @@ static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *d
     *d = *desc;
     TERRIMPI_DEFAULT(d->directions, 8u);
     TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
-                        !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
-                        !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
-                        !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
-                        !terrimpi_finite(d->texels_per_px),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
+                    !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
+                    !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
+                    !terrimpi_finite(d->texels_per_px), TERRIMP_E_NOT_FINITE);
     for (k = 0; k < 3; k++)
         TERRIMPI_REFUSE(d->eyes.min[k] > d->eyes.max[k], TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(d->cell_levels > 6u || d->directions > 64u ||
-                        !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
-                        d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f ||
-                        d->texels_per_px < 0.0f || d->draw_cost < 0.0f || d->triangle_cost < 0.0f,
-                    TERRIMP_E_RANGE);
+                    !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
+                    d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f || d->texels_per_px < 0.0f ||
+                    d->draw_cost < 0.0f || d->triangle_cost < 0.0f, TERRIMP_E_RANGE);
     d->tolerance_px = d->tolerance_px > 0.0f ? d->tolerance_px : 1.0f;
     d->max_angle_rad = d->max_angle_rad > 0.0f ? d->max_angle_rad : 0.1f;
     d->texels_per_px = d->texels_per_px > 0.0f ? d->texels_per_px : 1.0f;
@@ -20931,9 +20850,8 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare p;
     size_t needed;
     uint32_t i;
-    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains ||
-                        !set->parents || !set->costs,
-                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains || !set->parents ||
+                    !set->costs, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
     p.set = set;
@@ -20943,17 +20861,13 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare_gains(&p, 0);
     terrimpi_prepare_pictures(&p, 1);
     TERRIMPI_REFUSE(set->candidate_count > set->candidate_capacity ||
-                        set->gain_count > set->gain_capacity ||
-                        set->cluster_count > set->cluster_capacity ||
-                        set->view_count > set->view_capacity,
-                    TERRIMP_E_CAPACITY);
+                    set->gain_count > set->gain_capacity ||
+                    set->cluster_count > set->cluster_capacity ||
+                    set->view_count > set->view_capacity, TERRIMP_E_CAPACITY);
     terrimpi_prepare_gains(&p, 1);
-    for (i = 0; i < p.nodes; i++) {
-        terrimp_node n = terrimpi_tree_node(&p.desc.terrain->tree, i);
+    for (i = 0; i < p.nodes; i++)
         set->parents[i] = i + 1u == p.nodes
-                              ? i
-                              : terrimpi_tree_parent(&p.desc.terrain->tree, &n).number;
-    }
+                              ? i : terrimpi_tree_parent_number(&p.desc.terrain->tree, i);
     return TERRIMP_OK;
 }
 
@@ -20970,12 +20884,13 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
    0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
           have an alpha, the share of the pixels in the fade band; texture matrices and
           terrimp_texture_coordinates take positions relative to the eye of the picture;
-          exact_depth, endless and cost_limit, asked for by functions of their own, so that others
-          do not link what they need; terrimp_view_set; a hider, which hides what lies behind
+          exact_depth, endless, cost_limit and bound, asked for by functions of their own, so that
+          others do not link what they need; terrimp_view_set; a hider, which hides what lies behind
           ridges; statistics are counted when they are asked for; first what draws, then what
           builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement. Gone: the pair of
           atlases (a benchmark has it), evict, query, rect, reset and room of the live atlas, fitted
-          heights, stitched patterns, upper_skirts, terrimp_capture_rate, terrimp_heightfield_sample
+          heights, stitched patterns, upper_skirts, TERRIMP_NO_BOUND, terrimp_capture_rate,
+          terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any
    0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of

@@ -1262,6 +1262,7 @@ static terrimp_view_desc random_settings(int mode)
     d.tolerance_px = maybe(0.1f, 8.0f);
     d.ground_tolerance_px = maybe(0.1f, 8.0f);
     d.ground_rule = (int)random_range(0, TERRIMP_GEOMIP_RULE_COUNT - 1u);
+    d.bound = terrimp_geomip_bound();
     d.morph_ratio = random_range(0, 3) ? 0.0f : random_float(1.0f, 3.0f);
     d.fade_start = maybe(2.0f, 100.0f);
     d.fade_end = random_range(0, 1) && d.fade_start > 0.0f
@@ -2218,6 +2219,7 @@ static void geomip_draws_the_selection(void)
     d.mode = TERRIMP_MODE_GEOMIP;
     d.ground_tolerance_px = view.tolerance_px = 2.0f;
     d.ground_rule = view.rule = TERRIMP_GEOMIP_BOUND;
+    d.bound = terrimp_geomip_bound();
     d.morph_ratio = view.morph_ratio = 1.4f;
     CHECK(terrimp_quadtree_init(&l.desc.field, l.desc.chunk_quads, &tree) == TERRIMP_OK);
     tree.nodes = (terrimp_geomip_node *)flight_array(tree.node_count, sizeof *tree.nodes);
