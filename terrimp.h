@@ -1639,8 +1639,8 @@ typedef struct terrimp_impostor_command {
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain, with walls up to its outer border, without a gap. It comes after the
    impostors and shows only where none of them does: a slope that was hidden when its picture was
-   made. Its pixels are terrain in truth too: no holes are left. (An eye beside the terrain could see
-   some of it where the sky is, and one under the ground all of it: that is not drawn, and from
+   made. Its pixels are terrain in truth too: no holes are left. (An eye beside the terrain could
+   see some of it where the sky is, and one under the ground all of it: that is not drawn, and from
    beside nothing of it unless max_angle_rad is over 0.1.) Vertices and indices as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
@@ -10702,7 +10702,7 @@ static int terrimpi_view_has_slot(const terrimpi_frame *f, const terrimp_capture
            (float)(f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN);
 }
 
-/* Beyond which sides of the terrain a point lies, a bit each; where another one goes on it is none. */
+/* Beyond which sides of the terrain a point lies, a bit each: none where another one goes on. */
 static uint32_t terrimpi_view_beyond(const terrimpi_frame *f, const terrimp_box *box,
                                      const float point[3])
 {

@@ -642,7 +642,7 @@ static int flight_beside(const flight *f)
            eye[2] > box->max[2];
 }
 
-/* Where a line from an eye beside the terrain to a place within it comes in it is over the ground. */
+/* Where a line from an eye beside the terrain to a place within it comes in, it is over ground. */
 static void check_floor_is_behind_ground(const flight *f, const float place[3])
 {
     const terrimp_box *box = &f->l->info.box;
@@ -664,7 +664,7 @@ static void check_floor_is_behind_ground(const flight *f, const float place[3])
     CHECK(at[1] >= ground - 1e-4f * (fabsf(eye[1]) + fabsf(ground)));
 }
 
-/* The floor comes once, after all else; or parts of it, when the eye is beside the terrain, that are
+/* The floor comes once, after all else; or when the eye is beside the terrain parts of it, that are
    nowhere seen below its borders. */
 static void flight_draw_floor(void *user, const terrimp_floor_command *command)
 {
@@ -2774,8 +2774,9 @@ static void the_floor_is_seen_from_beside_behind_ground_alone(void)
             terrimp_camera camera = camera_beside(&l);
             for (k = 0; k < 3; k++)
                 camera.eye[k] = random_float(box->min[k] - side, box->max[k] + side);
-            camera.eye[axis] = random_range(0, 1) ? box->min[axis] - random_float(0.01f, 1.0f) * side
-                                                  : box->max[axis] + random_float(0.01f, 1.0f) * side;
+            camera.eye[axis] = random_range(0, 1)
+                                   ? box->min[axis] - random_float(0.01f, 1.0f) * side
+                                   : box->max[axis] + random_float(0.01f, 1.0f) * side;
             camera.eye[1] = high ? box->max[1] + 4.0f * (side + rise)
                                  : box->min[1] + random_float(-0.2f, 1.5f) * rise;
             for (k = 0; k < 3; k++)
