@@ -960,8 +960,7 @@ typedef struct terrimp_terrain_desc {
                                   [Default both 0 -> terrimp_terrain_build_begin finds them] */
 } terrimp_terrain_desc;
 
-/* What a host needs to know to make its buffers. Nodes are numbered level by level from the chunks
-   up, each level row by row, as in the geomipmap room: the last one is the root. */
+/* What a host needs to know to make its buffers. */
 typedef struct terrimp_terrain_info {
     uint32_t chunk_quads;
     uint32_t chunks_x, chunks_z;    /* nodes of level 0: node `n` stands in column n % chunks_x, row
@@ -1237,7 +1236,7 @@ TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
             0 for full resolution; a picture that is up to n pixels off its place: n / K
             [Limits: 0..0.5]
    low      [wu] the same whatever the distance [Limits: >= 0]
-   Errors   E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
+   Errors   those of terrimp_camera_resolve
    Cost     about 3 us */
 TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
                                                  const terrimp_camera *camera, float error,
@@ -1296,8 +1295,7 @@ TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrim
 
 /* Checks settings, fills in defaults. The codes are left as they are: zeros hide nothing.
 
-   tree     built; outlives the sets
-   Errors   E_RANGE, E_NOT_FINITE */
+   tree     built; outlives the sets */
 TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree);
 
 /* ==== Residency ========================================================== >>residency */
@@ -2396,7 +2394,6 @@ typedef struct terrimp_weights {
    reach      [texels] of a read to both sides: 1 when it is bilinear; with mipmaps up to level m
               1.5 times 2^m, so let the texture have no more of them [Limits: 1..65536]
    masks      [node_count] out
-   Errors     E_NULL, E_RANGE, E_NOT_FINITE; nothing is written
    Cost       O(count * texels)
    Source     Wagner 2003, "Materials" */
 TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
@@ -2487,7 +2484,6 @@ TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *des
    be built before. Different nodes of a level may be built at the same time by several threads.
 
    walls      [terrimp_walls_bytes] out: the part of this node; aligned to 4
-   Errors     E_NULL; E_ALIGN; E_RANGE
    Cost       about 20 us at level 0 with chunks of 64 quads, 3 us above */
 TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                     void *walls);
@@ -2495,7 +2491,7 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
 /* Finds those of all nodes that a rectangle of samples belongs to, after an edit or at first.
 
    samples    NULL: all
-   Errors     E_NULL; E_ALIGN; E_RANGE for a rectangle that is empty or outside
+   Errors     E_RANGE also for a rectangle that is empty or outside
    Cost       that of build_node for each: 0.05 ms for a chunk and all nodes above it */
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls);
@@ -2509,7 +2505,6 @@ TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
    walls      [terrimp_walls_bytes] built
    cell       [Limits: < nodes of cell_level]
    samples    after an edit: only the nodes are found anew whose sight lines meet it; NULL: all
-   Errors     E_NULL; E_ALIGN; E_RANGE
    Cost       10 ms for 256 nodes of 64 x 64 quads, 4 ms for those of 16 x 16
    Source     Wagner 2003 asks for them; monotony in height, cuts and their proof are our own */
 TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, const void *walls,
@@ -2518,7 +2513,6 @@ TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, con
 /* Forgets what an edit may have changed, in the frame of the edit: those nodes are not hidden any
    more. Building its cells anew, at leisure, with the same rectangle, finds them again.
 
-   Errors     E_NULL; E_RANGE
    Cost       20 ns for a cell and a node */
 TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
                                               const terrimp_rect *samples);
@@ -3080,15 +3074,6 @@ static size_t terrimpi_add(size_t a, size_t b, int *ok)
 #define TERRIMPI_FLOAT_MAX 3.402823466e38f
 #define TERRIMPI_ALIGN 8u /* of blocks of memory: pointers, and the simplifier's 64-bit sums */
 
-/* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
-static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
-{
-    size_t at = *offset;
-    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
-    *offset = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
-    return at;
-}
-
 /* A block of memory that is dealt out array by array: so one list of arrays serves both for laying
    them out and, without a base, for counting the bytes. */
 typedef struct terrimpi_arena {
@@ -3106,9 +3091,13 @@ static terrimpi_arena terrimpi_arena_at(void *base)
     return arena;
 }
 
+/* `count` items of `size` bytes, all aligned alike. */
 static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
 {
-    size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
+    int *ok = &arena->ok;
+    size_t at = arena->bytes;
+    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
+    arena->bytes = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
     return arena->base && arena->ok ? arena->base + at : NULL;
 }
 
@@ -5039,11 +5028,6 @@ static float terrimpi_mip_height(const terrimpi_mip_ground *g, uint32_t level, u
     return u < v ? a + v * (c - a) + u * (d - c) : a + u * (b - a) + v * (d - b);
 }
 
-static int terrimpi_mip_rule_fits(int rule)
-{
-    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT;
-}
-
 /* ---- selection ---- */
 
 /* One frame's selection. A point r from the eye, at depth z = forward . r, that is moved by e along
@@ -5420,7 +5404,7 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
                     !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(view->tolerance_px, view->morph_ratio) ||
                     !terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(view->rule) ||
+    TERRIMPI_REFUSE(view->rule < 0 || view->rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
                     !terrimpi_within(view->tolerance_px, 0.01f, 1000.0f) ||
                     !terrimpi_within(view->morph_ratio, 1.0f, TERRIMPI_MIP_MORPH_MOST) ||
                     !terrimpi_within(view->hysteresis, 0.0f, 1.0f), TERRIMP_E_RANGE);
@@ -10156,12 +10140,12 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         chunks *= d.wrap_tiles * d.wrap_tiles;
     TERRIMPI_DEFAULT(d.max_ground,
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
-    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
-                    !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
-                    (d.ground_rule == TERRIMP_GEOMIP_BOUND && !d.bound) || d.atlas_size < 64u ||
-                    d.atlas_size > 32768u || d.atlas_count > 16u ||
-                    d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    (d.max_cost > 0.0f && !d.cost_limit) ||
+    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
+                    d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+                    (d.ground_rule == TERRIMP_GEOMIP_BOUND && !d.bound) ||
+                    !(d.fade_end > d.fade_start) || d.atlas_size < 64u || d.atlas_size > 32768u ||
+                    d.atlas_count > 16u || d.max_impostors > 65534u || d.max_captures > 1024u ||
+                    d.joined > 15u || (d.max_cost > 0.0f && !d.cost_limit) ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
@@ -16913,18 +16897,22 @@ static uint32_t terrimpi_build_stale_words(const terrimp_terrain *t)
     return t->tree.node_count / 32u + 1u;
 }
 
+/* The one description of a terrain's block. */
+static size_t terrimpi_build_layout_block(terrimp_terrain *t, unsigned char *base)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t arrays = terrimpi_terrain_layout(t, NULL);
+    terrimpi_take(&b, 1, sizeof *t);
+    terrimpi_terrain_layout(t, (unsigned char *)terrimpi_take(&b, arrays, 1));
+    t->stale = (uint32_t *)terrimpi_take(&b, terrimpi_build_stale_words(t), sizeof *t->stale);
+    return b.ok && arrays ? b.bytes : 0;
+}
+
 TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
 {
     terrimp_terrain t;
-    size_t at = 0, arrays;
-    int ok = 1;
-    if (terrimp_terrain_desc_resolve(desc, &t.desc) != TERRIMP_OK)
-        return 0;
-    arrays = terrimpi_terrain_layout(&t, NULL);
-    terrimpi_place(&at, 1, sizeof t, &ok);
-    at = terrimpi_add(at, arrays, &ok);
-    at = terrimpi_add(at, terrimpi_build_stale_words(&t) * sizeof *t.stale, &ok);
-    return ok && arrays ? at : 0;
+    return terrimp_terrain_desc_resolve(desc, &t.desc) == TERRIMP_OK
+               ? terrimpi_build_layout_block(&t, NULL) : 0;
 }
 
 TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *desc)
@@ -16940,18 +16928,15 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
                                                 size_t bytes, terrimp_terrain **terrain)
 {
     terrimp_terrain t;
-    size_t needed, at = 0;
-    int ok = 1;
+    size_t needed;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     memset(&t, 0, sizeof t);
     TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &t.desc));
-    needed = terrimp_terrain_bytes(&t.desc);
+    needed = terrimpi_build_layout_block(&t, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
-    terrimpi_place(&at, 1, sizeof t, &ok);
-    at += terrimpi_terrain_layout(&t, (unsigned char *)memory + at);
-    t.stale = (uint32_t *)(void *)((unsigned char *)memory + at);
+    terrimpi_build_layout_block(&t, (unsigned char *)memory);
     *(terrimp_terrain *)memory = t;
     *terrain = (terrimp_terrain *)memory;
     return TERRIMP_OK;
