@@ -7352,29 +7352,19 @@ static float terrimpi_floor_lowest(const terrimp_terrain *t, uint32_t wall)
                    TERRIMP_OK ? low : t->sample_low;
 }
 
-/* The samples between which quad i of the floor lies, of its ground or its walls, in the order of
-   terrimpi_terrain_write_quads and terrimpi_terrain_write_wall. */
-static void terrimpi_floor_quad(const terrimp_terrain *t, uint32_t i, uint32_t low[2],
-                                uint32_t high[2])
+/* The samples of quad i of the floor, of its ground or its walls, in the order of
+   terrimpi_terrain_write_quads and terrimpi_terrain_write_wall; those of ground may reach over the
+   last ones. */
+static terrimp_rect terrimpi_floor_quad(const terrimp_terrain *t, uint32_t i)
 {
-    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level;
-    uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level], k;
-    if (i < wide * deep) {
-        uint32_t first = i / (TERRIMPI_TERRAIN_COLUMN * deep) * TERRIMPI_TERRAIN_COLUMN;
-        uint32_t width = terrimpi_min_u32(TERRIMPI_TERRAIN_COLUMN, wide - first);
-        i -= first * deep;
-        low[0] = (first + i % width) * quads, low[1] = i / width * quads;
-        high[0] = terrimpi_min_u32(low[0] + quads, t->desc.field.width - 1u);
-        high[1] = terrimpi_min_u32(low[1] + quads, t->desc.field.depth - 1u);
-        return;
-    }
-    terrimpi_floor_wall_place(t, i - wide * deep, &low[0], &low[1]);
-    terrimpi_floor_wall_place(t, i - wide * deep + 1u, &high[0], &high[1]);
-    for (k = 0; k < 2u; k++)
-        if (low[k] > high[k]) {
-            uint32_t other = low[k];
-            low[k] = high[k], high[k] = other;
-        }
+    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level, first, width;
+    uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level];
+    if (i >= wide * deep)
+        return terrimpi_floor_wall(t, i - wide * deep);
+    first = i / (TERRIMPI_TERRAIN_COLUMN * deep) * TERRIMPI_TERRAIN_COLUMN;
+    width = terrimpi_min_u32(TERRIMPI_TERRAIN_COLUMN, wide - first);
+    i -= first * deep;
+    return terrimpi_rect((first + i % width) * quads, i / width * quads, quads + 1u, quads + 1u);
 }
 
 /* Writes the floor and its walls. These stand on the outer border and face inwards, from below the
@@ -11863,17 +11853,16 @@ static int terrimpi_view_floor_shows(const terrimpi_frame *f, const terrimp_box 
     const terrimp_terrain *t = f->terrain;
     const terrimp_quadtree *tree = &t->tree;
     const float *eye = f->camera.eye;
-    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level, ends[2][2], side, k, n;
+    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level, k, n;
+    terrimp_rect samples = terrimpi_floor_quad(t, i);
     float at[2][3];
-    memset(at, 0, sizeof at);
-    terrimpi_floor_quad(t, i, ends[0], ends[1]);
-    for (k = 0; k < 2u; k++) {
-        at[k][0] = terrimpi_terrain_x(t, ends[k][0]);
-        at[k][2] = terrimpi_terrain_z(t, ends[k][1]);
-    }
-    for (side = 0; side < TERRIMP_SIDE_COUNT; side++) {
-        int is_x = side == TERRIMP_SIDE_X0 || side == TERRIMP_SIDE_X1, a = is_x ? 0 : 2, b = 2 - a;
-        int is_last = side == TERRIMP_SIDE_X1 || side == TERRIMP_SIDE_Z1;
+    int side;
+    at[0][0] = terrimpi_terrain_x(t, samples.x);
+    at[0][2] = terrimpi_terrain_z(t, samples.y);
+    at[1][0] = terrimpi_terrain_x(t, samples.x + samples.width - 1u);
+    at[1][2] = terrimpi_terrain_z(t, samples.y + samples.height - 1u);
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        int is_x = !terrimpi_along_x(side), a = is_x ? 0 : 2, b = 2 - a, is_last = side & 1;
         float border = is_last ? box->max[a] : box->min[a], from, to, in, height;
         float step = (float)quads * (is_x ? t->desc.field.spacing_z : t->desc.field.spacing_x);
         uint32_t count = is_x ? tree->level_z[level] : tree->level_x[level];
