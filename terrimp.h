@@ -10020,17 +10020,17 @@ typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
-    terrimp_camera camera;         /* resolved */
     float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
     float pixel_factor;            /* K from there */
     float side_px;                 /* pixels of a unit of a fitted frustum's side: K, too, or */
     int still;                     /* the camera is that of the frame before */
-    terrimp_frustum frustum;
     float middle[2];               /* [wu] the repetition of the eye, less the first one */
-    terrimpi_motion motion;
     float density;                 /* texels a pixel of what is captured */
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
+    terrimpi_motion motion;
+    terrimp_camera camera;         /* resolved */
+    terrimp_frustum frustum;
 } terrimpi_frame;
 
 /* From the closest of a frame's eyes to a box. */
@@ -10210,15 +10210,15 @@ typedef struct terrimpi_cache_slot_place {
 /* The picture of a node. */
 typedef struct terrimpi_cache_picture {
     terrimp_node node;
+    uint8_t layer_count;      /* 0: not made yet */
+    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
+    uint8_t expired;          /* the host wants it renewed, */
+    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
     uint32_t draw;            /* ... and its place on the list of that frame */
     uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
-    uint8_t layer_count;      /* 0: not made yet */
-    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
-    uint8_t expired;          /* the host wants it renewed, */
-    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture's plan */
     float angle_rad, parallax_px, urgency;
