@@ -177,7 +177,7 @@
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 36 KB of code at -Os on
-       a Cortex-M4, 33 KB without the two options that follow it above, if its linker drops
+       a Cortex-M4, 34 KB without the two options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -7373,7 +7373,6 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
 {
     terrimpi_floor f = terrimpi_floor_of(t);
     uint32_t ground = f.ground_vertices, first = f.ground_indices, points = f.wall_points, i, k;
-    terrimp_node root = terrimpi_tree_root(&t->tree);
     terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
@@ -7381,7 +7380,7 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
         float *top = xyz + 3u * (points + k);
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
-        xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
+        xyz[3u * k + 1u] = terrimpi_mesh_of(t, t->tree.node_count - 1u)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
         top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
                                : terrimpi_min(terrimpi_floor_lowest(t, k + points - 1u),
@@ -10031,6 +10030,7 @@ typedef struct terrimpi_frame {
     terrimpi_motion motion;
     terrimp_camera camera;         /* resolved */
     terrimp_frustum frustum;
+    terrimp_box all;               /* that is drawn of the terrain */
 } terrimpi_frame;
 
 /* From the closest of a frame's eyes to a box. */
@@ -10685,9 +10685,9 @@ static int terrimpi_view_has_slot(const terrimpi_frame *f, const terrimp_capture
 }
 
 /* Beyond which sides of the terrain a point lies, a bit each: none where another one goes on. */
-static uint32_t terrimpi_view_beyond(const terrimpi_frame *f, const terrimp_box *box,
-                                     const float point[3])
+static uint32_t terrimpi_view_beyond(const terrimpi_frame *f, const float point[3])
 {
+    const terrimp_box *box = &f->all;
     uint32_t beyond = 0;
     beyond |= point[2] < box->min[2] ? 1u << TERRIMP_SIDE_Z0 : 0u;
     beyond |= point[2] > box->max[2] ? 1u << TERRIMP_SIDE_Z1 : 0u;
@@ -10701,24 +10701,21 @@ static uint32_t terrimpi_view_beyond(const terrimpi_frame *f, const terrimp_box 
 static int terrimpi_view_through(const terrimpi_frame *f)
 {
     const float *forward = f->camera.forward;
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_capture c;
-    terrimp_box box;
     int corner, top, k;
     if (!(forward[1] < 0.0f))
         return 0;
     terrimpi_camera_capture(&f->camera, &c);
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
     for (corner = 0; corner < 4; corner++)
         for (top = 0; top < 2; top++) {
             float at[3], way;
             for (k = 0; k < 3; k++)
                 at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
                         c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
-            way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
+            way = ((top ? f->all.max[1] : f->all.min[1]) - at[1]) / forward[1];
             for (k = 0; k < 3; k++)
                 at[k] += forward[k] * way;
-            if (terrimpi_view_beyond(f, &box, at))
+            if (terrimpi_view_beyond(f, at))
                 return 0;
         }
     return 1;
@@ -10729,18 +10726,15 @@ static int terrimpi_view_through(const terrimpi_frame *f)
    terrain's outer border, or starts under the ground, does not. */
 static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
 {
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
-    terrimp_box box;
     float ground;
     uint32_t level;
     terrimp_heightfield here;
     terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
     result = terrimpi_terrain_ground(f->terrain, eye[0], eye[2], &here, &ground, &level);
     if (result == TERRIMP_E_MISS)
-        return !terrimpi_view_beyond(f, &box, eye);
+        return !terrimpi_view_beyond(f, eye);
     return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
 }
 
@@ -10748,12 +10742,8 @@ static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
    place, or the terrain no end. */
 static uint32_t terrimpi_view_beside(const terrimpi_frame *f)
 {
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
-    terrimp_box box;
-    if (f->camera.orthographic || f->terrain->real)
-        return 0;
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
-    return terrimpi_view_beyond(f, &box, f->camera.eye);
+    return f->camera.orthographic || f->terrain->real ? 0u
+                                                      : terrimpi_view_beyond(f, f->camera.eye);
 }
 
 /* Where a picture is made from: ahead of the eye, so that its error falls before it grows again;
@@ -11847,10 +11837,10 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
 /* Whether lines from the frame's eye to quad i of the floor come in over all ground of the sides
    that the eye is beyond: then they meet the ground before the floor. The lowest of them goes to
    the closest corner, and it is lower still if that lay at the lowest height of all. */
-static int terrimpi_view_floor_shows(const terrimpi_frame *f, const terrimp_box *box,
-                                     uint32_t beyond, uint32_t i)
+static int terrimpi_view_floor_shows(const terrimpi_frame *f, uint32_t beyond, uint32_t i)
 {
     const terrimp_terrain *t = f->terrain;
+    const terrimp_box *box = &f->all;
     const terrimp_quadtree *tree = &t->tree;
     const float *eye = f->camera.eye;
     uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level, k, n;
@@ -11896,12 +11886,9 @@ static uint32_t terrimpi_view_floor_run(const terrimp_view *v, terrimp_floor_com
 {
     uint32_t quads = terrimpi_floor_of(v->built).indices / 6u, i, shown = 0;
     uint32_t first = command->first_index, beyond = terrimpi_view_beside(&v->frame);
-    terrimp_node root = terrimpi_tree_root(&v->built->tree);
-    terrimp_box box;
-    terrimpi_terrain_node_box(v->built, &root, &box);
     command->index_count = 0;
     for (i = 0; i <= quads; i++) {
-        if (i < quads && (!beyond || terrimpi_view_floor_shows(&v->frame, &box, beyond, i))) {
+        if (i < quads && (!beyond || terrimpi_view_floor_shows(&v->frame, beyond, i))) {
             command->index_count += 6u;
         } else if (command->index_count) {
             command->first_index = first + 6u * i - command->index_count;
@@ -12393,15 +12380,14 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
 {
     terrimpi_frame f = *before;
     terrimp_node root = terrimpi_tree_root(&f.terrain->tree);
-    terrimp_box all;
     float step[3];
     uint32_t i;
     f.number++;
     f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
-    terrimpi_terrain_node_box(f.terrain, &root, &all);
-    f.pixel_factor = terrimpi_camera_stand(camera, &all, f.eye);
+    terrimpi_terrain_node_box(f.terrain, &root, &f.all);
+    f.pixel_factor = terrimpi_camera_stand(camera, &f.all, f.eye);
     f.side_px = terrimpi_camera_pixel_factor(camera);
     f.light_speed += (f.light_step - f.light_speed) / 16.0f;
     f.light_step = 0.0f;
