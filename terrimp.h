@@ -16886,6 +16886,7 @@ static size_t terrimpi_build_layout_block(terrimp_terrain *t, unsigned char *bas
 TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
 {
     terrimp_terrain t;
+    memset(&t, 0, sizeof t); /* an analyser cannot know that resolve fills in the rest */
     return terrimp_terrain_desc_resolve(desc, &t.desc) == TERRIMP_OK
                ? terrimpi_build_layout_block(&t, NULL) : 0;
 }
