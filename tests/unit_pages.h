@@ -1520,8 +1520,8 @@ static void pages_are_wanted_by_all_views(void)
 /* Pictures that stand for smaller ones. An eye comes closer when the finest two levels have been
    given up: what is too large for an impostor by then stays one, and is drawn while its picture is
    good. It is not made anew, but asks for the nodes that it stands for, before all that is only a
-   little coarse. When they have come nothing stands for others any more. With chunks of 64 impostors
-   are smaller than the nodes of ground that will do: then pictures alone ask for pages. */
+   little coarse. When they have come nothing stands for others any more. With chunks of 64,
+   impostors are smaller than the nodes of ground that will do: pictures alone ask for pages. */
 static void pictures_stand_for(uint32_t side, uint32_t chunk, float ground_px, float from,
                                float step, uint32_t *drawn)
 {
