@@ -156,7 +156,8 @@
        What moves on the terrain belongs into the host's own draws, not into captures. Ground and
        impostors of one place are alike to within the tolerances, not to the bit: where a node
        changes from one to the other beyond the fade band, that much can be seen to change. From
-       beside and from under the terrain no floor is drawn, since it would show where the sky is.
+       under the terrain no floor is drawn, and from beside it no more than is hidden by ground,
+       since it would show where the sky is.
 
    PORTING
        Needs a C99 or C++98 compiler with stdint.h, and memcpy, memset, memmove, memcmp, memchr.
@@ -171,13 +172,12 @@
          TERRIMP_NO_BUILD      no simplifier and no building: terrains are opened from bakes (also
                                before the API)
          TERRIMP_NO_SPLIT      views make no picture in two parts, as with no_splits
-         TERRIMP_NO_BOUND      no ground_rule BOUND: E_RANGE. DISTANCE keeps the same promise
          TERRIMP_NO_MORPH      no morph_ratio above 1: E_RANGE
          TERRIMP_NO_TROUBLE    no functions that name a wrong field (also before the API)
          TERRIMP_FIXED         Sorted gives out heights as integers (also before the API)
        No double, and no 64-bit division once a terrain is built (make sizes checks it). With
        TERRIMP_NO_BUILD a host that opens a bake, updates and renders links 36 KB of code at -Os on
-       a Cortex-M4, 33 KB without the three options that follow it above, if its linker drops
+       a Cortex-M4, 34 KB without the two options that follow it above, if its linker drops
        unused functions: -ffunction-sections for the compiler, --gc-sections for the linker. Small
        state: 257 x 257 samples in chunks of 16 from a bake, 24 pictures and 64 ground nodes, take
        under 32 KiB in all. Stack, however large the terrain: a frame takes 2.5 KB besides what the
@@ -621,6 +621,10 @@ typedef enum terrimp_geomip_rule {
     TERRIMP_GEOMIP_RULE_COUNT
 } terrimp_geomip_rule;
 
+/* What a view needs for BOUND, in its settings: a linker leaves it out where none does. */
+typedef struct terrimp_bound terrimp_bound;
+TERRIMP_API const terrimp_bound *terrimp_geomip_bound(void);
+
 typedef struct terrimp_geomip_draw {
     terrimp_node node;
     uint32_t pattern;
@@ -956,8 +960,7 @@ typedef struct terrimp_terrain_desc {
                                   [Default both 0 -> terrimp_terrain_build_begin finds them] */
 } terrimp_terrain_desc;
 
-/* What a host needs to know to make its buffers. Nodes are numbered level by level from the chunks
-   up, each level row by row, as in the geomipmap room: the last one is the root. */
+/* What a host needs to know to make its buffers. */
 typedef struct terrimp_terrain_info {
     uint32_t chunk_quads;
     uint32_t chunks_x, chunks_z;    /* nodes of level 0: node `n` stands in column n % chunks_x, row
@@ -1233,7 +1236,7 @@ TERRIMP_API terrimp_result terrimp_horizon_init(terrimp_horizon *horizon,
             0 for full resolution; a picture that is up to n pixels off its place: n / K
             [Limits: 0..0.5]
    low      [wu] the same whatever the distance [Limits: >= 0]
-   Errors   E_RANGE; E_NOT_FINITE; those of terrimp_camera_resolve
+   Errors   those of terrimp_camera_resolve
    Cost     about 3 us */
 TERRIMP_API terrimp_result terrimp_horizon_begin(terrimp_horizon *horizon,
                                                  const terrimp_camera *camera, float error,
@@ -1292,8 +1295,7 @@ TERRIMP_API size_t terrimp_sets_bytes(const terrimp_quadtree *tree, const terrim
 
 /* Checks settings, fills in defaults. The codes are left as they are: zeros hide nothing.
 
-   tree     built; outlives the sets
-   Errors   E_RANGE, E_NOT_FINITE */
+   tree     built; outlives the sets */
 TERRIMP_API terrimp_result terrimp_sets_init(terrimp_sets *sets, const terrimp_quadtree *tree);
 
 /* ==== Residency ========================================================== >>residency */
@@ -1533,6 +1535,7 @@ typedef struct terrimp_view_desc {
     float ground_tolerance_px; /* error of ground in GEOMIP and AUTO, by ground_rule
                                [Limits: 0.05..100] [Default 0 -> half of tolerance_px] */
     int ground_rule;        /* terrimp_geomip_rule */
+    const terrimp_bound *bound; /* (required for ground_rule BOUND) terrimp_geomip_bound() */
     float morph_ratio;      /* of ground in GEOMIP and AUTO: see terrimp_geomip_view
                                [Limits: 1..4] [Default 0 -> 1] */
     float fade_start;       /* [wu] from the eye: nodes that come closer are ground
@@ -1634,12 +1637,13 @@ typedef struct terrimp_impostor_command {
 /* Draw the floor, with the ground's own shading, opaque: a surface of a few triangles that lies
    below all of the terrain, with walls up to its outer border, without a gap. It comes after the
    impostors and shows only where none of them does: a slope that was hidden when its picture was
-   made. Its pixels are terrain in truth too: no holes are left. (An eye beside the terrain, or
-   under the ground, could see it where the sky is: there it is not drawn.) Vertices and indices as
-   for impostors. */
+   made. Its pixels are terrain in truth too: no holes are left. (An eye beside the terrain could
+   see some of it where the sky is, and one under the ground all of it: that is not drawn, and from
+   beside nothing of it unless max_angle_rad is over 0.1.) Vertices and indices as for impostors. */
 typedef struct terrimp_floor_command {
     uint32_t base_vertex;
-    uint32_t first_index;
+    uint32_t first_index; /* from mesh_index_count - floor_index_count on; for an eye beside the
+                             terrain there may be several parts, a command each */
     uint32_t index_count;
     float offset[2]; /* [wu] as for ground; one floor for each repetition */
 } terrimp_floor_command;
@@ -2390,7 +2394,6 @@ typedef struct terrimp_weights {
    reach      [texels] of a read to both sides: 1 when it is bilinear; with mipmaps up to level m
               1.5 times 2^m, so let the texture have no more of them [Limits: 1..65536]
    masks      [node_count] out
-   Errors     E_NULL, E_RANGE, E_NOT_FINITE; nothing is written
    Cost       O(count * texels)
    Source     Wagner 2003, "Materials" */
 TERRIMP_API terrimp_result terrimp_material_masks(const terrimp_quadtree *tree,
@@ -2481,7 +2484,6 @@ TERRIMP_API terrimp_result terrimp_pages_build_end(const terrimp_pages_desc *des
    be built before. Different nodes of a level may be built at the same time by several threads.
 
    walls      [terrimp_walls_bytes] out: the part of this node; aligned to 4
-   Errors     E_NULL; E_ALIGN; E_RANGE
    Cost       about 20 us at level 0 with chunks of 64 quads, 3 us above */
 TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree, uint32_t node,
                                                     void *walls);
@@ -2489,7 +2491,7 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
 /* Finds those of all nodes that a rectangle of samples belongs to, after an edit or at first.
 
    samples    NULL: all
-   Errors     E_NULL; E_ALIGN; E_RANGE for a rectangle that is empty or outside
+   Errors     E_RANGE also for a rectangle that is empty or outside
    Cost       that of build_node for each: 0.05 ms for a chunk and all nodes above it */
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls);
@@ -2503,7 +2505,6 @@ TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
    walls      [terrimp_walls_bytes] built
    cell       [Limits: < nodes of cell_level]
    samples    after an edit: only the nodes are found anew whose sight lines meet it; NULL: all
-   Errors     E_NULL; E_ALIGN; E_RANGE
    Cost       10 ms for 256 nodes of 64 x 64 quads, 4 ms for those of 16 x 16
    Source     Wagner 2003 asks for them; monotony in height, cuts and their proof are our own */
 TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, const void *walls,
@@ -2512,7 +2513,6 @@ TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, con
 /* Forgets what an edit may have changed, in the frame of the edit: those nodes are not hidden any
    more. Building its cells anew, at leisure, with the same rectangle, finds them again.
 
-   Errors     E_NULL; E_RANGE
    Cost       20 ns for a cell and a node */
 TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
                                               const terrimp_rect *samples);
@@ -2942,6 +2942,14 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
 
 #define TERRIMPI_INFINITY HUGE_VALF
 
+/* A function that compilers take to be as small as a call of it, but is not: it is called where
+   bytes count. */
+#if defined(__GNUC__) && defined(__OPTIMIZE_SIZE__)
+#define TERRIMPI_CALL __attribute__((noinline))
+#else
+#define TERRIMPI_CALL
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -2985,16 +2993,17 @@ static float terrimpi_float(float value)
 #endif
 }
 
-/* A float's bits but for the sign; infinity has TERRIMPI_INFINITE, and NaN has more. Told by bits,
-   since compilers may take every number for finite (-ffast-math). */
-#define TERRIMPI_INFINITE 0x7f800000u
-static uint32_t terrimpi_bits(float value)
+static uint32_t terrimpi_float_bits(float value)
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
-    return bits & 0x7fffffffu;
+    return bits;
 }
 
+/* But for the sign infinity has the bits TERRIMPI_INFINITE, and NaN has more. Told by bits, since
+   compilers may take every number for finite (-ffast-math). */
+#define TERRIMPI_INFINITE 0x7f800000u
+static uint32_t terrimpi_bits(float value) { return terrimpi_float_bits(value) & 0x7fffffffu; }
 static int terrimpi_finite(float value) { return terrimpi_bits(value) < TERRIMPI_INFINITE; }
 
 static int terrimpi_finite3(const float value[3])
@@ -3025,7 +3034,7 @@ static float terrimpi_abs(float a) { return TERRIMP_FABSF(a); }
 static uint32_t terrimpi_min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static uint32_t terrimpi_max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
-static float terrimpi_clamp(float value, float low, float high)
+static TERRIMPI_CALL float terrimpi_clamp(float value, float low, float high)
 {
     return value > low ? (value < high ? value : high) : low; /* NaN becomes low */
 }
@@ -3065,15 +3074,6 @@ static size_t terrimpi_add(size_t a, size_t b, int *ok)
 #define TERRIMPI_FLOAT_MAX 3.402823466e38f
 #define TERRIMPI_ALIGN 8u /* of blocks of memory: pointers, and the simplifier's 64-bit sums */
 
-/* Places `count` items of `size` bytes after `*offset`, all aligned alike. */
-static size_t terrimpi_place(size_t *offset, size_t count, size_t size, int *ok)
-{
-    size_t at = *offset;
-    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
-    *offset = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
-    return at;
-}
-
 /* A block of memory that is dealt out array by array: so one list of arrays serves both for laying
    them out and, without a base, for counting the bytes. */
 typedef struct terrimpi_arena {
@@ -3091,9 +3091,13 @@ static terrimpi_arena terrimpi_arena_at(void *base)
     return arena;
 }
 
+/* `count` items of `size` bytes, all aligned alike. */
 static void *terrimpi_take(terrimpi_arena *arena, size_t count, size_t size)
 {
-    size_t at = terrimpi_place(&arena->bytes, count, size, &arena->ok);
+    int *ok = &arena->ok;
+    size_t at = arena->bytes;
+    size_t bytes = terrimpi_add(terrimpi_mul(count, size, ok), TERRIMPI_ALIGN - 1u, ok);
+    arena->bytes = terrimpi_add(at, bytes - bytes % TERRIMPI_ALIGN, ok);
     return arena->base && arena->ok ? arena->base + at : NULL;
 }
 
@@ -3235,21 +3239,19 @@ typedef struct terrimpi_trouble_field {
 
 #define TERRIMPI_TROUBLE(type, field) {#field, offsetof(type, field), sizeof(((type *)0)->field)}
 
-/* Takes fields of a good descriptor for those of a bad one, one after the other, until it is good:
-   the last one was wrong. NULL when none was. */
-static const char *terrimpi_trouble(void *bad, const void *good,
-                                    const terrimpi_trouble_field *fields, size_t count,
-                                    terrimp_result (*resolve)(const void *context, void *desc),
-                                    const void *context)
-{
-    const char *name = NULL;
-    size_t i;
-    for (i = 0; i < count && resolve(context, bad) != TERRIMP_OK; i++) {
-        name = fields[i].name;
-        memcpy((char *)bad + fields[i].at, (const char *)good + fields[i].at, fields[i].bytes);
-    }
-    return name;
-}
+/* Takes fields of a good descriptor for those of a bad one, one after the other, until `resolve`
+   finds it good; returns the last one, which was wrong, or NULL when none was. */
+#define TERRIMPI_FIND_TROUBLE(fields, good, bad, resolve)                                          \
+    do {                                                                                           \
+        const char *name = NULL;                                                                   \
+        size_t i;                                                                                  \
+        for (i = 0; i < sizeof(fields) / sizeof *(fields) && (resolve) != TERRIMP_OK; i++) {       \
+            name = fields[i].name;                                                                 \
+            memcpy((char *)&bad + fields[i].at, (const char *)&good + fields[i].at,                \
+                   fields[i].bytes);                                                               \
+        }                                                                                          \
+        return name;                                                                               \
+    } while (0)
 
 #endif /* TERRIMP_NO_TROUBLE */
 
@@ -3487,6 +3489,13 @@ static terrimp_result terrimpi_field_scan_tile(const terrimp_heightfield *field,
     return TERRIMP_OK;
 }
 
+/* Whether a rectangle of samples has any that the field has, too. */
+static int terrimpi_field_has(const terrimp_heightfield *f, const terrimp_rect *samples)
+{
+    return samples->x < f->width && samples->y < f->depth && samples->width > 0 &&
+           samples->height > 0;
+}
+
 TERRIMP_API terrimp_result terrimp_heightfield_validate(const terrimp_heightfield *field,
                                                         uint32_t *x, uint32_t *z)
 {
@@ -3544,10 +3553,11 @@ TERRIMP_API terrimp_result terrimp_heightfield_bounds(const terrimp_heightfield 
                                                       float *low, float *high)
 {
     terrimp_heightfield f;
+    terrimp_rect samples = terrimpi_rect(x, z, cols, rows);
     TERRIMPI_TRY(terrimp_heightfield_resolve(field, &f));
     TERRIMPI_REFUSE(low == NULL || high == NULL, TERRIMP_E_NULL);
-    TERRIMPI_REFUSE(x >= f.width || z >= f.depth || cols == 0 || rows == 0, TERRIMP_E_RANGE);
-    return terrimpi_field_range(&f, terrimpi_rect(x, z, cols, rows), 1, low, high);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&f, &samples), TERRIMP_E_RANGE);
+    return terrimpi_field_range(&f, samples, 1, low, high);
 }
 
 /* ---- queries on the surface ---- */
@@ -3949,13 +3959,6 @@ TERRIMP_API terrimp_result terrimp_heightfield_raycast(const terrimp_heightfield
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_field_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_heightfield_resolve((const terrimp_heightfield *)desc,
-                                       (terrimp_heightfield *)desc);
-}
-
 TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *field)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -3979,8 +3982,7 @@ TERRIMP_API const char *terrimp_heightfield_trouble(const terrimp_heightfield *f
     good.samples = &good; /* aligned for any */
     good.width = good.depth = 2;
     bad = *field;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_field_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_heightfield_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -4053,12 +4055,6 @@ TERRIMP_API terrimp_result terrimp_camera_resolve(const terrimp_camera *camera, 
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_camera_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_camera_resolve((const terrimp_camera *)desc, (terrimp_camera *)desc);
-}
-
 TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -4077,8 +4073,7 @@ TERRIMP_API const char *terrimp_camera_trouble(const terrimp_camera *camera)
     good.width_px = good.height_px = 1;
     good.z_near = 1.0f;
     bad = *camera;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_camera_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_camera_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -4601,7 +4596,7 @@ struct terrimp_pages {
     float held[TERRIMP_QUADTREE_LEVELS]; /* of the last pages of a level, a running mean */
     int strays;                /* the view's walk may not come to all that it asks for */
     terrimp_want *wants;       /* [want_limit + 1] of this frame */
-    uint32_t want_count, want_limit;
+    uint32_t want_count, want_limit, want_first; /* first: of this update */
     const struct terrimpi_page_calls *calls;
 };
 
@@ -4621,12 +4616,13 @@ typedef struct terrimpi_page_need {
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
-    int (*want)(const terrimp_quadtree *t, const terrimp_node *node, int reason, float urgency);
+    int (*begin)(const terrimp_quadtree *t);
+    int (*want)(const terrimp_quadtree *t, uint32_t node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
                    const struct terrimpi_page_need *need);
-    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip);
+    uint32_t (*settle)(const terrimp_terrain *t, struct terrimpi_mip_frame *mip, int strays);
     void (*look_ahead)(const terrimp_terrain *t, const struct terrimpi_mip_frame *mip,
-                       const float away[3]);
+                       const float away[3], float times);
     struct terrimpi_mip_ground (*ground)(const terrimp_quadtree *t, const terrimp_node *node);
     terrimp_result (*at)(const terrimp_quadtree *t, float x, float z, terrimp_heightfield *ground,
                          uint32_t *level);
@@ -4761,11 +4757,6 @@ static void terrimpi_tree_enter(terrimpi_tree_walk *walk, const terrimpi_tree_vi
 #define TERRIMPI_MIP_MORPH_MOST 4.0f
 #else
 #define TERRIMPI_MIP_MORPH_MOST 1.0f
-#endif
-#ifndef TERRIMP_NO_BOUND
-#define TERRIMPI_MIP_HAS_BOUND 1
-#else
-#define TERRIMPI_MIP_HAS_BOUND 0
 #endif
 #define TERRIMPI_MIP_PICTURE_QUAD 4.0f /* [px] with quads of this size PICTURE goes by rms alone */
 
@@ -5037,12 +5028,6 @@ static float terrimpi_mip_height(const terrimpi_mip_ground *g, uint32_t level, u
     return u < v ? a + v * (c - a) + u * (d - c) : a + u * (b - a) + v * (d - b);
 }
 
-static int terrimpi_mip_rule_fits(int rule)
-{
-    return rule >= 0 && rule < (int)TERRIMP_GEOMIP_RULE_COUNT &&
-           (TERRIMPI_MIP_HAS_BOUND || rule != TERRIMP_GEOMIP_BOUND);
-}
-
 /* ---- selection ---- */
 
 /* One frame's selection. A point r from the eye, at depth z = forward . r, that is moved by e along
@@ -5060,20 +5045,25 @@ typedef struct terrimpi_mip_frame {
     float along, across;       /* largest tangents on the screen, in the direction in which y is
                                   seen there, and across it */
     float cos2;                /* square of the cosine between forward and the screen's corner */
-    int exact;                 /* BOUND */
+    const terrimp_bound *bound; /* for that rule; else NULL */
     float relief;              /* what measures are multiplied with */
     float whole;               /* [wu] so close to the eye all is split; below 0: all in sight */
     float factor;              /* pixels that errors count in */
     uint32_t first[TERRIMP_QUADTREE_LEVELS]; /* lists of marks; ends with node_count */
 } terrimpi_mip_frame;
 
+/* What only BOUND needs: what follows from the camera, and what D^2 is to be multiplied with. */
+struct terrimp_bound {
+    void (*begin)(terrimpi_mip_frame *f, const terrimp_camera *camera, float tan_x, float tan_y);
+    float (*factor)(const terrimpi_mip_frame *f, const terrimp_box *box, float distance2);
+};
+
 /* Sets up what depends on the camera alone. The screen is taken larger by the tolerance: a sample
    at its edge may be drawn that far outside. */
 static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera *camera,
                                     float margin)
 {
-    float right[3], seen[3], aside[3], tan_x = 0.0f, tan_y = 0.0f;
-    terrimpi_cross(camera->forward, camera->up, right);
+    float tan_x = 0.0f, tan_y = 0.0f;
     if (camera->orthographic)
         margin = 1.0f / 65536.0f; /* see terrimpi_camera_stand */
     else
@@ -5082,8 +5072,15 @@ static void terrimpi_mip_set_camera(terrimpi_mip_frame *f, const terrimp_camera 
     tan_y += margin;
     f->reach = camera->reach;
     f->cos2 = 1.0f / (1.0f + tan_x * tan_x + tan_y * tan_y);
-    if (!TERRIMPI_MIP_HAS_BOUND || !f->exact)
-        return;
+    if (f->bound)
+        f->bound->begin(f, camera, tan_x, tan_y);
+}
+
+static void terrimpi_mip_bound_begin(terrimpi_mip_frame *f, const terrimp_camera *camera,
+                                     float tan_x, float tan_y)
+{
+    float right[3], seen[3], aside[3];
+    terrimpi_cross(camera->forward, camera->up, right);
     memcpy(f->forward, camera->forward, sizeof f->forward);
     f->steep = f->forward[1];
     f->level = TERRIMP_SQRTF(f->forward[0] * f->forward[0] + f->forward[2] * f->forward[2]);
@@ -5130,11 +5127,11 @@ static float terrimpi_mip_stretch(const terrimpi_mip_frame *f, float p_min, floa
     return terrimpi_max(terrimpi_max(most, behind), 0.0f);
 }
 
-/* What D^2 is to be multiplied with: the square of the most pixels that a vertical error of
+/* The square of the most pixels that a vertical error of
    K^-1 shows as anywhere in a box. It changes continuously with the camera, and never grows from a
    box to a part of it. */
-static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
-                                      float distance2)
+static float terrimpi_mip_bound_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
+                                       float distance2)
 {
     float c[3], h[3], p, p_half, q_most, z, z2, far2 = 0.0f, a, b;
     int k;
@@ -5157,6 +5154,12 @@ static float terrimpi_mip_view_factor(const terrimpi_mip_frame *f, const terrimp
                              TERRIMP_SQRTF(far2));
     b = terrimpi_min(f->across * f->across, q_most * q_most / z2) * f->steep * f->steep;
     return (a * a + b) / z2 * 1.00001f; /* more than all rounding here */
+}
+
+TERRIMP_API const terrimp_bound *terrimp_geomip_bound(void)
+{
+    static const terrimp_bound calls = {terrimpi_mip_bound_begin, terrimpi_mip_bound_factor};
+    return &calls;
 }
 
 /* D of one node, squared, before its children have a say. */
@@ -5211,8 +5214,7 @@ static float terrimpi_mip_split_ratio(const terrimpi_mip_frame *f, const terrimp
     terrimpi_camera_grow(&box, f->reach);
     d2 = terrimpi_mip_distance2(&box, f->eye);
     split2 *= f->relief;
-    measure = TERRIMPI_MIP_HAS_BOUND && f->exact ? split2 * terrimpi_mip_view_factor(f, &box, d2)
-                                                 : split2 / d2;
+    measure = f->bound ? split2 * f->bound->factor(f, &box, d2) : split2 / d2;
     return measure < TERRIMPI_MIP_MOST ? measure : TERRIMPI_MIP_MOST; /* NaN: split it */
 }
 
@@ -5402,7 +5404,7 @@ static terrimp_result terrimpi_mip_view_resolve(const terrimp_quadtree *tree,
                     !terrimpi_tree_is_built(tree), TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite2(view->tolerance_px, view->morph_ratio) ||
                     !terrimpi_finite(view->hysteresis), TERRIMP_E_NOT_FINITE);
-    TERRIMPI_REFUSE(!terrimpi_mip_rule_fits(view->rule) ||
+    TERRIMPI_REFUSE(view->rule < 0 || view->rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
                     !terrimpi_within(view->tolerance_px, 0.01f, 1000.0f) ||
                     !terrimpi_within(view->morph_ratio, 1.0f, TERRIMPI_MIP_MORPH_MOST) ||
                     !terrimpi_within(view->hysteresis, 0.0f, 1.0f), TERRIMP_E_RANGE);
@@ -5423,7 +5425,6 @@ static void terrimpi_mip_mark(terrimpi_mip_frame *f, const terrimp_quadtree *tre
     terrimpi_camera_frustum(camera, &f->frustum);
     f->tree = tree;
     f->view = view;
-    f->exact = TERRIMPI_MIP_HAS_BOUND && view->rule == TERRIMP_GEOMIP_BOUND;
     f->relief = view->rule == TERRIMP_GEOMIP_PICTURE ? 1.0f / scale : 1.0f / (scale * scale);
     for (level = 0; level < tree->level_count; level++)
         f->first[level] = tree->node_count;
@@ -5440,6 +5441,7 @@ static terrimp_result terrimpi_mip_select(const terrimp_quadtree *tree, terrimp_
 {
     terrimpi_mip_frame f;
     f.whole = 0.0f;
+    f.bound = view->rule == TERRIMP_GEOMIP_BOUND ? terrimp_geomip_bound() : NULL;
     terrimpi_mip_mark(&f, tree, view, camera, 1.0f);
     terrimpi_mip_collect(&f);
     view->draw_count = view->draws_needed;
@@ -5808,8 +5810,7 @@ static terrimp_result terrimpi_impostor_check_eyes(const terrimp_box *box,
     TERRIMPI_REFUSE(!box || !captured_eye || !eye || !out, TERRIMP_E_NULL);
     return terrimpi_finite3(box->min) && terrimpi_finite3(box->max) &&
                    terrimpi_finite3(captured_eye) && terrimpi_finite3(eye)
-               ? TERRIMP_OK
-               : TERRIMP_E_NOT_FINITE;
+               ? TERRIMP_OK : TERRIMP_E_NOT_FINITE;
 }
 
 /* The functions of this room that a view calls check nothing; those of the API do. */
@@ -6431,7 +6432,8 @@ static uint32_t terrimpi_atlas_find(const terrimp_live_atlas *atlas, uint32_t wi
 }
 
 /* Length that the ranges [a, a + a_size] and [b, b + b_size] have in common. */
-static uint32_t terrimpi_atlas_shared(uint32_t a, uint32_t a_size, uint32_t b, uint32_t b_size)
+static TERRIMPI_CALL uint32_t terrimpi_atlas_shared(uint32_t a, uint32_t a_size, uint32_t b,
+                                                    uint32_t b_size)
 {
     uint32_t low = terrimpi_max_u32(a, b), high = terrimpi_min_u32(a + a_size, b + b_size);
     return high > low ? high - low : 0u;
@@ -6552,6 +6554,7 @@ TERRIMP_API terrimp_result terrimp_live_atlas_free(terrimp_live_atlas *atlas, ui
    change their byte order (room Bake). */
 
 #define TERRIMPI_TERRAIN_DIRECTIONS 8u           /* neighbours of a node */
+#define TERRIMPI_TERRAIN_COLUMN 14u      /* quads that are written side by side */
 #define TERRIMPI_FLOOR_QUADS 32u         /* along a side of the floor at most: 2048 triangles */
 #define TERRIMPI_FLOOR_WALL_POINTS 4u          /* of the walls round it, for each of these */
 #define TERRIMPI_MESH_UNDER (1.0f / 8192.0f) /* of a node's side: see terrimpi_mesh_under */
@@ -6652,13 +6655,6 @@ TERRIMP_API terrimp_result terrimp_terrain_desc_resolve(const terrimp_terrain_de
 
 #ifndef TERRIMP_NO_TROUBLE
 
-static terrimp_result terrimpi_terrain_try(const void *context, void *desc)
-{
-    (void)context;
-    return terrimp_terrain_desc_resolve((const terrimp_terrain_desc *)desc,
-                                        (terrimp_terrain_desc *)desc);
-}
-
 TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc *desc)
 {
     static const terrimpi_trouble_field fields[] = {
@@ -6675,8 +6671,7 @@ TERRIMP_API const char *terrimp_terrain_desc_trouble(const terrimp_terrain_desc 
         return terrimp_heightfield_trouble(&desc->field);
     memset(&good, 0, sizeof good);
     bad = *desc;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_terrain_try, NULL);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_terrain_desc_resolve(&bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -6850,8 +6845,8 @@ static float terrimpi_terrain_border_height(const terrimp_terrain *t, uint32_t s
 /* What a view does with a terrain that wraps: see terrimp_view_endless. */
 struct terrimp_endless {
     int (*fits)(const terrimp_terrain *built, const terrimp_view_desc *desc);
-    void (*begin)(terrimp_view *v, terrimp_terrain *t);
-    void (*layout)(terrimp_view *v, terrimpi_arena *l);
+    void (*begin)(const terrimp_terrain *built, uint32_t tiles, terrimp_terrain *t);
+    terrimp_terrain *(*layout)(terrimp_terrain *t, const terrimp_terrain *built, terrimpi_arena *l);
     void (*fill)(terrimp_terrain *t, const terrimp_terrain *built);
     void (*enter)(terrimp_view *v, terrimp_camera *camera, float middle[2]);
     terrimp_node (*place)(const terrimp_terrain *t, const terrimp_node *node,
@@ -6865,6 +6860,11 @@ static terrimp_node terrimpi_real_place(const terrimp_terrain *t, const terrimp_
 {
     return t->real ? t->endless->place(t, node, middle, offset) : *node;
 }
+
+/* Says in a command which node that is: the same names in those of all kinds. */
+#define TERRIMPI_COMMAND_NODE(command, place)                                                  \
+    ((command)->node = (place).number, (command)->level = (place).level,                     \
+     (command)->x = (place).x, (command)->z = (place).z)
 
 /* Vertex i of a node's mesh. */
 static terrimpi_mesh_point_steps terrimpi_mesh_point(const terrimp_terrain *t,
@@ -6924,7 +6924,7 @@ static terrimp_result terrimpi_check_page(const terrimp_terrain *terrain, uint32
 
 /* How far the skirts of a level's meshes end below all ground, and their borders are over it: see
    terrimpi_mesh_skirt_foot, terrimpi_build_lift_border. */
-static float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
+static TERRIMPI_CALL float terrimpi_mesh_under(const terrimp_terrain *t, uint32_t level)
 {
     return TERRIMPI_MESH_UNDER * (float)(t->desc.chunk_quads << level) *
            terrimpi_min(t->desc.field.spacing_x, t->desc.field.spacing_z);
@@ -7016,22 +7016,31 @@ static void terrimpi_terrain_touched_along(uint32_t first, uint32_t count, uint3
     *to = terrimpi_min_u32(last / side, nodes - 1u);
 }
 
+/* The same along both. */
+static terrimpi_terrain_touched terrimpi_terrain_touched_within(const terrimp_quadtree *t,
+                                                                const terrimp_rect *rect,
+                                                                uint32_t level, uint32_t margin)
+{
+    uint32_t side = t->chunk_quads << level;
+    terrimpi_terrain_touched out;
+    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->field.width,
+                                   t->level_x[level], &out.x0, &out.x1);
+    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->field.depth,
+                                   t->level_z[level], &out.z0, &out.z1);
+    return out;
+}
+
 /* What vertices move by hangs on the triangles of two levels above; errors, and how far down skirts
    reach, on what a finer neighbour draws next to the border. */
 static terrimpi_terrain_touched terrimpi_terrain_touched_nodes(const terrimp_terrain *t,
                                                                const terrimp_rect *rect,
                                                                uint32_t level, int morph)
 {
-    uint32_t side = t->desc.chunk_quads << level;
     uint32_t margin = morph ? 4u << level : (1u << level) / 2u;
-    terrimpi_terrain_touched out;
     if (t->tree.pages && level > t->tree.pages->block_level)
-        margin += side / 2u; /* errors are of whole nodes beside it, see terrimpi_paging_build */
-    terrimpi_terrain_touched_along(rect->x, rect->width, margin, side, t->desc.field.width,
-                                   t->tree.level_x[level], &out.x0, &out.x1);
-    terrimpi_terrain_touched_along(rect->y, rect->height, margin, side, t->desc.field.depth,
-                                   t->tree.level_z[level], &out.z0, &out.z1);
-    return out;
+        margin += (t->desc.chunk_quads << level) / 2u; /* errors are of whole nodes beside it, see
+                                                          terrimpi_paging_build */
+    return terrimpi_terrain_touched_within(&t->tree, rect, level, margin);
 }
 
 static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
@@ -7039,9 +7048,7 @@ static terrimp_result terrimpi_terrain_check_touched(const terrimp_terrain *t,
 {
     TERRIMPI_REFUSE(!t || !rect, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!t->built, TERRIMP_E_STATE);
-    TERRIMPI_REFUSE(rect->width == 0 || rect->height == 0 || rect->x >= t->desc.field.width ||
-                    rect->y >= t->desc.field.depth, TERRIMP_E_RANGE);
-    return TERRIMP_OK;
+    return terrimpi_field_has(&t->desc.field, rect) ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 TERRIMP_API terrimp_result terrimp_terrain_touched(const terrimp_terrain *terrain,
@@ -7160,15 +7167,15 @@ static uint32_t terrimpi_terrain_apron_pattern(uint32_t quads, uint32_t width, u
         direction : 0u;
 }
 
-/* Writes the triangles of a rectangle of quads in columns of 14 quads, row by row within a column,
-   so that a vertex cache of 16 entries still holds the row above. */
+/* Writes the triangles of a rectangle of quads in columns, row by row within a column, so that a
+   vertex cache of 16 entries still holds the row above. */
 static void terrimpi_terrain_write_quads(uint16_t *out, const terrimpi_terrain_pattern *p,
                                          uint32_t row_vertices)
 {
     uint32_t column, x, z;
-    for (column = p->x0; column < p->x1; column += 14u)
+    for (column = p->x0; column < p->x1; column += TERRIMPI_TERRAIN_COLUMN)
         for (z = p->z0; z < p->z1; z++)
-            for (x = column; x < terrimpi_min_u32(column + 14u, p->x1); x++) {
+            for (x = column; x < terrimpi_min_u32(column + TERRIMPI_TERRAIN_COLUMN, p->x1); x++) {
                 uint16_t a = (uint16_t)(z * row_vertices + x), b = (uint16_t)(a + row_vertices);
                 *out++ = a;
                 *out++ = b;
@@ -7326,18 +7333,38 @@ static void terrimpi_floor_wall_place(const terrimp_terrain *t, uint32_t k, uint
     *z = terrimpi_min_u32(row * quads / TERRIMPI_FLOOR_WALL_POINTS, t->desc.field.depth - 1u);
 }
 
-/* The lowest sample of a rectangle that two of its corners span. */
-static float terrimpi_terrain_lowest(const terrimp_terrain *t, const uint32_t a[2],
-                                     const uint32_t b[2])
+/* The samples below the walls from point k to the next one: one column or row. */
+static terrimp_rect terrimpi_floor_wall(const terrimp_terrain *t, uint32_t k)
+{
+    uint32_t a[2], b[2], x, z;
+    terrimpi_floor_wall_place(t, k, &a[0], &a[1]);
+    terrimpi_floor_wall_place(t, k + 1u, &b[0], &b[1]);
+    x = terrimpi_min_u32(a[0], b[0]);
+    z = terrimpi_min_u32(a[1], b[1]);
+    return terrimpi_rect(x, z, terrimpi_max_u32(a[0], b[0]) - x + 1u,
+                         terrimpi_max_u32(a[1], b[1]) - z + 1u);
+}
+
+static float terrimpi_floor_lowest(const terrimp_terrain *t, uint32_t wall)
 {
     float low, high;
-    terrimp_rect r;
-    r.x = terrimpi_min_u32(a[0], b[0]);
-    r.y = terrimpi_min_u32(a[1], b[1]);
-    r.width = terrimpi_max_u32(a[0], b[0]) - r.x + 1u;
-    r.height = terrimpi_max_u32(a[1], b[1]) - r.y + 1u;
-    return terrimpi_field_range(&t->desc.field, r, 0, &low, &high) == TERRIMP_OK
-               ? low : t->sample_low;
+    return terrimpi_field_range(&t->desc.field, terrimpi_floor_wall(t, wall), 0, &low, &high) ==
+                   TERRIMP_OK ? low : t->sample_low;
+}
+
+/* The samples of quad i of the floor, of its ground or its walls, in the order of
+   terrimpi_terrain_write_quads and terrimpi_terrain_write_wall; those of ground may reach over the
+   last ones. */
+static terrimp_rect terrimpi_floor_quad(const terrimp_terrain *t, uint32_t i)
+{
+    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level, first, width;
+    uint32_t wide = t->tree.level_x[level], deep = t->tree.level_z[level];
+    if (i >= wide * deep)
+        return terrimpi_floor_wall(t, i - wide * deep);
+    first = i / (TERRIMPI_TERRAIN_COLUMN * deep) * TERRIMPI_TERRAIN_COLUMN;
+    width = terrimpi_min_u32(TERRIMPI_TERRAIN_COLUMN, wide - first);
+    i -= first * deep;
+    return terrimpi_rect((first + i % width) * quads, i / width * quads, quads + 1u, quads + 1u);
 }
 
 /* Writes the floor and its walls. These stand on the outer border and face inwards, from below the
@@ -7346,21 +7373,18 @@ static void terrimpi_floor_write(const terrimp_terrain *t, float *xyz, uint16_t 
 {
     terrimpi_floor f = terrimpi_floor_of(t);
     uint32_t ground = f.ground_vertices, first = f.ground_indices, points = f.wall_points, i, k;
-    terrimp_node root = terrimpi_tree_root(&t->tree);
     terrimpi_floor_write_ground(t, xyz, indices);
     xyz += 3u * ground;
     for (k = 0; k < points; k++) {
-        uint32_t before[2], at[2], after[2];
+        uint32_t at[2];
         float *top = xyz + 3u * (points + k);
-        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
         terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
         xyz[3u * k] = top[0] = terrimpi_terrain_x(t, at[0]);
-        xyz[3u * k + 1u] = terrimpi_mesh_of(t, root.number)->low;
+        xyz[3u * k + 1u] = terrimpi_mesh_of(t, t->tree.node_count - 1u)->low;
         xyz[3u * k + 2u] = top[2] = terrimpi_terrain_z(t, at[1]);
         top[1] = t->tree.pages ? t->tree.pages->lows[ground + k]
-                               : terrimpi_min(terrimpi_terrain_lowest(t, before, at),
-                                              terrimpi_terrain_lowest(t, at, after));
+                               : terrimpi_min(terrimpi_floor_lowest(t, k + points - 1u),
+                                              terrimpi_floor_lowest(t, k));
     }
     terrimpi_terrain_write_wall(indices + first, points, points, 1);
     for (i = first; i < f.indices; i++)
@@ -7557,24 +7581,24 @@ static uint32_t terrimpi_bake_hash_word(uint32_t hash, uint32_t word)
     return (hash ^ word) * 16777619u;
 }
 
-static uint32_t terrimpi_bake_float_bits(float value)
+/* The hash of a block from its byte `from` on. Words are copied, since a float may not be looked at
+   as an integer. */
+static uint32_t terrimpi_bake_hash_from(const void *block, uint32_t from, uint32_t bytes)
 {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-/* The checksum of a bake. Words are copied, since a float may not be looked at as an integer. */
-static uint32_t terrimpi_bake_hash(const void *block)
-{
-    const unsigned char *at = (const unsigned char *)block + offsetof(terrimpi_bake, width);
-    uint32_t hash = 2166136261u, word, bytes;
-    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
-    for (bytes -= (uint32_t)offsetof(terrimpi_bake, width); bytes >= 4u; bytes -= 4u, at += 4) {
-        memcpy(&word, at, sizeof word);
+    uint32_t hash = 2166136261u, word;
+    for (; from + 4u <= bytes; from += 4u) {
+        memcpy(&word, (const unsigned char *)block + from, sizeof word);
         hash = terrimpi_bake_hash_word(hash, word);
     }
     return hash;
+}
+
+/* The checksum of a bake. */
+static uint32_t terrimpi_bake_hash(const void *block)
+{
+    uint32_t bytes;
+    memcpy(&bytes, (const unsigned char *)block + offsetof(terrimpi_bake, bytes), sizeof bytes);
+    return terrimpi_bake_hash_from(block, (uint32_t)offsetof(terrimpi_bake, width), bytes);
 }
 
 /* The checksum of a heightfield's samples, whatever their byte order and the length of rows. */
@@ -7584,7 +7608,7 @@ static uint32_t terrimpi_bake_hash_samples(const terrimp_heightfield *field)
     for (z = 0; z < field->depth; z++)
         for (x = 0; x < field->width; x++)
             hash = terrimpi_bake_hash_word(hash,
-                                           terrimpi_bake_float_bits(terrimpi_field_raw(field, x,
+                                           terrimpi_float_bits(terrimpi_field_raw(field, x,
                                                                                        z)));
     return hash;
 }
@@ -7659,7 +7683,7 @@ static uint32_t terrimpi_bake_edge_hash(uint32_t from, uint32_t to)
 }
 
 /* What an edge adds to the sum over a surface; the same edge the other way takes it off. */
-static uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
+static TERRIMPI_CALL uint32_t terrimpi_bake_edge_sum(uint32_t from, uint32_t to)
 {
     return terrimpi_bake_edge_hash(from, to) - terrimpi_bake_edge_hash(to, from);
 }
@@ -7696,25 +7720,40 @@ static int terrimpi_bake_corners_ok(const terrimp_terrain *t, const terrimpi_ter
     return edges == 0 && all == 2 * (int64_t)p->span_x * (int64_t)p->span_z;
 }
 
+/* Whether heights and errors of a node could be those of one. */
+static int terrimpi_bake_heights_ok(const terrimp_geomip_node *ground, const terrimpi_mesh *mesh)
+{
+    const float most = TERRIMPI_FLOAT_MAX;
+    return terrimpi_within(ground->error, 0.0f, most) && terrimpi_within(ground->rms, 0.0f, most) &&
+           terrimpi_within(mesh->error, 0.0f, most) &&
+           terrimpi_within(mesh->error_rms, 0.0f, most) &&
+           terrimpi_within(mesh->low, -most, most) &&
+           terrimpi_within(mesh->high, mesh->low, most) &&
+           terrimpi_within(ground->low, mesh->low, mesh->high) &&
+           terrimpi_within(ground->high, ground->low, mesh->high);
+}
+
+/* Whether a node's are held by those of its parent. */
+static int terrimpi_bake_heights_held(const terrimp_geomip_node *ground, const terrimpi_mesh *mesh,
+                                      const terrimp_geomip_node *above,
+                                      const terrimpi_mesh *mesh_above)
+{
+    return ground->low >= above->low && ground->high <= above->high &&
+           ground->error <= above->error && mesh->low >= mesh_above->low &&
+           mesh->high <= mesh_above->high;
+}
+
 /* Whether all numbers of one node are what building could have made. */
 static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
 {
-    const terrimp_geomip_node *ground = terrimpi_tree_kept(&t->tree, node);
     const terrimpi_mesh *mesh = terrimpi_mesh_of(t, node);
-    const float most = TERRIMPI_FLOAT_MAX;
     float slack = t->range_step + terrimpi_mesh_step(mesh); /* other machines round */
     uint32_t i, border = terrimpi_mesh_border(mesh), vertices = terrimpi_mesh_vertices(mesh);
     uint32_t triangles = terrimpi_mesh_triangles(mesh);
     terrimpi_terrain_tile p = terrimpi_terrain_tile_of(t, node);
-    if (!terrimpi_within(ground->error, 0.0f, most) || !terrimpi_within(ground->rms, 0.0f, most) ||
-        !terrimpi_within(mesh->error, 0.0f, most) ||
-        !terrimpi_within(mesh->error_rms, 0.0f, most) ||
-        !terrimpi_within(mesh->low, -most, most) || !terrimpi_within(mesh->high, mesh->low, most) ||
-        !terrimpi_within(ground->low, mesh->low, mesh->high) ||
-        !terrimpi_within(ground->high, ground->low, mesh->high))
-        return 0;
-    if (border < 4u || border > t->border_limit || vertices < border ||
-        vertices > t->vertex_limit || triangles < 2u || triangles > t->desc.triangle_budget)
+    if (!terrimpi_bake_heights_ok(terrimpi_tree_kept(&t->tree, node), mesh) || border < 4u ||
+        border > t->border_limit || vertices < border || vertices > t->vertex_limit ||
+        triangles < 2u || triangles > t->desc.triangle_budget)
         return 0;
     for (i = 0; i < vertices; i++) {
         terrimpi_mesh_point_steps point = terrimpi_mesh_point(t, &p, node, i);
@@ -7723,18 +7762,6 @@ static int terrimpi_bake_node_ok(const terrimp_terrain *t, uint32_t node)
             return 0;
     }
     return terrimpi_bake_loop_ok(t, &p, node) && terrimpi_bake_corners_ok(t, &p, node);
-}
-
-/* Whether a node is held by its parent. */
-static int terrimpi_bake_parent_ok(const terrimp_terrain *t, uint32_t node)
-{
-    uint32_t parent =
-        node + 1u < t->tree.node_count ? terrimpi_tree_parent_number(&t->tree, node) : node;
-    const terrimp_geomip_node *c = terrimpi_tree_kept(&t->tree, node);
-    const terrimp_geomip_node *p = terrimpi_tree_kept(&t->tree, parent);
-    return c->low >= p->low && c->high <= p->high && c->error <= p->error &&
-           terrimpi_mesh_of(t, node)->low >= terrimpi_mesh_of(t, parent)->low &&
-           terrimpi_mesh_of(t, node)->high <= terrimpi_mesh_of(t, parent)->high;
 }
 
 /* Checks a whole block and fills in a terrain from it. A resolved field has to be one that the bake
@@ -7760,7 +7787,11 @@ static terrimp_result terrimpi_bake_read(const void *block, size_t bytes,
                               field->height_offset != f->height_offset), TERRIMP_E_BAKE);
     terrimpi_bake_arrays_at(t, block);
     for (node = 0; node < t->tree.node_count; node++) {
-        if (!terrimpi_bake_node_ok(t, node) || !terrimpi_bake_parent_ok(t, node))
+        uint32_t above = node + 1u < t->tree.node_count
+                             ? terrimpi_tree_parent_number(&t->tree, node) : node;
+        if (!terrimpi_bake_node_ok(t, node) ||
+            !terrimpi_bake_heights_held(&t->tree.nodes[node], &t->meshes[node],
+                                        &t->tree.nodes[above], &t->meshes[above]))
             return TERRIMP_E_BAKE;
         triangles += terrimpi_mesh_triangles(terrimpi_mesh_of(t, node));
     }
@@ -8447,26 +8478,16 @@ static float terrimpi_horizon_draw_error(const terrimp_quadtree *tree,
     return error;
 }
 
-/* The two bounds that a horizon wants: close to the eye one of height, else one over distance. */
-static void terrimpi_horizon_draws_error(const terrimp_quadtree *tree,
-                                         const terrimp_geomip_view *view,
-                                         const float eye[3], float *error, float *low)
+/* Adds a node that may be drawn so far off to the two bounds that a horizon wants: close to the eye
+   one of height, else one over distance. */
+static void terrimpi_horizon_add_error(const terrimp_quadtree *tree, float off, float distance,
+                                       float *error, float *low)
 {
-    float side = (float)tree->chunk_quads *
-                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
-    uint32_t i;
-    *error = *low = 0.0f;
-    for (i = 0; i < view->draw_count; i++) {
-        float off = terrimpi_horizon_draw_error(tree, &view->draws[i],
-                                                view->morph_ratio > 1.0f), distance;
-        terrimp_box box;
-        terrimpi_mip_box(tree, &view->draws[i].node, &box);
-        distance = terrimp_box_distance(&box, eye);
-        if (distance < side)
-            *low = terrimpi_max(*low, off);
-        else
-            *error = terrimpi_max(*error, off / distance);
-    }
+    if (distance < (float)tree->chunk_quads *
+                       terrimpi_max(tree->field.spacing_x, tree->field.spacing_z))
+        *low = terrimpi_max(*low, off);
+    else
+        *error = terrimpi_max(*error, off / distance);
 }
 
 TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
@@ -8475,17 +8496,22 @@ TERRIMP_API terrimp_result terrimp_horizon_cull(terrimp_horizon *horizon,
 {
     const terrimp_quadtree *tree;
     terrimp_camera c;
-    float error, low;
+    float error = 0.0f, low = 0.0f, off;
     uint32_t i, count = 0;
     TERRIMPI_REFUSE(!horizon || !view || !view->draws, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &c));
     tree = horizon->hider.tree;
-    terrimpi_horizon_draws_error(tree, view, c.eye, &error, &low);
+    for (i = 0; i < view->draw_count; i++) {
+        terrimp_box box;
+        off = terrimpi_horizon_draw_error(tree, &view->draws[i], view->morph_ratio > 1.0f);
+        terrimpi_mip_box(tree, &view->draws[i].node, &box);
+        terrimpi_horizon_add_error(tree, off, terrimp_box_distance(&box, c.eye), &error, &low);
+    }
     terrimpi_horizon_begin(horizon, &c, terrimpi_min(error, 0.5f), low);
     horizon->blind |= error > 0.5f;
     for (i = 0; i < view->draw_count; i++) {
         const terrimp_geomip_draw *draw = &view->draws[i];
-        float off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
+        off = terrimpi_horizon_draw_error(tree, draw, view->morph_ratio > 1.0f);
         if (terrimpi_horizon_hides_node(horizon, &draw->node, off))
             view->triangle_count -= terrimpi_mip_triangles(tree->chunk_quads, draw->pattern);
         else
@@ -8644,14 +8670,9 @@ static uint32_t terrimpi_page_bytes(const terrimp_terrain *t)
 }
 
 /* The checksum of a page: of all but its first word. */
-static uint32_t terrimpi_page_hash(const unsigned char *page, uint32_t bytes)
+static uint32_t terrimpi_page_hash(const void *page, uint32_t bytes)
 {
-    uint32_t at, hash = 2166136261u, word;
-    for (at = 4u; at < bytes; at += 4u) {
-        memcpy(&word, page + at, sizeof word);
-        hash = terrimpi_bake_hash_word(hash, word);
-    }
-    return hash;
+    return terrimpi_bake_hash_from(page, 4u, bytes);
 }
 
 /* ---- where pages stand: the levels above the blocks, row by row; then block by block, each from
@@ -8700,16 +8721,8 @@ static uint64_t terrimpi_page_offset(const terrimp_terrain *t, uint32_t block_le
 
 static int terrimpi_record_ok(const terrimpi_record *r)
 {
-    const float most = TERRIMPI_FLOAT_MAX;
-    return terrimpi_within(r->ground.error, 0.0f, most) &&
-           terrimpi_within(r->ground.rms, 0.0f, most) &&
-           terrimpi_within(r->held, r->ground.rms, most) &&
-           terrimpi_within(r->mesh.error, 0.0f, most) &&
-           terrimpi_within(r->mesh.error_rms, 0.0f, most) &&
-           terrimpi_within(r->mesh.low, -most, most) &&
-           terrimpi_within(r->mesh.high, r->mesh.low, most) &&
-           terrimpi_within(r->ground.low, r->mesh.low, r->mesh.high) &&
-           terrimpi_within(r->ground.high, r->ground.low, r->mesh.high);
+    return terrimpi_bake_heights_ok(&r->ground, &r->mesh) &&
+           terrimpi_within(r->held, r->ground.rms, TERRIMPI_FLOAT_MAX);
 }
 
 /* Reads a header into a terrain, all but its memory. */
@@ -8892,9 +8905,8 @@ static int terrimpi_page_children_ok(const terrimp_terrain *t, const terrimp_nod
             continue;
         memcpy(&r, terrimpi_page_of(t->tree.pages, n->number) + TERRIMPI_PAGE_CHILDREN +
                        i * TERRIMPI_PAGE_RECORD, sizeof r);
-        if (!terrimpi_record_ok(&r) || r.ground.low < own->ground.low ||
-            r.ground.high > own->ground.high || r.ground.error > own->ground.error ||
-            r.mesh.low < own->mesh.low || r.mesh.high > own->mesh.high ||
+        if (!terrimpi_record_ok(&r) ||
+            !terrimpi_bake_heights_held(&r.ground, &r.mesh, &own->ground, &own->mesh) ||
             terrimpi_page_held_by(t->tree.pages->morph_ratio, r.held) > own->held)
             return 0;
         slot = terrimpi_page_slot_of(t->tree.pages, child.number);
@@ -9042,22 +9054,30 @@ static int terrimpi_page_list(struct terrimp_pages *p, const terrimp_node *node,
 
 /* Notes that a page is of use in this frame. If it is missing, it is wanted at an urgency above 0,
    and those above it up to the one that is here. Returns whether it is here itself. */
-static int terrimpi_page_want(const terrimp_quadtree *t, const terrimp_node *node, int reason,
-                              float urgency)
+static int terrimpi_page_want(const terrimp_quadtree *t, uint32_t node, int reason, float urgency)
 {
     struct terrimp_pages *p = t->pages;
-    terrimp_node n = *node;
+    uint32_t number = node;
     for (;;) {
-        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, n.number);
+        terrimpi_page_slot *slot = terrimpi_page_slot_of(p, number);
+        terrimp_node n;
         if (slot)
             slot->used = p->frame; /* or it might be given up for this */
         if (slot && slot->page)
-            return n.number == node->number;
+            return number == node;
+        n = terrimpi_tree_node(t, number);
         if ((!slot && urgency > 0.0f && !terrimpi_page_list(p, &n, reason, urgency)) ||
             n.level + 1u == t->level_count)
             return 0;
-        n = terrimpi_tree_parent(t, &n);
+        number = terrimpi_tree_parent(t, &n).number;
     }
+}
+
+/* Begins a view's update; returns 0 when the root's page is not here: then there is none. */
+static int terrimpi_page_begin(const terrimp_quadtree *t)
+{
+    t->pages->want_first = t->pages->want_count;
+    return terrimpi_page_want(t, t->node_count - 1u, TERRIMP_WANT_GROUND, 1e6f);
 }
 
 /* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
@@ -9095,7 +9115,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
     }
     below = *need;
     urgency = TERRIMP_SQRTF(need->urgency);
-    all = terrimpi_page_want(&t->tree, node, need->reason, urgency);
+    all = terrimpi_page_want(&t->tree, node->number, need->reason, urgency);
     for (i = 0; i < 4u && (all || need->urgency > 0.0f); i++) {
         if (!terrimpi_tree_quarter(&t->tree, node, i, &child) ||
             (!uses && terrimpi_page_of(p, child.number)))
@@ -9103,7 +9123,7 @@ static int terrimpi_page_divides(const terrimp_terrain *t, const terrimp_node *n
         terrimpi_page_box(t, &child, &box);
         if (terrimp_frustum_test(need->frustum, &box, TERRIMP_PLANES_ALL) ==
                 TERRIMP_PLANES_OUTSIDE ||
-            terrimpi_page_want(&t->tree, &child, need->reason, urgency))
+            terrimpi_page_want(&t->tree, child.number, need->reason, urgency))
             continue;
         if (all && !uses) { /* it does not come to them: once more */
             uses = 1;
@@ -9140,15 +9160,18 @@ static int terrimpi_page_has_around(const terrimpi_mip_frame *mip, const terrimp
 
 /* Joins the nodes again that cannot be split, since pages are missing: from the root down, so that
    neighbours still differ by one level at most. All that the split would need is wanted; and the
-   ground below the eye, which says whether it is over it. Returns how many are joined. */
-static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip)
+   ground below the eye, which says whether it is over it. Returns how many are joined. What a try
+   before this one wanted is of no use. */
+static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_frame *mip, int strays)
 {
     terrimpi_page_need need = {&mip->frustum, mip->eye, TERRIMP_WANT_GROUND, 1.0f, 0.0f};
     uint32_t level, number, late = 0;
     terrimp_node below;
+    t->tree.pages->want_count = t->tree.pages->want_first;
+    t->tree.pages->strays = strays;
     if (mip->eye[1] < terrimpi_tree_kept(&t->tree, t->tree.node_count - 1u)->high &&
         terrimp_quadtree_find(&t->tree, 0, mip->eye[0], mip->eye[2], &below) == TERRIMP_OK)
-        terrimpi_page_want(&t->tree, &below, TERRIMP_WANT_GROUND, 1.0f);
+        terrimpi_page_want(&t->tree, below.number, TERRIMP_WANT_GROUND, 1.0f);
     for (level = t->tree.level_count; level-- > 1u;)
         for (number = mip->first[level]; number != t->tree.node_count;
              number = mip->view->marks[number].next) {
@@ -9169,17 +9192,17 @@ static uint32_t terrimpi_page_settle(const terrimp_terrain *t, terrimpi_mip_fram
     return late;
 }
 
-/* Asks for the pages that ground will need when the eye has gone on by `away`. */
+/* Asks for the pages that ground will need when the eye has gone on by `away`, so many times. */
 static void terrimpi_page_look_ahead(const terrimp_terrain *t, const terrimpi_mip_frame *mip,
-                                     const float away[3])
+                                     const float away[3], float times)
 {
     terrimpi_page_need need = {&mip->frustum, NULL, TERRIMP_WANT_AHEAD, 0.0f, 0.0f};
     float eye[3];
     uint32_t i;
     for (i = 0; i < 3u; i++)
-        eye[i] = mip->eye[i] + away[i];
+        eye[i] = mip->eye[i] + away[i] * times;
     need.eye = eye;
-    for (i = 0; i < mip->view->draw_count; i++) {
+    for (i = 0; i < mip->view->draw_count && terrimpi_length(away) > 0.0f; i++) {
         const terrimp_geomip_draw *draw = &mip->view->draws[i];
         float error = draw->error_px / mip->view->tolerance_px;
         terrimp_box box;
@@ -9297,9 +9320,9 @@ TERRIMP_API terrimp_result terrimp_pages_open(const terrimp_heightfield *field, 
                                               size_t memory_bytes, terrimp_terrain **terrain)
 {
     static const terrimpi_page_calls calls = {
-        terrimpi_page_record,     terrimpi_page_want,        terrimpi_page_divides,
-        terrimpi_page_settle,     terrimpi_page_look_ahead,  terrimpi_page_ground,
-        terrimpi_page_at,         terrimpi_page_sample};
+        terrimpi_page_record, terrimpi_page_begin,      terrimpi_page_want,  terrimpi_page_divides,
+        terrimpi_page_settle, terrimpi_page_look_ahead, terrimpi_page_ground, terrimpi_page_at,
+        terrimpi_page_sample};
     terrimp_terrain t;
     terrimpi_pages_head head;
     struct terrimp_pages p;
@@ -9854,10 +9877,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     camera.z_far = terrimpi_capture_end(plan, layer);
     camera.eye[0] += middle[0];
     camera.eye[2] += middle[1];
-    command->node = place.number;
-    command->level = place.level;
-    command->x = place.x;
-    command->z = place.z;
+    TERRIMPI_COMMAND_NODE(command, place);
     command->part = layer;
     terrimp_capture_matrices(&camera, depth_zero_to_one, command->view, command->projection);
     memcpy(command->eye, camera.eye, sizeof command->eye);
@@ -9866,7 +9886,6 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
     command->clip_max[0] = plan->box.max[0] + border * field->spacing_x + middle[0];
     command->clip_max[1] = plan->box.max[2] + border * field->spacing_z + middle[1];
     callbacks->begin_capture(callbacks->user, command);
-    ground.level = plan->source;
     for (i = from / rows; i * rows < to; i++) {
         terrimp_node node = terrimpi_tree_node(&t->tree, draws[i].node);
         uint32_t first = terrimpi_max_u32(from, i * rows) - i * rows;
@@ -9874,9 +9893,7 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
         if (!terrimpi_capture_in_layer(t, plan, node.number, layer))
             continue;
         place = terrimpi_real_place(t, &node, middle, ground.offset);
-        ground.node = place.number;
-        ground.x = place.x;
-        ground.z = place.z;
+        TERRIMPI_COMMAND_NODE(&ground, place);
         ground.first_index = draws[i].first_index;
         ground.index_count = draws[i].index_count;
         if (last - first < rows)
@@ -9908,6 +9925,9 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_FINE 3.0f       /* ... and too small by this */
 #define TERRIMPI_VIEW_FILL 0.7f       /* of the atlases, that pictures in use may fill, */
 #define TERRIMPI_VIEW_SOFTEST 0.7f    /* ... with so much of texels_per_px at least */
+#define TERRIMPI_VIEW_BESIDE 0.1f     /* [rad] pictures that may turn by more than this have a floor
+                                         below them from beside, too: with less no frame of 46,000
+                                         had a hole that it would fill, and it takes 3 to 6 % */
 #define TERRIMPI_VIEW_LIFE 600.0f     /* [frames] of a picture at most, for the cost model */
 #define TERRIMPI_VIEW_FLIP 1.25f      /* how much cheaper another kind must be to be changed to */
 #define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
@@ -9999,18 +10019,18 @@ typedef struct terrimpi_frame {
     const terrimp_terrain *terrain;
     const terrimp_view_desc *desc; /* resolved */
     uint32_t number;               /* updates so far */
-    uint32_t wants;                /* of pages, before this update */
-    terrimp_camera camera;         /* resolved */
     float eye[3];                  /* that decisions are made from: see terrimpi_camera_stand */
     float pixel_factor;            /* K from there */
     float side_px;                 /* pixels of a unit of a fitted frustum's side: K, too, or */
     int still;                     /* the camera is that of the frame before */
-    terrimp_frustum frustum;
     float middle[2];               /* [wu] the repetition of the eye, less the first one */
-    terrimpi_motion motion;
     float density;                 /* texels a pixel of what is captured */
     float light[3], light_tolerance; /* of length 1; a chord; 0: light is no matter */
     float light_step, light_speed; /* the same since the last frame; a frame, a running mean */
+    terrimpi_motion motion;
+    terrimp_camera camera;         /* resolved */
+    terrimp_frustum frustum;
+    terrimp_box all;               /* that is drawn of the terrain */
 } terrimpi_frame;
 
 /* From the closest of a frame's eyes to a box. */
@@ -10021,18 +10041,10 @@ static float terrimpi_view_distance(const terrimpi_frame *f, const terrimp_box *
 
 /* ---- settings ---- */
 
-/* Impostors of a mode. */
-enum {
-    TERRIMPI_VIEW_IMPOSTORS_NEVER = 0,
-    TERRIMPI_VIEW_IMPOSTORS_ALWAYS, /* from the fade band on, each chunk, of its full resolution */
-    TERRIMPI_VIEW_IMPOSTORS_CHEAPER /* where they cost less than ground */
-};
-
+/* Whether there are impostors: always from the fade band on, or in AUTO where they cost less. */
 static int terrimpi_view_impostors(const terrimp_view_desc *d)
 {
-    return d->mode == TERRIMP_MODE_AUTO       ? TERRIMPI_VIEW_IMPOSTORS_CHEAPER
-           : d->mode == TERRIMP_MODE_IMPOSTOR ? TERRIMPI_VIEW_IMPOSTORS_ALWAYS
-                                              : TERRIMPI_VIEW_IMPOSTORS_NEVER;
+    return d->mode == TERRIMP_MODE_AUTO || d->mode == TERRIMP_MODE_IMPOSTOR;
 }
 
 /* Whether ground is drawn at its full resolution, else at a tolerance. */
@@ -10118,31 +10130,24 @@ TERRIMP_API terrimp_result terrimp_view_desc_resolve(const terrimp_terrain *terr
         chunks *= d.wrap_tiles * d.wrap_tiles;
     TERRIMPI_DEFAULT(d.max_ground,
                      terrimpi_view_full(&d) ? chunks : terrimpi_min_u32(chunks, 4096));
-    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT ||
-                    !terrimpi_mip_rule_fits(d.ground_rule) || !(d.fade_end > d.fade_start) ||
-                    d.atlas_size < 64u || d.atlas_size > 32768u || d.atlas_count > 16u ||
-                    d.max_impostors > 65534u || d.max_captures > 1024u || d.joined > 15u ||
-                    (d.max_cost > 0.0f && !d.cost_limit) ||
+    TERRIMPI_REFUSE(d.mode < 0 || d.mode >= (int)TERRIMP_MODE_COUNT || d.ground_rule < 0 ||
+                    d.ground_rule >= (int)TERRIMP_GEOMIP_RULE_COUNT ||
+                    (d.ground_rule == TERRIMP_GEOMIP_BOUND && !d.bound) ||
+                    !(d.fade_end > d.fade_start) || d.atlas_size < 64u || d.atlas_size > 32768u ||
+                    d.atlas_count > 16u || d.max_impostors > 65534u || d.max_captures > 1024u ||
+                    d.joined > 15u || (d.max_cost > 0.0f && !d.cost_limit) ||
                     !terrimpi_within_u32(d.max_slot, 12u, d.atlas_size), TERRIMP_E_RANGE);
     for (hider = d.hider; hider; hider = hider->next)
         TERRIMPI_REFUSE(hider->tree != &terrain->tree || !hider->begin || !hider->hides,
                         TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(terrain->tree.pages && d.morph_ratio > 1.0f &&
                     (d.morph_ratio > terrain->tree.pages->morph_ratio ||
-                     (d.ground_rule != TERRIMP_GEOMIP_PICTURE &&
-                      d.ground_rule != TERRIMP_GEOMIP_DEFAULT)), TERRIMP_E_RANGE);
+                     d.ground_rule != TERRIMP_GEOMIP_PICTURE), TERRIMP_E_RANGE);
     *out = d;
     return TERRIMP_OK;
 }
 
 #ifndef TERRIMP_NO_TROUBLE
-
-static terrimp_result terrimpi_view_try(const void *context, void *desc)
-{
-    return terrimp_view_desc_resolve((const terrimp_terrain *)context,
-                                     (const terrimp_view_desc *)desc,
-                                     (terrimp_view_desc *)desc);
-}
 
 TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain,
                                                   const terrimp_view_desc *desc)
@@ -10176,8 +10181,7 @@ TERRIMP_API const char *terrimp_view_desc_trouble(const terrimp_terrain *terrain
     memset(&good, 0, sizeof good);
     good.endless = terrimp_view_endless();
     bad = *desc;
-    return terrimpi_trouble(&bad, &good, fields, sizeof fields / sizeof *fields,
-                            terrimpi_view_try, terrain);
+    TERRIMPI_FIND_TROUBLE(fields, good, bad, terrimp_view_desc_resolve(terrain, &bad, &bad));
 }
 
 #endif /* TERRIMP_NO_TROUBLE */
@@ -10206,15 +10210,15 @@ typedef struct terrimpi_cache_slot_place {
 /* The picture of a node. */
 typedef struct terrimpi_cache_picture {
     terrimp_node node;
+    uint8_t layer_count;      /* 0: not made yet */
+    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
+    uint8_t expired;          /* the host wants it renewed, */
+    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t seen;            /* the last frame that had a use for it; 0: there is none */
     uint32_t listed;          /* the last frame that draws it, */
     uint32_t draw;            /* ... and its place on the list of that frame */
     uint32_t refused;         /* the last frame that found no room for it */
     uint32_t judged;          /* the last frame that `urgency` and what goes with it are of */
-    uint8_t layer_count;      /* 0: not made yet */
-    uint8_t layers_now;       /* when the impostors of the judged frame are drawn */
-    uint8_t expired;          /* the host wants it renewed, */
-    uint8_t lost;             /* ... or has said that it could not be made */
     uint32_t drawn_count;     /* frames that have drawn it since the capture */
     float eye[3];             /* of the capture's plan */
     float angle_rad, parallax_px, urgency;
@@ -10454,9 +10458,8 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
     const terrimp_heightfield *field = &f->terrain->desc.field;
     terrimpi_page_need need = {&f->frustum, f->eye, TERRIMP_WANT_GROUND, 0.0f, 0.0f};
     const struct terrimp_pages *pages = f->terrain->tree.pages;
-    int impostors = terrimpi_view_impostors(f->desc);
     float side, sides = terrimpi_max(2.0f, f->pixel_factor / f->desc->impostor_px);
-    if (impostors == TERRIMPI_VIEW_IMPOSTORS_NEVER || closest < f->desc->fade_start)
+    if (!terrimpi_view_impostors(f->desc) || closest < f->desc->fade_start)
         return 0;
     if (f->camera.reach > 0.0f &&
         f->camera.reach > terrimpi_view_sine(f, node->number, closest) * closest)
@@ -10468,7 +10471,7 @@ static int terrimpi_cull_impostor(const terrimpi_frame *f, const terrimp_node *n
         return 0;
     side = (float)(f->terrain->desc.chunk_quads << node->level) *
            terrimpi_max(field->spacing_x, field->spacing_z);
-    if (impostors != TERRIMPI_VIEW_IMPOSTORS_ALWAYS &&
+    if (f->desc->mode == TERRIMP_MODE_AUTO &&
         closest >= sides * (has_picture ? side / TERRIMPI_VIEW_STAY : side))
         return 1;
     return smallest || !pages || pages->calls->divides(f->terrain, node, &need)
@@ -10520,13 +10523,12 @@ static int terrimpi_cull_cuts(const terrimpi_frame *f, const terrimpi_cache *cac
     if (!(*done & TERRIMPI_CULL_GROUND) && terrimpi_cull_ground(mip, node)) {
         cuts = terrimpi_cull_shows_ground(f, mip, node, planes) ? TERRIMPI_CULL_GROUND : 0;
         *done |= TERRIMPI_CULL_GROUND;
-        if (closest < f->desc->fade_start ||
-            terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_NEVER)
+        if (closest < f->desc->fade_start || !terrimpi_view_impostors(f->desc))
             *done |= TERRIMPI_CULL_IMPOSTOR;
     }
     if (*done & TERRIMPI_CULL_IMPOSTOR)
         return cuts;
-    smallest = *done && terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_CHEAPER &&
+    smallest = *done && f->desc->mode == TERRIMP_MODE_AUTO &&
                terrimpi_mesh_lift(f->terrain->desc.chunk_quads) < 2u;
     impostor = terrimpi_cull_impostor(
         f, node, closest, cache->of_node[node->number] != TERRIMPI_CACHE_NO_PICTURE,
@@ -10596,21 +10598,16 @@ static void terrimpi_cull_begin_hiders(const terrimpi_cull *cull, const terrimpi
 {
     terrimp_hider *hider;
     const terrimp_quadtree *tree = &f->terrain->tree;
-    float side = (float)tree->chunk_quads *
-                 terrimpi_max(tree->field.spacing_x, tree->field.spacing_z);
     float error = 0.0f, low = 0.0f;
     uint32_t i;
     for (i = 0; i < cull->count && !full; i++) {
         terrimp_node n = terrimpi_tree_node(tree, cull->nodes[i].number);
-        float off = terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f);
-        if (!(cull->nodes[i].cuts & TERRIMPI_CULL_GROUND))
-            continue;
-        if (cull->nodes[i].closest < side)
-            low = terrimpi_max(low, off);
-        else
-            error = terrimpi_max(error, off / cull->nodes[i].closest);
+        if (cull->nodes[i].cuts & TERRIMPI_CULL_GROUND)
+            terrimpi_horizon_add_error(
+                tree, terrimpi_horizon_node_error(tree, &n, f->desc->morph_ratio > 1.0f),
+                cull->nodes[i].closest, &error, &low);
     }
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_NEVER)
+    if (terrimpi_view_impostors(f->desc))
         error = terrimpi_max(error, TERRIMPI_VIEW_STALE * f->desc->tolerance_px / f->pixel_factor);
     for (hider = f->desc->hider; hider; hider = hider->next)
         hider->blind = 2.0f * error > 0.5f || !hider->begin(hider, &f->camera, 2.0f * error, low);
@@ -10672,7 +10669,7 @@ static uint32_t terrimpi_view_source(const terrimpi_frame *f, const terrimp_node
                                      float closest, int *is_known)
 {
     *is_known = 1;
-    if (terrimpi_view_impostors(f->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (f->desc->mode == TERRIMP_MODE_IMPOSTOR)
         return 0;
     return terrimpi_capture_source(&f->terrain->tree, node,
                                    TERRIMPI_CAPTURE_SOURCE_TEXELS * closest /
@@ -10687,16 +10684,16 @@ static int terrimpi_view_has_slot(const terrimpi_frame *f, const terrimp_capture
            (float)(f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN);
 }
 
-/* Whether a point lies over the terrain, or beyond sides where another one goes on. */
-static int terrimpi_view_inside(const terrimpi_frame *f, const terrimp_box *box,
-                                const float point[3])
+/* Beyond which sides of the terrain a point lies, a bit each: none where another one goes on. */
+static uint32_t terrimpi_view_beyond(const terrimpi_frame *f, const float point[3])
 {
+    const terrimp_box *box = &f->all;
     uint32_t beyond = 0;
     beyond |= point[2] < box->min[2] ? 1u << TERRIMP_SIDE_Z0 : 0u;
     beyond |= point[2] > box->max[2] ? 1u << TERRIMP_SIDE_Z1 : 0u;
     beyond |= point[0] < box->min[0] ? 1u << TERRIMP_SIDE_X0 : 0u;
     beyond |= point[0] > box->max[0] ? 1u << TERRIMP_SIDE_X1 : 0u;
-    return (beyond & ~f->desc->joined) == 0;
+    return beyond & ~f->desc->joined;
 }
 
 /* Whether all rays of an orthographic camera come in through the top of the terrain's box, and go
@@ -10704,24 +10701,21 @@ static int terrimpi_view_inside(const terrimpi_frame *f, const terrimp_box *box,
 static int terrimpi_view_through(const terrimpi_frame *f)
 {
     const float *forward = f->camera.forward;
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
     terrimp_capture c;
-    terrimp_box box;
     int corner, top, k;
     if (!(forward[1] < 0.0f))
         return 0;
     terrimpi_camera_capture(&f->camera, &c);
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
     for (corner = 0; corner < 4; corner++)
         for (top = 0; top < 2; top++) {
             float at[3], way;
             for (k = 0; k < 3; k++)
                 at[k] = c.eye[k] + c.right[k] * (corner & 1 ? c.tan_right : c.tan_left) +
                         c.up[k] * (corner & 2 ? c.tan_up : c.tan_down);
-            way = ((top ? box.max[1] : box.min[1]) - at[1]) / forward[1];
+            way = ((top ? f->all.max[1] : f->all.min[1]) - at[1]) / forward[1];
             for (k = 0; k < 3; k++)
                 at[k] += forward[k] * way;
-            if (!terrimpi_view_inside(f, &box, at))
+            if (terrimpi_view_beyond(f, at))
                 return 0;
         }
     return 1;
@@ -10732,19 +10726,24 @@ static int terrimpi_view_through(const terrimpi_frame *f)
    terrain's outer border, or starts under the ground, does not. */
 static int terrimpi_view_over(const terrimpi_frame *f, const float eye[3])
 {
-    terrimp_node root = terrimpi_tree_root(&f->terrain->tree);
-    terrimp_box box;
     float ground;
     uint32_t level;
     terrimp_heightfield here;
     terrimp_result result;
     if (f->camera.orthographic)
         return terrimpi_view_through(f);
-    terrimpi_terrain_node_box(f->terrain, &root, &box);
     result = terrimpi_terrain_ground(f->terrain, eye[0], eye[2], &here, &ground, &level);
     if (result == TERRIMP_E_MISS)
-        return terrimpi_view_inside(f, &box, eye);
+        return !terrimpi_view_beyond(f, eye);
     return result == TERRIMP_OK && eye[1] - f->camera.reach >= ground;
+}
+
+/* Beyond which sides of the terrain the frame's eye is, as terrimpi_view_beyond; 0 where it has no
+   place, or the terrain no end. */
+static uint32_t terrimpi_view_beside(const terrimpi_frame *f)
+{
+    return f->camera.orthographic || f->terrain->real ? 0u
+                                                      : terrimpi_view_beyond(f, f->camera.eye);
 }
 
 /* Where a picture is made from: ahead of the eye, so that its error falls before it grows again;
@@ -11028,7 +11027,7 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
         &l, ground + impostors + (v->tiled ? v->desc.wrap_tiles * v->desc.wrap_tiles : 1u),
         sizeof *v->draws.items);
     if (v->tiled)
-        v->desc.endless->layout(v, &l);
+        v->terrain = v->tiled = v->desc.endless->layout(v->tiled, v->built, &l);
     return l.ok && slots ? l.bytes : 0;
 }
 
@@ -11038,8 +11037,11 @@ static void terrimpi_view_begin(terrimp_view *v, const terrimp_terrain *terrain,
 {
     v->terrain = v->built = terrain;
     v->tiled = NULL;
-    if (terrain->desc.field.wrap)
-        v->desc.endless->begin(v, tiled);
+    if (!terrain->desc.field.wrap)
+        return;
+    v->desc.endless->begin(terrain, v->desc.wrap_tiles, tiled);
+    tiled->endless = v->desc.endless;
+    v->terrain = v->tiled = tiled;
 }
 
 TERRIMP_API size_t terrimp_view_bytes(const terrimp_terrain *terrain, const terrimp_view_desc *desc)
@@ -11158,13 +11160,11 @@ static int terrimpi_tiled_fits(const terrimp_terrain *built, const terrimp_view_
            rows * d->wrap_tiles < TERRIMP_MAX_DIM;
 }
 
-static void terrimpi_tiled_begin(terrimp_view *v, terrimp_terrain *t)
+static void terrimpi_tiled_begin(const terrimp_terrain *built, uint32_t tiles, terrimp_terrain *t)
 {
-    terrimp_heightfield field = v->built->desc.field;
-    v->terrain = v->tiled = t;
-    *t = *v->built;
-    t->tiles = v->desc.wrap_tiles;
-    t->endless = v->desc.endless;
+    terrimp_heightfield field = built->desc.field;
+    *t = *built;
+    t->tiles = tiles;
     field.origin_x -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 0);
     field.origin_z -= (float)(t->tiles / 2u) * terrimpi_field_period(&field, 1);
     field.width = (field.width - 1u) * t->tiles + 1u;
@@ -11192,19 +11192,20 @@ static void terrimpi_tiled_fill(terrimp_terrain *t, const terrimp_terrain *real)
     }
 }
 
-static void terrimpi_tiled_layout(terrimp_view *v, terrimpi_arena *l)
+/* Lays it out and fills it in, if there is memory; returns where it is then. */
+static terrimp_terrain *terrimpi_tiled_layout(terrimp_terrain *t, const terrimp_terrain *built,
+                                              terrimpi_arena *l)
 {
-    size_t nodes = v->tiled->tree.node_count;
-    terrimp_terrain *t = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *t);
-    terrimp_terrain made = *v->tiled;
+    size_t nodes = t->tree.node_count;
+    terrimp_terrain *to = (terrimp_terrain *)terrimpi_take(l, 1, sizeof *to), made = *t;
     made.real = (uint32_t *)terrimpi_take(l, nodes, sizeof *made.real);
     made.meshes = (terrimpi_mesh *)terrimpi_take(l, nodes, sizeof *made.meshes);
     made.tree.nodes = (terrimp_geomip_node *)terrimpi_take(l, nodes, sizeof *made.tree.nodes);
-    if (!t)
-        return;
-    *t = made;
-    terrimpi_tiled_fill(t, v->built);
-    v->terrain = v->tiled = t;
+    if (!to)
+        return t;
+    *to = made;
+    terrimpi_tiled_fill(to, built);
+    return to;
 }
 
 static terrimp_node terrimpi_tiled_place(const terrimp_terrain *t, const terrimp_node *node,
@@ -11513,8 +11514,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
 {
     struct terrimp_pages *pages = f->terrain->tree.pages;
     terrimpi_mip_frame mip;
-    uint32_t i;
     mip.whole = 0.0f;
+    mip.bound = v->desc.ground_rule == TERRIMP_GEOMIP_BOUND ? v->desc.bound : NULL;
     if (terrimpi_view_full(&v->desc) && pages) { /* not all is here: to be balanced */
         const terrimp_heightfield *field = &f->terrain->desc.field;
         mip.whole = v->desc.mode == TERRIMP_MODE_FULL
@@ -11530,11 +11531,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         float most = TERRIMPI_VIEW_COARSEST / v->desc.ground_tolerance_px;
         float scale = terrimpi_min(v->ground_scale, most);
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
-        if (pages) {
-            pages->want_count = f->wants; /* those of a try before are of no use */
-            pages->strays = f->desc->hider != NULL;
-            v->late = pages->calls->settle(f->terrain, &mip);
-        }
+        if (pages)
+            v->late = pages->calls->settle(f->terrain, &mip, f->desc->hider != NULL);
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most || mip.whole < 0.0f)
@@ -11543,13 +11541,9 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
     }
     terrimpi_regions_make(f, &v->cull, &v->ground,
                           mip.whole < 0.0f && v->late == 0 ? NULL : &mip, &v->regions);
-    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f) {
-        float ahead[3];
-        for (i = 0; i < 3u; i++)
-            ahead[i] = f->motion.away[0][i] * (TERRIMPI_VIEW_SOON / f->motion.frames[0]);
-        if (terrimpi_length(ahead) > 0.0f)
-            pages->calls->look_ahead(f->terrain, &mip, ahead);
-    }
+    if (pages && !f->desc->no_lookahead && f->motion.frames[0] > 0.0f)
+        pages->calls->look_ahead(f->terrain, &mip, f->motion.away[0],
+                                 TERRIMPI_VIEW_SOON / f->motion.frames[0]);
     return TERRIMP_OK;
 }
 
@@ -11616,21 +11610,21 @@ static void terrimpi_region_measure(const terrimpi_frame *f, const terrimpi_cach
     }
 }
 
-static int terrimpi_view_ground_estimate(const terrimp_view *v, const terrimpi_region *region,
+static int terrimpi_view_ground_estimate(const terrimpi_frame *f, const terrimpi_region *region,
                                          terrimpi_region_offer *offer)
 {
-    const terrimp_costs *costs = &v->desc.costs;
-    float quads = (float)v->terrain->desc.chunk_quads;
+    const terrimp_costs *costs = &f->desc->costs;
+    float quads = (float)f->terrain->desc.chunk_quads;
     offer->draw = (float)region->ground_count * terrimpi_cost_draw(costs, 2.0f * quads * quads) +
                   terrimpi_cost_shading(region->pixels, costs->ground_px, costs->impostor_px);
     offer->upkeep = 0.0f;
     return 1;
 }
 
-static int terrimpi_view_impostor_estimate(const terrimp_view *v, const terrimpi_region *region,
+static int terrimpi_view_impostor_estimate(const terrimpi_frame *f, const terrimpi_region *region,
                                            terrimpi_region_offer *offer)
 {
-    const terrimp_costs *costs = &v->desc.costs;
+    const terrimp_costs *costs = &f->desc->costs;
     const terrimpi_candidate *c = region->candidates;
     uint32_t i;
     offer->draw = offer->upkeep = 0.0f;
@@ -11685,7 +11679,7 @@ static int terrimpi_view_impostor_add(const terrimpi_frame *f, terrimpi_cache *c
 {
     terrimpi_cache_picture *p = terrimpi_cache_find(cache, node->number);
     const terrimp_quadtree *tree = &f->terrain->tree;
-    if (!p || (tree->pages && !tree->pages->calls->want(tree, node, 0, 0.0f)))
+    if (!p || (tree->pages && !tree->pages->calls->want(tree, node->number, 0, 0.0f)))
         return 0;
     if (p->listed == f->number) {
         list->items[p->draw].alpha = 1.0f;
@@ -11734,7 +11728,7 @@ static int terrimpi_candidate_list(const terrimpi_frame *f, terrimpi_cache *cach
     if (terrimpi_view_impostor_add(f, cache, &node, list))
         return 1;
     list->waiting++;
-    if (terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER)
+    if (f->desc->mode != TERRIMP_MODE_AUTO)
         return 0;
     if (terrimpi_view_impostor_add_children(f, cache, &node, list))
         return 1;
@@ -11791,10 +11785,7 @@ static void terrimpi_view_ground_emit(const terrimp_view *v, const terrimpi_view
     terrimpi_view_ground_pattern(v, draw->index, &pattern);
     memset(&command, 0, sizeof command);
     place = terrimpi_real_place(v->terrain, &ground->node, v->frame.middle, command.offset);
-    command.node = place.number;
-    command.level = place.level;
-    command.x = place.x;
-    command.z = place.z;
+    TERRIMPI_COMMAND_NODE(&command, place);
     command.first_index = pattern.first_index;
     command.index_count = pattern.index_count;
     command.morph = ground->morph;
@@ -11815,10 +11806,7 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     terrimpi_mesh_place(v->terrain, picture->node.number, &mesh);
     memset(&command, 0, sizeof command);
     place = terrimpi_real_place(v->terrain, &picture->node, v->frame.middle, command.offset);
-    command.node = place.number;
-    command.level = place.level;
-    command.x = place.x;
-    command.z = place.z;
+    TERRIMPI_COMMAND_NODE(&command, place);
     command.part_count = picture->layer_count;
     command.base_vertex = mesh.base_vertex;
     command.first_index = mesh.first_index;
@@ -11846,16 +11834,84 @@ static void terrimpi_view_impostor_emit(const terrimp_view *v, const terrimpi_vi
     }
 }
 
+/* Whether lines from the frame's eye to quad i of the floor come in over all ground of the sides
+   that the eye is beyond: then they meet the ground before the floor. The lowest of them goes to
+   the closest corner, and it is lower still if that lay at the lowest height of all. */
+static int terrimpi_view_floor_shows(const terrimpi_frame *f, uint32_t beyond, uint32_t i)
+{
+    const terrimp_terrain *t = f->terrain;
+    const terrimp_box *box = &f->all;
+    const terrimp_quadtree *tree = &t->tree;
+    const float *eye = f->camera.eye;
+    uint32_t level = t->floor_level, quads = t->desc.chunk_quads << level, k, n;
+    terrimp_rect samples = terrimpi_floor_quad(t, i);
+    float at[2][3];
+    int side;
+    at[0][0] = terrimpi_terrain_x(t, samples.x);
+    at[0][2] = terrimpi_terrain_z(t, samples.y);
+    at[1][0] = terrimpi_terrain_x(t, samples.x + samples.width - 1u);
+    at[1][2] = terrimpi_terrain_z(t, samples.y + samples.height - 1u);
+    for (side = 0; side < (int)TERRIMP_SIDE_COUNT; side++) {
+        int is_x = !terrimpi_along_x(side), a = is_x ? 0 : 2, b = 2 - a, is_last = side & 1;
+        float border = is_last ? box->max[a] : box->min[a], from, to, in, height;
+        float step = (float)quads * (is_x ? t->desc.field.spacing_z : t->desc.field.spacing_x);
+        uint32_t count = is_x ? tree->level_z[level] : tree->level_x[level];
+        uint32_t last = (is_x ? tree->level_x[level] : tree->level_z[level]) - 1u;
+        if (!(beyond & 1u << side))
+            continue;
+        from = TERRIMPI_FLOAT_MAX, to = -TERRIMPI_FLOAT_MAX, height = TERRIMPI_FLOAT_MAX;
+        for (k = 0; k < 4u; k++) { /* its corners: where, and how low, the lines come in */
+            in = (border - eye[a]) / (at[k % 2u][a] - eye[a]);
+            height = terrimpi_min(height, eye[1] + in * (box->min[1] - eye[1]));
+            in = eye[b] + in * (at[k / 2u][b] - eye[b]) - box->min[b];
+            from = terrimpi_min(from, in), to = terrimpi_max(to, in);
+        }
+        if (to < -0.001f * step || from > box->max[b] - box->min[b] + 0.001f * step)
+            continue; /* they come in over another side */
+        n = (uint32_t)terrimpi_clamp(from / step, 0.0f, (float)(count - 1u));
+        for (; n < count && (float)n * step <= to + 0.001f * step; n++) {
+            uint32_t x = is_x ? (is_last ? last : 0u) : n, z = is_x ? n : is_last ? last : 0u;
+            if (height < (tree->nodes ? tree->nodes[terrimpi_tree_at(tree, level, x, z).number].high
+                                      : box->max[1]))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* Draws what may be seen of the floor, in runs of quads, or counts it when `callbacks` is NULL;
+   returns its triangles. */
+static uint32_t terrimpi_view_floor_run(const terrimp_view *v, terrimp_floor_command *command,
+                                        const terrimp_callbacks *callbacks, uint32_t *draws)
+{
+    uint32_t quads = terrimpi_floor_of(v->built).indices / 6u, i, shown = 0;
+    uint32_t first = command->first_index, beyond = terrimpi_view_beside(&v->frame);
+    command->index_count = 0;
+    for (i = 0; i <= quads; i++) {
+        if (i < quads && (!beyond || terrimpi_view_floor_shows(&v->frame, beyond, i))) {
+            command->index_count += 6u;
+        } else if (command->index_count) {
+            command->first_index = first + 6u * i - command->index_count;
+            shown += command->index_count / 3u;
+            ++*draws;
+            if (callbacks)
+                callbacks->draw_floor(callbacks->user, command);
+            command->index_count = 0;
+        }
+    }
+    return shown;
+}
+
 static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_draw *draw,
                                      const terrimp_callbacks *callbacks)
 {
     terrimp_floor_command command;
+    uint32_t draws = 0;
     if (!callbacks->draw_floor)
         return;
     memset(&command, 0, sizeof command);
     command.base_vertex = terrimpi_mesh_places(v->built) * v->terrain->vertex_stride;
     command.first_index = terrimpi_mesh_places(v->built) * v->terrain->index_stride;
-    command.index_count = terrimpi_floor_of(v->built).indices;
     if (v->terrain->real) { /* its first chunk says of which repetition */
         uint32_t tiles = v->terrain->tiles;
         terrimp_node first = terrimpi_tree_at(&v->terrain->tree, 0, draw->index % tiles *
@@ -11863,13 +11919,13 @@ static void terrimpi_view_floor_emit(const terrimp_view *v, const terrimpi_view_
                                               v->built->tree.level_z[0]);
         terrimpi_real_place(v->terrain, &first, v->frame.middle, command.offset);
     }
-    callbacks->draw_floor(callbacks->user, &command);
+    terrimpi_view_floor_run(v, &command, callbacks, &draws);
 }
 
 /* What can show a region. */
 typedef struct terrimpi_view_kind {
     /* What it costs; returns 0 when it cannot show the region. */
-    int (*estimate)(const terrimp_view *v, const terrimpi_region *region,
+    int (*estimate)(const terrimpi_frame *f, const terrimpi_region *region,
                     terrimpi_region_offer *offer);
     /* Whether it can do so in this frame, before captures. */
     int (*ready)(const terrimpi_region *region);
@@ -11896,40 +11952,40 @@ typedef struct terrimpi_frame_sums {
 
 /* Decides what shows a region: what costs least; what did so before, unless another is cheaper by
    TERRIMPI_VIEW_FLIP. Adds it to the frame's sums. */
-static void terrimpi_view_decide(terrimp_view *v, terrimpi_region *region,
+static void terrimpi_view_decide(const terrimpi_frame *f, const terrimpi_cache *cache,
+                                 uint8_t *kind_of, terrimpi_region *region,
                                  terrimpi_frame_sums *sums)
 {
     terrimpi_region_offer offers[TERRIMPI_VIEW_KIND_SHOWS];
     int possible[TERRIMPI_VIEW_KIND_SHOWS], kind, best = TERRIMPI_VIEW_KIND_GROUND;
-    int before = v->kind_of[region->node];
+    int before = kind_of[region->node];
     float total[TERRIMPI_VIEW_KIND_SHOWS];
     uint32_t i;
     int is_known = !region->kind;
-    terrimpi_region_measure(&v->frame, &v->cache, region);
+    terrimpi_region_measure(f, cache, region);
     for (kind = 0; kind < TERRIMPI_VIEW_KIND_SHOWS; kind++) {
-        possible[kind] = terrimpi_view_kinds[kind].estimate(v, region, &offers[kind]);
+        possible[kind] = terrimpi_view_kinds[kind].estimate(f, region, &offers[kind]);
         total[kind] = offers[kind].draw + offers[kind].upkeep;
         if (possible[kind] && total[kind] < total[best])
             best = kind;
     }
     if (possible[before] && total[before] < total[best] * TERRIMPI_VIEW_FLIP)
         best = before;
-    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] &&
-        terrimpi_view_impostors(&v->desc) == TERRIMPI_VIEW_IMPOSTORS_ALWAYS)
+    if (possible[TERRIMPI_VIEW_KIND_IMPOSTOR] && f->desc->mode == TERRIMP_MODE_IMPOSTOR)
         best = TERRIMPI_VIEW_KIND_IMPOSTOR;
     region->kind = (uint8_t)best;
     for (i = 0; i < region->candidate_count; i++)
         is_known &= region->candidates[i].is_known &&
                     !region->candidates[i].is_short;
     if (is_known) /* else a page that comes later must not find it settled */
-        v->kind_of[region->node] = (uint8_t)best;
+        kind_of[region->node] = (uint8_t)best;
     sums->spread += offers[best].upkeep;
     sums->drawn += offers[terrimpi_view_kinds[best].ready(region) ? best : 0].draw;
     for (i = 0; i < region->candidate_count && best == TERRIMPI_VIEW_KIND_IMPOSTOR; i++) {
         const terrimpi_candidate *c = &region->candidates[i];
         sums->pixels += c->pixels;
         if (c->picture)
-            c->picture->seen = v->frame.number;
+            c->picture->seen = f->number;
     }
 }
 
@@ -11956,8 +12012,7 @@ static int terrimpi_view_split(const terrimpi_frame *f, const terrimpi_capture_p
     float sine = terrimpi_view_sine(f, plan->node.number, closest);
     float overlap = terrimpi_capture_overlap(f->terrain, plan);
     terrimp_split split;
-    if (f->desc->no_splits || f->camera.orthographic ||
-        terrimpi_view_impostors(f->desc) != TERRIMPI_VIEW_IMPOSTORS_CHEAPER ||
+    if (f->desc->no_splits || f->camera.orthographic || f->desc->mode != TERRIMP_MODE_AUTO ||
         !(sine * closest > 0.0f) ||
         2.0f * overlap >
             TERRIMPI_VIEW_SPLIT_OVERLAP * (plan->camera.z_far - plan->camera.z_near))
@@ -11980,10 +12035,8 @@ static int terrimpi_capture_has_pages(const terrimp_quadtree *t, const terrimpi_
 {
     int reason = urgency < 1.0f ? TERRIMP_WANT_AHEAD : TERRIMP_WANT_PICTURE, all = 1;
     uint32_t i;
-    for (i = 0; i < count && t->pages; i++) {
-        terrimp_node node = terrimpi_tree_node(t, draws[i].node);
-        all &= t->pages->calls->want(t, &node, reason, terrimpi_min(urgency, 2.0f));
-    }
+    for (i = 0; i < count && t->pages; i++)
+        all &= t->pages->calls->want(t, draws[i].node, reason, terrimpi_min(urgency, 2.0f));
     *late += all ? 0u : 1u;
     return all;
 }
@@ -12202,27 +12255,20 @@ static void terrimpi_spending_add(const terrimpi_frame *f, const terrimpi_job *j
     p->urgency = terrimpi_view_error(f, &p->node, job->plan.eye, &p->angle_rad, &p->parallax_px);
 }
 
-/* Asks for the pages of a picture that has to wait: so they come meanwhile, and stay. */
-static void terrimpi_view_await(terrimp_view *v, const terrimpi_candidate *c)
-{
-    terrimpi_job job;
-    if (v->terrain->tree.pages && (c->urgency >= 1.0f || c->is_short))
-        terrimpi_job_prepare(v, c, 0, &job);
-}
-
 /* Takes the capture of a candidate as the next job, whole or its first piece, if the limits allow.
    Returns 0 when it is put off. */
 static int terrimpi_view_take(terrimp_view *v, const terrimpi_candidate *c, terrimpi_spending *s)
 {
     const terrimp_view_desc *d = &v->desc;
-    terrimpi_job *job = &v->jobs.items[v->jobs.count];
+    terrimpi_job *job = &v->jobs.items[v->jobs.count], none;
     uint32_t room = terrimpi_spending_left(&v->frame, s), triangles;
     if (v->jobs.count == d->max_captures ||
         (s->cost > 0.0f && room < terrimpi_spending_least(&v->frame)) ||
         (c->urgency < 1.0f && s->cost + c->capture_cost > s->spread) ||
         (d->max_cost > 0.0f && s->cost > 0.0f && s->cost + c->capture_cost > s->allowance) ||
         (d->max_capture_texels && s->texels >= d->max_capture_texels)) {
-        terrimpi_view_await(v, c);
+        if (v->terrain->tree.pages && (c->urgency >= 1.0f || c->is_short))
+            terrimpi_job_prepare(v, c, 0, &none); /* so its pages come meanwhile, and stay */
         return 0;
     }
     if (!terrimpi_job_prepare(v, c, room, job))
@@ -12306,23 +12352,25 @@ static void terrimpi_view_schedule(terrimp_view *v, float spread, float drawn)
 /* ---- a frame ---- */
 
 /* Lists what each region is drawn as, now that it is known which pictures will exist. */
-static void terrimpi_view_list(terrimp_view *v)
+static void terrimpi_view_list(const terrimpi_frame *f, terrimpi_cache *cache,
+                               const terrimpi_regions *regions, terrimpi_view_draws *list)
 {
-    terrimpi_view_draws *list = &v->draws;
-    uint32_t i;
+    uint32_t i, tiles = f->terrain->real ? f->terrain->tiles : 1u;
     memset(list->kind_count, 0, sizeof list->kind_count);
     list->count = list->waiting = 0;
-    for (i = 0; i < v->regions.count; i++) {
-        int kind = v->regions.items[i].kind;
-        while (!terrimpi_view_kinds[kind].list(&v->frame, &v->cache, &v->regions.items[i], list))
+    for (i = 0; i < regions->count; i++) {
+        int kind = regions->items[i].kind;
+        while (!terrimpi_view_kinds[kind].list(f, cache, &regions->items[i], list))
             kind--;
     }
     for (i = 0; i < list->count; i++)
         list->kind_count[list->items[i].kind]++;
     if ((list->kind_count[TERRIMPI_VIEW_KIND_IMPOSTOR] > 0 ||
-         (v->desc.joined && v->desc.mode != TERRIMP_MODE_FULL)) &&
-        terrimpi_view_over(&v->frame, v->frame.camera.eye))
-        for (i = 0; i < (v->terrain->real ? v->terrain->tiles * v->terrain->tiles : 1u); i++)
+         (f->desc->joined && f->desc->mode != TERRIMP_MODE_FULL)) &&
+        (terrimpi_view_over(f, f->camera.eye) ||
+         (f->desc->max_angle_rad > TERRIMPI_VIEW_BESIDE && !(f->camera.reach > 0.0f) &&
+          terrimpi_view_beside(f))))
+        for (i = 0; i < tiles * tiles; i++)
             terrimpi_view_add(list, TERRIMPI_VIEW_KIND_FLOOR, i);
 }
 
@@ -12332,15 +12380,14 @@ static terrimpi_frame terrimpi_frame_next(const terrimpi_frame *before,
 {
     terrimpi_frame f = *before;
     terrimp_node root = terrimpi_tree_root(&f.terrain->tree);
-    terrimp_box all;
     float step[3];
     uint32_t i;
     f.number++;
     f.still = memcmp(camera, &before->camera, sizeof *camera) == 0;
     f.camera = *camera;
     terrimpi_camera_frustum(camera, &f.frustum);
-    terrimpi_terrain_node_box(f.terrain, &root, &all);
-    f.pixel_factor = terrimpi_camera_stand(camera, &all, f.eye);
+    terrimpi_terrain_node_box(f.terrain, &root, &f.all);
+    f.pixel_factor = terrimpi_camera_stand(camera, &f.all, f.eye);
     f.side_px = terrimpi_camera_pixel_factor(camera);
     f.light_speed += (f.light_step - f.light_speed) / 16.0f;
     f.light_step = 0.0f;
@@ -12376,7 +12423,7 @@ static terrimp_result terrimpi_view_fit(terrimp_view *v, const terrimpi_frame *f
         v->frame = *f;
         memset(sums, 0, sizeof *sums);
         for (i = 0; i < v->regions.count; i++)
-            terrimpi_view_decide(v, &v->regions.items[i], sums);
+            terrimpi_view_decide(f, &v->cache, v->kind_of, &v->regions.items[i], sums);
         v->cost = sums->drawn + terrimpi_min(sums->spread, TERRIMPI_VIEW_RESERVE * max_cost);
         if (!(v->cost > max_cost) || !(max_cost > 0.0f) || v->ground_scale >= most ||
             tries == TERRIMPI_VIEW_TRIES)
@@ -12394,6 +12441,7 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     terrimp_camera resolved;
     terrimpi_frame frame;
     terrimpi_frame_sums sums;
+    const struct terrimp_pages *pages;
     float reuse, middle[2] = {0.0f, 0.0f};
     TERRIMPI_REFUSE(!view, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimp_camera_resolve(camera, &resolved));
@@ -12401,13 +12449,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         view->desc.endless->enter(view, &resolved, middle);
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
-    if (view->terrain->tree.pages) {
-        const terrimp_quadtree *tree = &view->terrain->tree;
-        terrimp_node root = terrimpi_tree_root(tree);
-        frame.wants = tree->pages->want_count;
-        TERRIMPI_REFUSE(!tree->pages->calls->want(tree, &root, TERRIMP_WANT_GROUND, 1e6f),
-                        TERRIMP_E_PAGE);
-    }
+    pages = view->terrain->tree.pages;
+    TERRIMPI_REFUSE(pages && !pages->calls->begin(&view->terrain->tree), TERRIMP_E_PAGE);
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;
@@ -12419,21 +12462,21 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
         view->stats.ground_tolerance_px = terrimpi_min(
             view->ground.tolerance_px * view->ground_scale, TERRIMPI_VIEW_COARSEST);
     terrimpi_view_schedule(view, sums.spread, sums.drawn);
-    terrimpi_view_list(view);
+    terrimpi_view_list(&view->frame, &view->cache, &view->regions, &view->draws);
     view->frame.density = terrimpi_view_density(&view->desc, sums.pixels);
     return TERRIMP_OK;
 }
 
-/* Notes that a picture has been made. */
-static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
+/* Notes that a picture has been made, and for how many frames the one before was drawn. */
+static void terrimpi_view_finish(const terrimpi_frame *f, terrimpi_cache *cache,
+                                 const terrimpi_job *job, float *reuse)
 {
     terrimpi_cache_picture *p = job->picture;
-    uint32_t i;
+    uint32_t i, side = f->desc->atlas_size;
     if (p->layer_count > 0) {
-        float frames = (float)p->drawn_count;
-        v->stats.reuse += (frames - v->stats.reuse) * (v->stats.reuse > 0.0f ? 0.02f : 1.0f);
+        *reuse += ((float)p->drawn_count - *reuse) * (*reuse > 0.0f ? 0.02f : 1.0f);
         if (memcmp(job->slots, p->slots, sizeof p->slots) != 0)
-            terrimpi_cache_free(&v->cache, p->slots, p->layer_count);
+            terrimpi_cache_free(cache, p->slots, p->layer_count);
     }
     p->layer_count = (uint8_t)job->plan.layer_count;
     memcpy(p->slots, job->slots, sizeof p->slots);
@@ -12445,29 +12488,17 @@ static void terrimpi_view_finish(terrimp_view *v, const terrimpi_job *job)
     memcpy(p->eye, job->plan.eye, sizeof p->eye);
     for (i = 0; i < p->layer_count; i++) {
         terrimp_capture camera = terrimpi_capture_layer(&job->plan, i);
-        terrimp_rect rect = terrimpi_cache_rect(&v->cache, &p->slots[i]);
-        if (v->frame.camera.rows_from_top) {
+        terrimp_rect rect = terrimpi_cache_rect(cache, &p->slots[i]);
+        if (f->camera.rows_from_top) {
             camera.tan_up = job->plan.camera.tan_down;
             camera.tan_down = job->plan.camera.tan_up;
         }
-        terrimpi_impostor_texture_matrix(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                         p->texture_matrix[i]);
+        terrimpi_impostor_texture_matrix(&camera, &rect, side, side, p->texture_matrix[i]);
         camera.z_far = terrimpi_capture_end(&job->plan, i); /* what it shows, not what wears it */
-        if (v->cache.places)
-            v->cache.exact->make(&camera, &rect, v->desc.atlas_size, v->desc.atlas_size,
-                                 v->cache.places[p - v->cache.pictures].matrix[i]);
+        if (cache->places)
+            cache->exact->make(&camera, &rect, side, side,
+                               cache->places[p - cache->pictures].matrix[i]);
     }
-}
-
-/* Lists the frame without the pictures that could not be made. */
-static void terrimpi_view_list_again(terrimp_view *v)
-{
-    uint32_t i;
-    for (i = 0; i < v->draws.count; i++)
-        if (v->draws.items[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
-            v->cache.pictures[v->draws.items[i].index].listed = 0;
-    terrimpi_jobs_lose(&v->cache, &v->jobs);
-    terrimpi_view_list(v);
 }
 
 /* Makes a picture, or a piece of one. */
@@ -12490,7 +12521,7 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
     job->from = job->to;
     if (job->to < job->end)
         return;
-    terrimpi_view_finish(v, job);
+    terrimpi_view_finish(&v->frame, &v->cache, job, &v->stats.reuse);
     if (v->jobs.open && &v->jobs.items[v->jobs.open - 1u] == job)
         v->jobs.open = 0;
 }
@@ -12511,8 +12542,13 @@ TERRIMP_API terrimp_result terrimp_view_render(terrimp_view *view,
     for (i = 0; i < view->jobs.count; i++)
         terrimpi_view_capture(view, &view->jobs.items[i], callbacks);
     view->jobs.count = 0;
-    if (view->lost)
-        terrimpi_view_list_again(view);
+    if (view->lost) { /* it is listed anew, without the pictures that could not be made */
+        for (i = 0; i < view->draws.count; i++)
+            if (view->draws.items[i].kind == TERRIMPI_VIEW_KIND_IMPOSTOR)
+                view->cache.pictures[view->draws.items[i].index].listed = 0;
+        terrimpi_jobs_lose(&view->cache, &view->jobs);
+        terrimpi_view_list(&view->frame, &view->cache, &view->regions, &view->draws);
+    }
     view->capturing = view->lost = 0;
     for (i = view->desc.sorted ? view->draws.count : 0u; i-- > 0;)
         terrimpi_view_kinds[view->draws.items[i].kind].emit(view, &view->draws.items[i], callbacks);
@@ -12542,8 +12578,9 @@ static void terrimpi_view_count_draw(const terrimp_view *v, const terrimpi_view_
         s->worst_angle_rad = terrimpi_max(s->worst_angle_rad, p->angle_rad);
         s->worst_parallax_px = terrimpi_max(s->worst_parallax_px, p->parallax_px);
     } else {
-        s->draws++;
-        s->triangles += terrimpi_floor_of(v->built).indices / 3u;
+        terrimp_floor_command none;
+        memset(&none, 0, sizeof none);
+        s->triangles += terrimpi_view_floor_run(v, &none, NULL, &s->draws);
     }
 }
 
@@ -15355,12 +15392,9 @@ static terrimp_result terrimpi_simp_check_desc(const terrimp_simplify_desc *desc
     TERRIMPI_REFUSE(!terrimpi_simp_tile_size_ok(desc->cols, desc->rows) ||
                     desc->triangle_budget == 1 ||
                     desc->triangle_budget > TERRIMP_MAX_TRIANGLES, TERRIMP_E_RANGE);
-    for (i = 0; i < TERRIMP_SIDE_COUNT; i++) {
-        terrimp_result r = terrimpi_simp_check_border(
-            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows);
-        if (r != TERRIMP_OK)
-            return r;
-    }
+    for (i = 0; i < TERRIMP_SIDE_COUNT; i++)
+        TERRIMPI_TRY(terrimpi_simp_check_border(
+            b + i, terrimpi_along_x((int)i) ? desc->cols : desc->rows));
     for (i = 0; i < 4u; i++) { /* the two borders that meet in each corner */
         uint32_t x_end = i & 1u, z_end = i >> 1;
         const terrimp_border *p = b + (z_end ? TERRIMP_SIDE_Z1 : TERRIMP_SIDE_Z0);
@@ -16629,7 +16663,7 @@ static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terri
 {
     float most = terrimpi_terrain_border_height(t, TERRIMPI_MESH_BORDER_STEPS), low = most, step;
     float high = t->range_low;
-    uint32_t i, bits;
+    uint32_t i;
     for (i = mesh->border_vertex_count; i < mesh->surface_vertex_count; i++) {
         mesh->vertices[i].height = terrimpi_clamp(mesh->vertices[i].height, t->range_low, most);
         low = terrimpi_min(low, mesh->vertices[i].height);
@@ -16637,8 +16671,7 @@ static uint32_t terrimpi_build_inner_range(const terrimp_terrain *t, const terri
     }
     *base = low;
     step = terrimpi_max(0.0f, high - low) / (float)TERRIMPI_MESH_INNER_STEPS;
-    memcpy(&bits, &step, sizeof bits);
-    return (bits + 0x7fffffu) >> 23;
+    return (terrimpi_float_bits(step) + 0x7fffffu) >> 23;
 }
 
 /* A vertex of a surface as it is stored. */
@@ -16839,18 +16872,23 @@ static uint32_t terrimpi_build_stale_words(const terrimp_terrain *t)
     return t->tree.node_count / 32u + 1u;
 }
 
+/* The one description of a terrain's block. */
+static size_t terrimpi_build_layout_block(terrimp_terrain *t, unsigned char *base)
+{
+    terrimpi_arena b = terrimpi_arena_at(base);
+    size_t arrays = terrimpi_terrain_layout(t, NULL);
+    terrimpi_take(&b, 1, sizeof *t);
+    terrimpi_terrain_layout(t, (unsigned char *)terrimpi_take(&b, arrays, 1));
+    t->stale = (uint32_t *)terrimpi_take(&b, terrimpi_build_stale_words(t), sizeof *t->stale);
+    return b.ok && arrays ? b.bytes : 0;
+}
+
 TERRIMP_API size_t terrimp_terrain_bytes(const terrimp_terrain_desc *desc)
 {
     terrimp_terrain t;
-    size_t at = 0, arrays;
-    int ok = 1;
-    if (terrimp_terrain_desc_resolve(desc, &t.desc) != TERRIMP_OK)
-        return 0;
-    arrays = terrimpi_terrain_layout(&t, NULL);
-    terrimpi_place(&at, 1, sizeof t, &ok);
-    at = terrimpi_add(at, arrays, &ok);
-    at = terrimpi_add(at, terrimpi_build_stale_words(&t) * sizeof *t.stale, &ok);
-    return ok && arrays ? at : 0;
+    memset(&t, 0, sizeof t); /* an analyser cannot know that resolve fills in the rest */
+    return terrimp_terrain_desc_resolve(desc, &t.desc) == TERRIMP_OK
+               ? terrimpi_build_layout_block(&t, NULL) : 0;
 }
 
 TERRIMP_API size_t terrimp_terrain_scratch_bytes(const terrimp_terrain_desc *desc)
@@ -16866,18 +16904,15 @@ TERRIMP_API terrimp_result terrimp_terrain_init(const terrimp_terrain_desc *desc
                                                 size_t bytes, terrimp_terrain **terrain)
 {
     terrimp_terrain t;
-    size_t needed, at = 0;
-    int ok = 1;
+    size_t needed;
     TERRIMPI_REFUSE(!terrain, TERRIMP_E_NULL);
     memset(&t, 0, sizeof t);
     TERRIMPI_TRY(terrimp_terrain_desc_resolve(desc, &t.desc));
-    needed = terrimp_terrain_bytes(&t.desc);
+    needed = terrimpi_build_layout_block(&t, NULL);
     TERRIMPI_REFUSE(needed == 0, TERRIMP_E_OVERFLOW);
     TERRIMPI_TRY(terrimpi_check_block(memory, bytes, needed));
     memset(memory, 0, needed);
-    terrimpi_place(&at, 1, sizeof t, &ok);
-    at += terrimpi_terrain_layout(&t, (unsigned char *)memory + at);
-    t.stale = (uint32_t *)(void *)((unsigned char *)memory + at);
+    terrimpi_build_layout_block(&t, (unsigned char *)memory);
     *(terrimp_terrain *)memory = t;
     *terrain = (terrimp_terrain *)memory;
     return TERRIMP_OK;
@@ -17433,7 +17468,7 @@ static terrimp_result terrimpi_paging_begin(const terrimp_pages_desc *desc, terr
     w->head.block_level = d->block_level;
     w->head.morph_ratio = d->morph_ratio;
     w->head.stamp = d->stamp;
-    w->head.stamp = terrimpi_page_hash((const unsigned char *)&w->head, sizeof w->head);
+    w->head.stamp = terrimpi_page_hash(&w->head, sizeof w->head);
     return TERRIMP_OK;
 }
 
@@ -17580,10 +17615,7 @@ static terrimp_result terrimpi_paging_build(const terrimpi_paging *w, const terr
     for (i = 0; i < 4u; i++) {
         if (!terrimpi_tree_quarter(&t->tree, n, i, &child))
             continue;
-        ground->low = terrimpi_min(ground->low, t->tree.nodes[child.number].low);
-        ground->high = terrimpi_max(ground->high, t->tree.nodes[child.number].high);
-        ground->error = terrimpi_max(ground->error, t->tree.nodes[child.number].error);
-        terrimpi_build_hold(mesh, t->meshes[child.number].low, t->meshes[child.number].high);
+        terrimpi_build_hold_node(t, n->number, child.number);
         w->held[n->number] = terrimpi_max(w->held[n->number],
                                           terrimpi_page_held_by(w->desc->morph_ratio,
                                                                 w->held[child.number]));
@@ -17744,23 +17776,23 @@ static terrimp_result terrimpi_paging_take(const terrimpi_paging *w, const terri
     return TERRIMP_OK;
 }
 
-/* The lowest sample of a rectangle that two of its corners span, through `read`. */
-static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, const uint32_t a[2],
-                                             const uint32_t b[2], float *lowest)
+/* The lowest sample below one of the floor's walls, through `read`. */
+static terrimp_result terrimpi_paging_lowest(const terrimpi_paging *w, uint32_t wall,
+                                             float *lowest)
 {
+    terrimp_rect r = terrimpi_floor_wall(&w->whole, wall);
     terrimp_heightfield f = w->desc->terrain.field;
     terrimpi_field_scan scan;
-    uint32_t x = terrimpi_min_u32(a[0], b[0]), z = terrimpi_min_u32(a[1], b[1]), k;
-    uint32_t cols = terrimpi_max_u32(a[0], b[0]) - x + 1u;
-    uint32_t rows = terrimpi_max_u32(a[1], b[1]) - z + 1u;
-    float line[256]; /* of any format; either is 1 */
-    for (k = 0; k < cols * rows; k += 256u) {
-        f.width = terrimpi_min_u32(cols > 1u ? cols - k : 1u, 256u);
-        f.depth = terrimpi_min_u32(rows > 1u ? rows - k : 1u, 256u);
+    float line[256]; /* of any format */
+    uint32_t k, along_x = r.width > 1u;
+    for (k = 0; k < r.width * r.height; k += 256u) {
+        f.width = along_x ? terrimpi_min_u32(r.width - k, 256u) : 1u;
+        f.depth = along_x ? 1u : terrimpi_min_u32(r.height - k, 256u);
         f.row_bytes = f.width * terrimpi_field_sample_bytes(f.format);
         f.samples = line;
-        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, cols > 1u ? x + k : x, rows > 1u ? z + k : z,
-                                       f.width, f.depth, line, f.row_bytes), TERRIMP_E_PAGE);
+        TERRIMPI_REFUSE(!w->desc->read(w->desc->user, along_x ? r.x + k : r.x,
+                                       along_x ? r.y : r.y + k, f.width, f.depth, line,
+                                       f.row_bytes), TERRIMP_E_PAGE);
         scan.skip_voids = 0;
         TERRIMPI_TRY(terrimpi_field_scan_tile(&f, 0, 0, f.width, f.depth, 1, &scan));
         *lowest = terrimpi_min(*lowest, terrimpi_field_world_height(&f, scan.low));
@@ -17788,12 +17820,8 @@ static terrimp_result terrimpi_paging_floor(const terrimpi_paging *w, float *low
         }
     lows += terrimpi_floor_of(t).ground_vertices;
     for (k = 0; k < points; k++) {
-        uint32_t before[2], at[2], after[2];
-        terrimpi_floor_wall_place(t, k + points - 1u, &before[0], &before[1]);
-        terrimpi_floor_wall_place(t, k, &at[0], &at[1]);
-        terrimpi_floor_wall_place(t, k + 1u, &after[0], &after[1]);
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, before, at, &lows[k]));
-        TERRIMPI_TRY(terrimpi_paging_lowest(w, at, after, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, k + points - 1u, &lows[k]));
+        TERRIMPI_TRY(terrimpi_paging_lowest(w, k, &lows[k]));
     }
     return TERRIMP_OK;
 }
@@ -17984,44 +18012,19 @@ TERRIMP_API terrimp_result terrimp_walls_build_node(const terrimp_quadtree *tree
     return TERRIMP_OK;
 }
 
-/* The nodes of a level that samples from `at` on belong to: those at a border belong to both. */
-static void terrimpi_wall_range(uint32_t at, uint32_t count, uint32_t quads, uint32_t nodes,
-                                uint32_t range[2])
-{
-    range[0] = terrimpi_min_u32((at > 0 ? at - 1u : 0u) / quads, nodes - 1u);
-    range[1] = terrimpi_min_u32((at + count - 1u) / quads, nodes - 1u);
-}
-
-/* A rectangle of samples, NULL for all, cut at the far edges; `cut` may be NULL. Returns 0 when it
-   is empty or outside. */
-static int terrimpi_walls_rect(const terrimp_quadtree *tree, const terrimp_rect *samples,
-                               terrimp_rect *cut)
-{
-    uint32_t width = tree->field.width, depth = tree->field.depth;
-    terrimp_rect all = samples ? *samples : terrimpi_rect(0, 0, width, depth);
-    if (all.width < 1u || all.height < 1u || all.x >= width || all.y >= depth)
-        return 0;
-    all.width = terrimpi_min_u32(all.width, width - all.x);
-    all.height = terrimpi_min_u32(all.height, depth - all.y);
-    if (cut)
-        *cut = all;
-    return 1;
-}
-
 TERRIMP_API terrimp_result terrimp_walls_build(const terrimp_quadtree *tree,
                                                const terrimp_rect *samples, void *walls)
 {
-    terrimp_rect all;
-    uint32_t level, x[2], z[2], i, j;
+    const terrimp_rect all = {0, 0, TERRIMP_MAX_DIM, TERRIMP_MAX_DIM};
+    uint32_t level, x, z;
+    samples = samples ? samples : &all;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
-    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, &all), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&tree->field, samples), TERRIMP_E_RANGE);
     for (level = 0; level < tree->level_count; level++) {
-        uint32_t quads = tree->chunk_quads << level;
-        terrimpi_wall_range(all.x, all.width, quads, tree->level_x[level], x);
-        terrimpi_wall_range(all.y, all.height, quads, tree->level_z[level], z);
-        for (j = z[0]; j <= z[1]; j++)
-            for (i = x[0]; i <= x[1]; i++)
-                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, i, j),
+        terrimpi_terrain_touched in = terrimpi_terrain_touched_within(tree, samples, level, 0);
+        for (z = in.z0; z <= in.z1; z++)
+            for (x = in.x0; x <= in.x1; x++)
+                terrimpi_wall_build(tree, terrimpi_tree_at(tree, level, x, z),
                                     (unsigned char *)walls);
     }
     return TERRIMP_OK;
@@ -18292,7 +18295,7 @@ TERRIMP_API terrimp_result terrimp_sets_build_cell(const terrimp_sets *sets, con
     tree = sets->hider.tree;
     TERRIMPI_TRY(terrimpi_walls_check(tree, walls));
     TERRIMPI_REFUSE(cell >= terrimpi_sets_level_nodes(tree, sets->cell_level) ||
-                    (samples && !terrimpi_walls_rect(tree, samples, NULL)), TERRIMP_E_RANGE);
+                    (samples && !terrimpi_field_has(&tree->field, samples)), TERRIMP_E_RANGE);
     memset(&b, 0, sizeof b);
     node = terrimpi_tree_node(tree, tree->level_first[sets->cell_level] + cell);
     b.sets = sets;
@@ -18318,7 +18321,7 @@ TERRIMP_API terrimp_result terrimp_sets_touch(const terrimp_sets *sets,
     uint32_t i;
     TERRIMPI_REFUSE(!sets || !samples || !sets->hider.tree, TERRIMP_E_NULL);
     tree = sets->hider.tree;
-    TERRIMPI_REFUSE(!terrimpi_walls_rect(tree, samples, NULL), TERRIMP_E_RANGE);
+    TERRIMPI_REFUSE(!terrimpi_field_has(&tree->field, samples), TERRIMP_E_RANGE);
     memset(&b, 0, sizeof b);
     b.sets = sets;
     for (i = 0; i < terrimpi_sets_level_nodes(tree, sets->cell_level); i++) {
@@ -18409,20 +18412,17 @@ static terrimp_result terrimpi_layers_check(const terrimp_layers_desc *d)
 {
     int k;
     TERRIMPI_REFUSE(!terrimpi_finite(d->distance) || !terrimpi_finite(d->texel) ||
-                        !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
-                        d->cell_depth != d->cell_depth,
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite(d->tolerance_rad) || d->depth != d->depth ||
+                    d->cell_depth != d->cell_depth, TERRIMP_E_NOT_FINITE);
     for (k = 0; k < 2; k++) {
         float sum = d->cell_tan[k] + d->view_tan[k];
         TERRIMPI_REFUSE(!terrimpi_finite2(d->cell_size[k], sum), TERRIMP_E_NOT_FINITE);
         TERRIMPI_REFUSE(!(d->cell_size[k] >= 0.0f) || !(d->cell_tan[k] >= 0.0f) ||
-                            !(d->view_tan[k] > 0.0f),
-                        TERRIMP_E_RANGE);
+                        !(d->view_tan[k] > 0.0f), TERRIMP_E_RANGE);
     }
     TERRIMPI_REFUSE(!(d->distance > 0.0f) || !terrimpi_finite(1.0f / d->distance) ||
-                        !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
-                        !(d->tolerance_rad >= 0.0f),
-                    TERRIMP_E_RANGE);
+                    !(d->depth >= 0.0f) || !(d->cell_depth >= 0.0f) || !(d->texel > 0.0f) ||
+                    !(d->tolerance_rad >= 0.0f), TERRIMP_E_RANGE);
     return TERRIMP_OK;
 }
 
@@ -18818,9 +18818,8 @@ static terrimp_result terrimpi_cover_begin(const terrimp_cover_desc *desc, void 
     c->desc = *desc;
     TERRIMPI_DEFAULT(c->desc.quad_cost, 20u);
     TERRIMPI_REFUSE(!terrimpi_within_u32(desc->width, 1, 16384) || desc->gutter > 64u ||
-                        !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
-                        c->desc.quad_cost > 1u << 24,
-                    TERRIMP_E_RANGE);
+                    !terrimpi_within_u32(desc->height, 1, 16384) || !capacity ||
+                    c->desc.quad_cost > 1u << 24, TERRIMP_E_RANGE);
     c->node_count = 0;
     c->node_limit = capacity < 0x10000000u ? 8u * capacity : 0x80000000u;
     c->low = (uint32_t *)terrimpi_take(&arena, longest, sizeof *c->low);
@@ -18893,8 +18892,7 @@ TERRIMP_API terrimp_result terrimp_layer_pack(const uint32_t atlas[2], terrimp_l
     TERRIMPI_REFUSE(!atlas || !quads || !rects || !order, TERRIMP_E_NULL);
     for (i = 0; i < count; i++)
         TERRIMPI_REFUSE(!terrimpi_within_u32(quads[i].texels.width, 1, 65536) || gutter > 64u ||
-                            !terrimpi_within_u32(quads[i].texels.height, 1, 65536),
-                        TERRIMP_E_RANGE);
+                        !terrimpi_within_u32(quads[i].texels.height, 1, 65536), TERRIMP_E_RANGE);
     for (i = 0; i < count; i++) {
         rects[i] = quads[i].texels;
         rects[i].width += 2u * gutter;
@@ -18955,8 +18953,7 @@ static terrimp_result terrimpi_record_check(const terrimp_layer_record *r)
     TERRIMPI_REFUSE(!r || !r->layers || !r->picture || !r->masks, TERRIMP_E_NULL);
     return terrimpi_within_u32(r->width, 1, 16384) && terrimpi_within_u32(r->height, 1, 16384) &&
                    r->layers->count
-               ? TERRIMP_OK
-               : TERRIMP_E_RANGE;
+               ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 static uint32_t *terrimpi_record_row(const terrimp_layer_record *r, uint32_t layer, uint32_t y)
@@ -19949,8 +19946,7 @@ static terrimp_result terrimpi_depth_check(const terrimp_depth_mesh_desc *desc, 
                    terrimpi_within_u32(desc->height, 1, 16384) &&
                    terrimpi_within_u32(desc->layers, 1, 65535) &&
                    terrimpi_within(d->tolerance, 0.75f, 64.0f)
-               ? TERRIMP_OK
-               : TERRIMP_E_RANGE;
+               ? TERRIMP_OK : TERRIMP_E_RANGE;
 }
 
 /* Lays out the scratch memory, for cells and texels that have been counted. */
@@ -19994,8 +19990,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
     size_t needed;
     TERRIMPI_TRY(terrimpi_depth_check(desc, &d));
     TERRIMPI_REFUSE(!scratch || !mesh || !mesh->vertices || !mesh->indices || !mesh->sheets ||
-                        !mesh->texel_layers,
-                    TERRIMP_E_NULL);
+                    !mesh->texel_layers, TERRIMP_E_NULL);
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     terrimpi_depth_cells(&d, 0);
     needed = terrimpi_depth_layout(&d, scratch);
@@ -20013,8 +20008,7 @@ TERRIMP_API terrimp_result terrimp_depth_mesh_make(const terrimp_depth_mesh_desc
                    mesh->index_count > mesh->index_capacity ||
                    mesh->sheet_count > mesh->sheet_capacity ||
                    mesh->texel_count > mesh->texel_capacity
-               ? TERRIMP_E_CAPACITY
-               : TERRIMP_OK;
+               ? TERRIMP_E_CAPACITY : TERRIMP_OK;
 }
 
 /* --- layers all round a cell, and for all views of an object --- */
@@ -20062,8 +20056,7 @@ TERRIMP_API terrimp_result terrimp_layers_object(const terrimp_box *box, float t
     int k;
     TERRIMPI_REFUSE(!box || !counts, TERRIMP_E_NULL);
     TERRIMPI_REFUSE(!terrimpi_finite3(box->min) || !terrimpi_finite3(box->max) ||
-                        !terrimpi_finite2(texel, slope),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite2(texel, slope), TERRIMP_E_NOT_FINITE);
     TERRIMPI_REFUSE(!(texel > 0.0f) || !(slope >= 1.0f), TERRIMP_E_RANGE);
     for (k = 0; k < 3; k++) {
         needed[k] = (box->max[k] - box->min[k]) * slope / texel;
@@ -20383,9 +20376,8 @@ static terrimp_result terrimpi_place_check(const terrimp_place_desc *d)
         const terrimp_place_candidate *c = &d->candidates[i];
         TERRIMPI_REFUSE(!terrimpi_finite(c->memory), TERRIMP_E_NOT_FINITE);
         TERRIMPI_REFUSE(!(c->memory > 0.0f) || c->cluster >= d->cluster_count ||
-                            c->first_gain > d->gain_count ||
-                            c->gain_count > d->gain_count - c->first_gain,
-                        TERRIMP_E_RANGE);
+                        c->first_gain > d->gain_count ||
+                        c->gain_count > d->gain_count - c->first_gain, TERRIMP_E_RANGE);
     }
     return TERRIMP_OK;
 }
@@ -20455,8 +20447,7 @@ TERRIMP_API terrimp_result terrimp_place(const terrimp_place_desc *desc, void *s
     TERRIMPI_REFUSE((uintptr_t)scratch % TERRIMPI_ALIGN, TERRIMP_E_ALIGN);
     TERRIMPI_TRY(terrimpi_place_check(desc));
     TERRIMPI_REFUSE(bytes < terrimp_place_scratch_bytes(desc) ||
-                        !terrimpi_place_layout(desc, scratch, &p),
-                    TERRIMP_E_MEMORY);
+                    !terrimpi_place_layout(desc, scratch, &p), TERRIMP_E_MEMORY);
     p.costs = costs;
     p.shown = shown;
     memset(p.wish, 0, desc->candidate_count);
@@ -20765,18 +20756,16 @@ static terrimp_result terrimpi_prepare_begin(const terrimp_place_terrain_desc *d
     *d = *desc;
     TERRIMPI_DEFAULT(d->directions, 8u);
     TERRIMPI_REFUSE(!terrimpi_finite3(d->eyes.min) || !terrimpi_finite3(d->eyes.max) ||
-                        !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
-                        !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
-                        !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
-                        !terrimpi_finite(d->texels_per_px),
-                    TERRIMP_E_NOT_FINITE);
+                    !terrimpi_finite2(d->fov_rad, d->pixel_factor) ||
+                    !terrimpi_finite2(d->tolerance_px, d->max_angle_rad) ||
+                    !terrimpi_finite2(d->draw_cost, d->triangle_cost) ||
+                    !terrimpi_finite(d->texels_per_px), TERRIMP_E_NOT_FINITE);
     for (k = 0; k < 3; k++)
         TERRIMPI_REFUSE(d->eyes.min[k] > d->eyes.max[k], TERRIMP_E_RANGE);
     TERRIMPI_REFUSE(d->cell_levels > 6u || d->directions > 64u ||
-                        !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
-                        d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f ||
-                        d->texels_per_px < 0.0f || d->draw_cost < 0.0f || d->triangle_cost < 0.0f,
-                    TERRIMP_E_RANGE);
+                    !terrimpi_within(d->fov_rad, 0.01f, 6.3f) || !(d->pixel_factor > 0.0f) ||
+                    d->tolerance_px < 0.0f || d->max_angle_rad < 0.0f || d->texels_per_px < 0.0f ||
+                    d->draw_cost < 0.0f || d->triangle_cost < 0.0f, TERRIMP_E_RANGE);
     d->tolerance_px = d->tolerance_px > 0.0f ? d->tolerance_px : 1.0f;
     d->max_angle_rad = d->max_angle_rad > 0.0f ? d->max_angle_rad : 0.1f;
     d->texels_per_px = d->texels_per_px > 0.0f ? d->texels_per_px : 1.0f;
@@ -20813,9 +20802,8 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare p;
     size_t needed;
     uint32_t i;
-    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains ||
-                        !set->parents || !set->costs,
-                    TERRIMP_E_NULL);
+    TERRIMPI_REFUSE(!set || !set->candidates || !set->pictures || !set->gains || !set->parents ||
+                    !set->costs, TERRIMP_E_NULL);
     TERRIMPI_TRY(terrimpi_prepare_begin(desc, scratch, &p, &needed));
     TERRIMPI_TRY(terrimpi_check_block(scratch, bytes, needed));
     p.set = set;
@@ -20825,17 +20813,13 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
     terrimpi_prepare_gains(&p, 0);
     terrimpi_prepare_pictures(&p, 1);
     TERRIMPI_REFUSE(set->candidate_count > set->candidate_capacity ||
-                        set->gain_count > set->gain_capacity ||
-                        set->cluster_count > set->cluster_capacity ||
-                        set->view_count > set->view_capacity,
-                    TERRIMP_E_CAPACITY);
+                    set->gain_count > set->gain_capacity ||
+                    set->cluster_count > set->cluster_capacity ||
+                    set->view_count > set->view_capacity, TERRIMP_E_CAPACITY);
     terrimpi_prepare_gains(&p, 1);
-    for (i = 0; i < p.nodes; i++) {
-        terrimp_node n = terrimpi_tree_node(&p.desc.terrain->tree, i);
+    for (i = 0; i < p.nodes; i++)
         set->parents[i] = i + 1u == p.nodes
-                              ? i
-                              : terrimpi_tree_parent(&p.desc.terrain->tree, &n).number;
-    }
+                              ? i : terrimpi_tree_parent_number(&p.desc.terrain->tree, i);
     return TERRIMP_OK;
 }
 
@@ -20852,12 +20836,13 @@ TERRIMP_API terrimp_result terrimp_place_terrain(const terrimp_place_terrain_des
    0.5.0  all terrain lies at its own depth: depth_bias and the alpha of ground are gone, impostors
           have an alpha, the share of the pixels in the fade band; texture matrices and
           terrimp_texture_coordinates take positions relative to the eye of the picture;
-          exact_depth, endless and cost_limit, asked for by functions of their own, so that others
-          do not link what they need; terrimp_view_set; a hider, which hides what lies behind
+          exact_depth, endless, cost_limit and bound, asked for by functions of their own, so that
+          others do not link what they need; terrimp_view_set; a hider, which hides what lies behind
           ridges; statistics are counted when they are asked for; first what draws, then what
           builds. New rooms: Quadtree, Visibility, Sorted, Layers, Placement. Gone: the pair of
           atlases (a benchmark has it), evict, query, rect, reset and room of the live atlas, fitted
-          heights, stitched patterns, upper_skirts, terrimp_capture_rate, terrimp_heightfield_sample
+          heights, stitched patterns, upper_skirts, TERRIMP_NO_BOUND, terrimp_capture_rate,
+          terrimp_heightfield_sample
    0.4.1  no ray slips through the surface whatever the registers' width; TERRIMP_STATIC without
           warnings of what is not called, -O3 without any
    0.4.0  skirts no deeper than neighbours need, upper ones when asked for: upper_skirts instead of

@@ -173,6 +173,7 @@ static void open_contender(flyover *f, contender *c, const char *name, int mode)
     desc.tolerance_px = o->tolerance;
     desc.ground_tolerance_px = o->ground_tolerance;
     desc.ground_rule = o->rule;
+    desc.bound = terrimp_geomip_bound();
     desc.morph_ratio = o->morph;
     desc.fade_start = o->fade[0];
     desc.fade_end = o->fade[1];

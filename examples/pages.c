@@ -267,7 +267,7 @@ int main(int argc, char **argv)
     uint32_t threads = 1, part = 0, parts = 0, side = 0;
     struct rusage usage;
     terrimp_pages_info info;
-    uint64_t from, bytes;
+    uint64_t from, bytes = 0;
     void *scratch;
     int i;
     for (i = 2; i < argc; i++)
@@ -314,8 +314,8 @@ int main(int argc, char **argv)
     scratch = malloc(s.scratch_bytes);
     if (s.result == TERRIMP_OK && !parts)
         s.result = terrimp_pages_build_end(&s.desc, scratch, s.scratch_bytes);
-    if (s.result == TERRIMP_OK)
-        s.result = terrimp_pages_place(&s.desc, 0, 0, &from, &bytes);
+    if (s.result == TERRIMP_OK) /* of a part: there is no header yet */
+        s.result = terrimp_pages_place(&s.desc, s.end - s.all, s.all, &from, &bytes);
     memset(&info, 0, sizeof info);
     if (s.result == TERRIMP_OK && !parts && pread(s.file, scratch, 8192, 0) == 8192)
         s.result = terrimp_pages_check(scratch, 8192, &info);
@@ -325,7 +325,7 @@ int main(int argc, char **argv)
     getrusage(RUSAGE_SELF, &usage);
     printf("\n%s: %s, %u x %u samples, %.1f MB of pages, %.1f MiB of memory\n", out,
            terrimp_result_text(s.result), (unsigned)s.desc.terrain.field.width,
-           (unsigned)s.desc.terrain.field.depth, (double)info.bytes * 1e-6,
+           (unsigned)s.desc.terrain.field.depth, (double)(parts ? bytes : info.bytes) * 1e-6,
            (double)usage.ru_maxrss / 1024.0);
     return s.result != TERRIMP_OK;
 }

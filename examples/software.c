@@ -28,7 +28,7 @@ typedef struct host {
     uint16_t *indices, *mesh_indices;
     uint16_t *scratch; /* painter's order instead of the depth buffer; NULL: the depth buffer */
     float *mesh_xyz, ground_xyz[GRID * 3]; /* of one node */
-    uint32_t mesh_floats, mesh_index_count;
+    uint32_t mesh_floats, mesh_index_count, floor_first_index;
     uint16_t lightmap_texels[SCENE_SIDE * SCENE_SIDE * 4 / 3];
     raster_texture lightmap, atlas_texture;
     const float *lightmap_matrix;
@@ -76,16 +76,17 @@ static void turn_to_screen(host *h)
 
 /* Vertices are made for each draw, from the samples and from the terrain's compact meshes: no
    memory goes into vertex buffers. */
-static void draw_mesh(host *h, uint32_t node, const raster_style *style, uint32_t index_count)
+static void draw_mesh(host *h, uint32_t node, const raster_style *style, uint32_t first,
+                      uint32_t index_count)
 {
     turn_to_screen(h);
     if (terrimp_terrain_fill_mesh(h->terrain, node, h->mesh_xyz, h->mesh_floats, h->mesh_indices,
                                   h->mesh_index_count) != TERRIMP_OK)
         return;
     if (!h->scratch || terrimp_sorted_mesh(h->mesh_xyz, h->mesh_floats / 3, h->r.eye,
-                                           h->mesh_indices, index_count, h->scratch,
+                                           h->mesh_indices + first, index_count, h->scratch,
                                            NULL) == TERRIMP_OK)
-        raster_draw(&h->r, style, h->mesh_xyz, h->mesh_indices, index_count);
+        raster_draw(&h->r, style, h->mesh_xyz, h->mesh_indices + first, index_count);
 }
 
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
@@ -101,7 +102,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         style.place_matrix = c->place_matrix;
         style.texture_depth = h->atlas_depth;
     }
-    draw_mesh(h, c->node, &style, c->index_count);
+    draw_mesh(h, c->node, &style, 0, c->index_count);
 }
 
 /* The floor is the mesh behind those of all nodes. */
@@ -112,7 +113,7 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     style.texture = &h->lightmap;
     style.texture_matrix = h->lightmap_matrix;
     style.share = RASTER_ALL;
-    draw_mesh(h, h->node_count, &style, c->index_count);
+    draw_mesh(h, h->node_count, &style, c->first_index - h->floor_first_index, c->index_count);
 }
 
 static void draw_ground(void *user, const terrimp_ground_command *c)
@@ -157,6 +158,7 @@ static int prepare(host *h, const terrimp_terrain *terrain, const scene *s, int 
     h->mesh_index_count = larger(info.mesh_index_stride, info.mesh_index_count
                                                     - info.node_count * info.mesh_index_stride);
     h->indices = malloc(info.ground_index_count * sizeof *h->indices);
+    h->floor_first_index = info.mesh_index_count - info.floor_index_count;
     h->mesh_indices = malloc(h->mesh_index_count * sizeof *h->mesh_indices);
     h->mesh_xyz = malloc(h->mesh_floats * sizeof *h->mesh_xyz);
     most = 3 * info.ground_index_count + 3 * h->mesh_index_count + h->mesh_floats / 3;

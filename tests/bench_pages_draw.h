@@ -71,12 +71,13 @@ static void painter_ground(void *user, const terrimp_ground_command *c)
         raster_draw(&p->r, &style, p->xyz, p->indices + c->first_index, c->index_count);
 }
 
-static void painter_mesh(painter *p, uint32_t node, const raster_style *style, uint32_t count)
+static void painter_mesh(painter *p, uint32_t node, const raster_style *style, uint32_t first,
+                         uint32_t count)
 {
     painter_screen(p);
     if (terrimp_terrain_fill_mesh(p->terrain, node, p->xyz, p->floats, p->mesh_indices,
                                   p->mesh_index_count) == TERRIMP_OK)
-        raster_draw(&p->r, style, p->xyz, p->mesh_indices, count);
+        raster_draw(&p->r, style, p->xyz, p->mesh_indices + first, count);
 }
 
 static void painter_impostor(void *user, const terrimp_impostor_command *c)
@@ -88,7 +89,7 @@ static void painter_impostor(void *user, const terrimp_impostor_command *c)
     memcpy(style.picture_eye, c->eye, sizeof style.picture_eye);
     style.share = (int)(c->alpha * RASTER_ALL + 0.5f);
     style.within_depth = c->part_count > 1;
-    painter_mesh(p, c->node, &style, c->index_count);
+    painter_mesh(p, c->node, &style, 0, c->index_count);
 }
 
 static void painter_floor(void *user, const terrimp_floor_command *c)
@@ -98,7 +99,9 @@ static void painter_floor(void *user, const terrimp_floor_command *c)
     style.texture = &p->colour;
     style.texture_matrix = p->colour_matrix;
     style.share = RASTER_ALL;
-    painter_mesh(p, p->info.node_count, &style, c->index_count);
+    painter_mesh(p, p->info.node_count, &style,
+                 c->first_index - (p->info.mesh_index_count - p->info.floor_index_count),
+                 c->index_count);
 }
 
 /* A view of a terrain whose sides are `side` [wu], over which a texture is spread. */

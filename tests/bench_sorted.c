@@ -2,7 +2,8 @@
    an eye flies a circle at a constant height above the ground, 1000 frames, and the scale of the
    levels is raised until triangles go from 400 to 6000 a frame. What is timed is what makes them,
    without drawing: medians over the frames, less what the clock takes itself. Cycles are those of a
-   chain of additions and shifts on the same machine.
+   chain of additions and shifts on the same machine. Then views in painter's order over the same
+   pages, and what max_cost makes of flights over other terrain.
 
    Build:  make bench_sorted
    Use:    build/bench_sorted   (BENCH_FRAMES is the number of frames of a flight [1000])
@@ -11,6 +12,7 @@
 #define TERRIMP_IMPLEMENTATION
 #include "terrimp.h"
 
+#include "bench_pace.h"
 #include "bench_say.h"
 
 #include "examples/host/raster.h"
@@ -414,6 +416,7 @@ int main(void)
         first.triangles, last.triangles, first.triangles / first.pages, first.cycles, last.cycles,
         1e6 * first.cycles / rate, 1e6 * last.cycles / rate, rate / (400.0 * first.cycles));
     fly_views(frames, rate);
+    pace_flights();
     say_close();
     return 0;
 }

@@ -63,6 +63,7 @@ static terrimp_view_desc way_describe(const way *w)
     if (w->mode == TERRIMP_MODE_GEOMIP)
         desc.ground_tolerance_px = w->tolerance_px;
     desc.ground_rule = w->rule;
+    desc.bound = terrimp_geomip_bound();
     desc.morph_ratio = w->morph_ratio;
     desc.fade_start = w->foreground * 0.75f;
     desc.fade_end = w->foreground;

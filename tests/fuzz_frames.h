@@ -77,6 +77,7 @@ static void describe_view(terrimp_view_desc *desc)
     memset(desc, 0, sizeof *desc);
     desc->mode = (int)fuzz_below(TERRIMP_MODE_COUNT + 1);
     desc->ground_rule = fuzz_u8() & 3u ? 0 : (int)fuzz_below(TERRIMP_GEOMIP_RULE_COUNT + 1);
+    desc->bound = terrimp_geomip_bound();
     desc->morph_ratio = fuzz_u8() & 3u ? 0.0f : fuzz_float(4.0f);
     desc->fade_start = fuzz_u8() & 3u ? fuzz_good(0.0f, 80.0f) : fuzz_float(100.0f);
     desc->fade_end = fuzz_u8() & 3u ? 0.0f : fuzz_float(200.0f);

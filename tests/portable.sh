@@ -82,6 +82,14 @@ bakes_travel()
     done < $work/openers
 }
 
+# Nothing where the kernel runs 32-bit programs of this machine itself, else what runs them.
+by_32_bits()
+{
+    ! have i686-linux-gnu-gcc && return
+    echo 'int main(void) { return 0; }' | i686-linux-gnu-gcc -static -x c - -o $work/small
+    $work/small 2> /dev/null || echo qemu-i386
+}
+
 # machine name "what it shows" "compiler and flags" "emulator, or none" ["more sources"]
 # Programs are linked statically, so that nothing of the machine need be installed but the compiler.
 machine()
@@ -121,15 +129,16 @@ corpus_in_32_bits()
 
 replays() # fuzzer, corpus
 {
-    $compiler -DTERRIMP_STATIC -I. "tests/$1.c" -lm -o $work/fuzzer && $work/fuzzer "$2"/*
+    $compiler -DTERRIMP_STATIC -I. "tests/$1.c" -lm -o $work/fuzzer && $x87 $work/fuzzer "$2"/*
 }
 
 machines()
 {
-    machine x87 "80-bit registers, as C99 has them" "i686-linux-gnu-gcc -O2 -std=c99" ""
+    x87=$(by_32_bits)
+    machine x87 "80-bit registers, as C99 has them" "i686-linux-gnu-gcc -O2 -std=c99" "$x87"
     ! wanted x87 || corpus_in_32_bits
     machine x87-gnu "80-bit registers, rounded at the compiler's whim" \
-        "i686-linux-gnu-gcc -O2 -std=gnu99" ""
+        "i686-linux-gnu-gcc -O2 -std=gnu99" "$x87"
     machine arm "32 bits, hard float" "arm-linux-gnueabihf-gcc -O2 -std=c99" qemu-arm
     machine aarch64 "products fused with sums" "aarch64-linux-gnu-gcc -O2 -std=gnu99" qemu-aarch64
     machine mipsel "32 bits" "mipsel-linux-gnu-gcc -O2 -std=c99" qemu-mipsel

@@ -12,8 +12,8 @@ enum { FLIGHT_SCENES = 8 }; /* of 288 frames */
 enum { FLIGHT_SPOT = 3 }; /* pixels of a frame */
 
 /* What is asked of a frame. Where the eye is over the ground: no hole, and no skyline torn off.
-   From elsewhere no floor can be drawn, and a texel at the edge of a step may let the sky through,
-   once in some thousand frames: no more than a spot. */
+   From elsewhere little or no floor can be drawn, and a texel at the edge of a step may let the sky
+   through, once in some thousand frames: no more than a spot. */
 static void check_flight(void *user, const holes_scene *s, const holes_path *p,
                          const holes_frame *f)
 {

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.." || exit 1
 work=build/test/sizes
 mkdir -p $work
 flags="-std=c99 -Os -DNDEBUG -DTERRIMP_NO_MALLOC -ffunction-sections -fdata-sections -I."
-leave_out="-DTERRIMP_NO_SPLIT -DTERRIMP_NO_BOUND -DTERRIMP_NO_MORPH"
+leave_out="-DTERRIMP_NO_SPLIT -DTERRIMP_NO_MORPH"
 aim=24576
 draws="terrimp_terrain_open_bytes terrimp_terrain_open terrimp_view_bytes terrimp_view_init
        terrimp_view_update terrimp_view_render"
@@ -62,9 +62,10 @@ machine() # name, prefix, flags, "judged" or ""
     has_none_of "$1" "$2" $work/part.o "terrain without end" '^terrimpi_tiled_'
     has_none_of "$1" "$2" $work/part.o "exact depth" '^terrimpi_impostor_place_'
     has_none_of "$1" "$2" $work/part.o "pieces of nodes" '^terrimpi_capture_draw_rows'
+    has_none_of "$1" "$2" $work/part.o "the rule BOUND" '^terrimpi_mip_bound_'
     $compile -DTERRIMP_NO_BUILD $leave_out -o $work/small.o || exit 1
     linked "$2" $work/small.o $draws || exit 1
-    row "$1" "without splits, BOUND, morphing" $work/part.o "$4"
+    row "$1" "without splits, morphing" $work/part.o "$4"
     [ -z "$2" ] || needs_nothing_heavy "$1" "$2" "$object"
     $compile -DTERRIMP_NO_BUILD -DTERRIMP_FIXED -o $work/fixed.o || exit 1
     linked "$2" $work/fixed.o terrimp_sorted_begin terrimp_sorted_init terrimp_sorted_next || exit 1

@@ -995,7 +995,7 @@ static void view_descriptors_are_refused(void)
         REFUSES(TERRIMP_E_NULL, view, terrimp_view_init(l.terrain, &good, NULL, 1u << 30, &view));
         REFUSES(TERRIMP_E_NULL, view, terrimp_view_create(l.terrain, &good, &allocator, &view));
         check_view_numbers(&l);
-        for (i = 0; i < 13; i++) {
+        for (i = 0; i < 14; i++) {
             bad = good;
             switch (i) {
             case 0: bad.mode = -1; break;
@@ -1010,6 +1010,7 @@ static void view_descriptors_are_refused(void)
             case 9: bad.max_impostors = 65535; break;
             case 10: bad.max_impostors = 0xffffffffu; break;
             case 11: bad.max_captures = 1025; break;
+            case 12: bad.ground_rule = TERRIMP_GEOMIP_BOUND; break; /* without its bound */
             default: bad.max_captures = 0xffffffffu; break;
             }
             check_view_refused(TERRIMP_E_RANGE, l.terrain, &bad);
@@ -1189,6 +1190,7 @@ static void too_little_room_for_ground_is_an_error(void)
     l.desc.chunk_quads = 8;
     memset(&desc, 0, sizeof desc);
     desc.ground_rule = TERRIMP_GEOMIP_BOUND;
+    desc.bound = terrimp_geomip_bound();
     desc.max_ground = 1;
     memset(&camera, 0, sizeof camera);
     camera.eye[0] = camera.eye[2] = 32.0f;

@@ -255,6 +255,7 @@ static void golden_settings(terrimp_view_desc *d, int mode, int variant, int kin
     d->no_lookahead = kind == 1;
     d->no_spreading = kind == 2;
     d->ground_rule = kind % (int)TERRIMP_GEOMIP_RULE_COUNT;
+    d->bound = terrimp_geomip_bound();
     if (variant == 1) {
         d->morph_ratio = 1.5f;
         d->ground_tolerance_px = 4.0f;

@@ -1517,6 +1517,94 @@ static void pages_are_wanted_by_all_views(void)
     p->memory = NULL;
 }
 
+/* Pictures that stand for smaller ones. An eye comes closer when the finest two levels have been
+   given up: what is too large for an impostor by then stays one, and is drawn while its picture is
+   good. It is not made anew, but asks for the nodes that it stands for, before all that is only a
+   little coarse. When they have come nothing stands for others any more. With chunks of 64,
+   impostors are smaller than the nodes of ground that will do: pictures alone ask for pages. */
+static void pictures_stand_for(uint32_t side, uint32_t chunk, float ground_px, float from,
+                               float step, uint32_t *drawn)
+{
+    static paged_frame frame;
+    static terrimp_want wants[512];
+    paged_land p;
+    terrimp_camera camera;
+    terrimp_view_desc desc;
+    terrimp_view *view = NULL;
+    uint32_t turn, i, k, at, count, node, stood = 0, asked = 0;
+    paged_prepare(&p, side, side, TERRIMP_FORMAT_U16, LAND_HILLS, chunk, 0);
+    p.l.desc.field.height_scale = p.desc.terrain.field.height_scale = 2e-4f; /* meshes do */
+    if (!land_build(&p.l) || !paged_build(&p) || !paged_open(&p, p.info.node_count + 8u))
+        return;
+    paged_fetch_all(&p);
+    camera = paged_camera(&p.l, 1);
+    camera.eye[0] = from;
+    camera.eye[1] = 14.0f + 2.0f * (float)chunk;
+    camera.eye[2] = 0.5f * (float)side;
+    camera.forward[0] = 1.0f;
+    camera.forward[1] = -0.3f;
+    camera.forward[2] = 0.0f;
+    memset(&desc, 0, sizeof desc);
+    desc.tolerance_px = 8.0f; /* pictures last, and cost little */
+    desc.ground_tolerance_px = ground_px;
+    desc.costs.capture = 1.0f;
+    CHECK(terrimp_view_create(p.opened, &desc, NULL, &view) == TERRIMP_OK);
+    for (turn = 0; turn < 200u; turn++) {
+        int held_back = turn >= 60u && turn < 160u;
+        if (turn < 160u)
+            camera.eye[0] += step;
+        for (node = 0; node < p.opened->tree.level_first[2] && turn == 60u; node++)
+            terrimpi_page_clear(&p.opened->tree, terrimpi_page_slot_of(p.opened->tree.pages, node));
+        CHECK(terrimp_pages_next_frame(p.opened) == TERRIMP_OK);
+        CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+        CHECK(terrimp_pages_wants(p.opened, wants, 512, &count) == TERRIMP_OK);
+        for (k = 0; k < view->regions.count; k++) {
+            const terrimpi_region *r = &view->regions.items[k];
+            const terrimpi_candidate *c = r->candidates;
+            const terrimpi_cache_picture *picture;
+            terrimp_node child;
+            if (r->kind != TERRIMPI_VIEW_KIND_IMPOSTOR || r->candidate_count != 1u || !c->is_short)
+                continue;
+            CHECK(turn >= 60u && turn < 165u);
+            for (i = 0; i < view->jobs.count; i++)
+                CHECK(view->jobs.items[i].plan.node.number != c->node.number);
+            picture = terrimpi_cache_find(&view->cache, c->node.number);
+            CHECK(!terrimpi_candidate_ready(c) || picture->listed == view->frame.number);
+            *drawn += terrimpi_candidate_ready(c) ? 1u : 0u;
+            stood++;
+            for (i = 0; i < 4u; i++) {
+                terrimp_box box;
+                CHECK(terrimpi_tree_quarter(&p.opened->tree, &c->node, i, &child));
+                terrimpi_page_box(p.opened, &child, &box);
+                if (paged_is_here(&p, child.number) ||
+                    terrimp_frustum_test(&view->frame.frustum, &box, TERRIMP_PLANES_ALL) ==
+                        TERRIMP_PLANES_OUTSIDE)
+                    continue;
+                for (at = 0; at < count && wants[at].node != child.number; at++) {}
+                CHECK(at < count && wants[at].urgency >= 2.0f);
+                asked++;
+            }
+        }
+        CHECK(paged_render(view, &frame, &p) == TERRIMP_OK);
+        check_paged_frame(&p.l, &frame, &camera, 0);
+        for (i = 0; i < count && !held_back; i++)
+            CHECK(paged_fetch(&p, wants[i].node) == TERRIMP_OK);
+    }
+    CHECK(stood > *drawn && asked > 0);
+    CHECK(view->late == 0 && frame.impostor_count > 0);
+    terrimp_view_destroy(view);
+    paged_free(&p);
+}
+
+static void pictures_stand_for_pages_on_the_way(void)
+{
+    uint32_t drawn = 0;
+    pictures_stand_for(1025, 64, 20.0f, 265.0f, 0.5f, &drawn);
+    drawn = 0;
+    pictures_stand_for(257, 8, 0.25f, 20.0f, 0.25f, &drawn);
+    CHECK(drawn > 0);
+}
+
 static inline void pages_tests(void)
 {
     RUN(bad_pages);
@@ -1540,6 +1628,7 @@ static inline void pages_flights(void)
     RUN(pages_of_a_jump_come_at_once);
     RUN(guesses_of_pages_fall_from_level_to_level);
     RUN(pages_are_wanted_by_all_views);
+    RUN(pictures_stand_for_pages_on_the_way);
 }
 
 #endif

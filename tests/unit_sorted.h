@@ -345,9 +345,14 @@ static void sorted_needs_no_depth_buffer_over_mountains(void)
     sorted_needs_no_depth_buffer_over_tile("N42E001.hgt");
 }
 
+/* TERRIMP_LONG: over the other tiles, too. */
 static void sorted_needs_no_depth_buffer_over_hills(void)
 {
     sorted_needs_no_depth_buffer_over_tile("N49E011.hgt");
+    if (getenv("TERRIMP_LONG")) {
+        sorted_needs_no_depth_buffer_over_tile("N41E001.hgt");
+        sorted_needs_no_depth_buffer_over_tile("N48W125.hgt");
+    }
 }
 
 /* ---- the order of views ---- */

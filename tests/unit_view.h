@@ -112,6 +112,7 @@ typedef struct flight {
     /* All frames: */
     uint32_t total_captures, total_impostors, total_ground, total_waiting, total_pieces;
     uint32_t total_fading, total_high, total_splits, most_captures, total_lost;
+    uint32_t total_floor_beside; /* quads */
 } flight;
 
 static void *flight_array(size_t count, size_t bytes)
@@ -630,18 +631,69 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     f->total_high += command->level > 0;
 }
 
-/* The floor comes once, after all else. */
+/* Whether the eye is beside the terrain, and no other one goes on there. */
+static int flight_beside(const flight *f)
+{
+    const terrimp_box *box = &f->l->info.box;
+    const float *eye = f->camera.eye;
+    if (f->desc.joined || f->apart)
+        return 0;
+    return eye[0] < box->min[0] || eye[0] > box->max[0] || eye[2] < box->min[2] ||
+           eye[2] > box->max[2];
+}
+
+/* Where a line from an eye beside the terrain to a place within it comes in, it is over ground. */
+static void check_floor_is_behind_ground(const flight *f, const float place[3])
+{
+    const terrimp_box *box = &f->l->info.box;
+    const float *eye = f->camera.eye;
+    float in = 0.0f, at[3], ground = 0.0f;
+    int k;
+    for (k = 0; k < 3; k += 2)
+        if (eye[k] < box->min[k] || eye[k] > box->max[k]) {
+            float border = eye[k] < box->min[k] ? box->min[k] : box->max[k];
+            float way = (border - eye[k]) / (place[k] - eye[k]);
+            in = way > in ? way : in;
+        }
+    for (k = 0; k < 3; k++) {
+        at[k] = eye[k] + in * (place[k] - eye[k]);
+        if (k != 1)
+            at[k] = at[k] < box->min[k] ? box->min[k] : at[k] > box->max[k] ? box->max[k] : at[k];
+    }
+    CHECK(terrimp_heightfield_height(&f->l->desc.field, at[0], at[2], &ground) == TERRIMP_OK);
+    CHECK(at[1] >= ground - 1e-4f * (fabsf(eye[1]) + fabsf(ground)));
+}
+
+/* The floor comes once, after all else; or when the eye is beside the terrain parts of it, that are
+   nowhere seen below its borders. */
 static void flight_draw_floor(void *user, const terrimp_floor_command *command)
 {
     flight *f = (flight *)user;
+    const land *l = f->l;
+    uint32_t base = l->info.node_count * l->info.mesh_vertex_stride, i, k;
+    uint32_t end = command->first_index + command->index_count;
+    int beside = flight_beside(f) && !f->camera.orthographic;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
-    CHECK(!f->in_capture && f->stage == 1);
+    CHECK(!f->in_capture && f->stage == (f->floor_drawn ? 2 : 1));
     f->stage = 2;
     CHECK(f->impostor_count > 0);
-    CHECK(command->base_vertex == f->l->info.node_count * f->l->info.mesh_vertex_stride);
-    CHECK(command->first_index == f->l->info.node_count * f->l->info.mesh_index_stride);
-    CHECK(command->first_index + command->index_count == f->l->info.mesh_index_count);
-    f->floor_drawn = 1;
+    CHECK(command->base_vertex == base);
+    CHECK(command->first_index >= l->info.mesh_index_count - l->info.floor_index_count);
+    CHECK(end <= l->info.mesh_index_count);
+    CHECK(beside || (f->floor_drawn == 0 && command->index_count == l->info.floor_index_count));
+    for (i = command->first_index; beside && l->xyz && i < end; i += 3u) {
+        float place[3], share[3];
+        for (k = 0; k < 3u; k++)
+            share[k] = (float)((i / 3u + k * 5u) % 7u % 4u);
+        for (k = 0; k < 3u; k++)
+            place[k] = (share[0] * l->xyz[3u * (base + l->indices[i]) + k] +
+                        share[1] * l->xyz[3u * (base + l->indices[i + 1u]) + k] +
+                        share[2] * l->xyz[3u * (base + l->indices[i + 2u]) + k]) /
+                       (share[0] + share[1] + share[2]);
+        check_floor_is_behind_ground(f, place);
+    }
+    f->floor_drawn++;
+    f->total_floor_beside += beside ? command->index_count / 6u : 0u;
     f->triangles += command->index_count / 3u;
 }
 
@@ -1210,6 +1262,7 @@ static terrimp_view_desc random_settings(int mode)
     d.tolerance_px = maybe(0.1f, 8.0f);
     d.ground_tolerance_px = maybe(0.1f, 8.0f);
     d.ground_rule = (int)random_range(0, TERRIMP_GEOMIP_RULE_COUNT - 1u);
+    d.bound = terrimp_geomip_bound();
     d.morph_ratio = random_range(0, 3) ? 0.0f : random_float(1.0f, 3.0f);
     d.fade_start = maybe(2.0f, 100.0f);
     d.fade_end = random_range(0, 1) && d.fade_start > 0.0f
@@ -2166,6 +2219,7 @@ static void geomip_draws_the_selection(void)
     d.mode = TERRIMP_MODE_GEOMIP;
     d.ground_tolerance_px = view.tolerance_px = 2.0f;
     d.ground_rule = view.rule = TERRIMP_GEOMIP_BOUND;
+    d.bound = terrimp_geomip_bound();
     d.morph_ratio = view.morph_ratio = 1.4f;
     CHECK(terrimp_quadtree_init(&l.desc.field, l.desc.chunk_quads, &tree) == TERRIMP_OK);
     tree.nodes = (terrimp_geomip_node *)flight_array(tree.node_count, sizeof *tree.nodes);
@@ -2693,6 +2747,53 @@ static void the_field_that_is_wrong_is_named(void)
     land_free(&l);
 }
 
+/* Eyes beside the terrain, close and far, low and high: what is drawn of the floor is checked where
+   it comes. From over the highest ground nearly all of it is. */
+static void the_floor_is_seen_from_beside_behind_ground_alone(void)
+{
+    flight *f = &flight_room;
+    static land l;
+    int round, frame, k;
+    for (round = 0; round < 4; round++) {
+        terrimp_view_desc d;
+        uint32_t quads = 0, high_frames = 0;
+        land_prepare(&l, random_range(70, 150), random_range(70, 150), TERRIMP_FORMAT_F32,
+                     round % 2 ? LAND_NOISE : LAND_HILLS);
+        l.desc.chunk_quads = 8u << random_range(0, 1);
+        l.desc.field.height_scale = random_float(0.2f, 1.0f);
+        memset(&d, 0, sizeof d);
+        d.mode = TERRIMP_MODE_IMPOSTOR;
+        d.fade_start = 1.0f;
+        d.max_angle_rad = 0.2f;
+        if (!land_build(&l) || !flight_open(f, &l, &d))
+            return;
+        for (frame = 0; frame < 60; frame++) {
+            const terrimp_box *box = &l.info.box;
+            int high = frame % 3 == 0, axis = random_range(0, 1) ? 0 : 2;
+            float side = box->max[axis] - box->min[axis], rise = box->max[1] - box->min[1];
+            terrimp_camera camera = camera_beside(&l);
+            for (k = 0; k < 3; k++)
+                camera.eye[k] = random_float(box->min[k] - side, box->max[k] + side);
+            camera.eye[axis] = random_range(0, 1)
+                                   ? box->min[axis] - random_float(0.01f, 1.0f) * side
+                                   : box->max[axis] + random_float(0.01f, 1.0f) * side;
+            camera.eye[1] = high ? box->max[1] + 4.0f * (side + rise)
+                                 : box->min[1] + random_float(-0.2f, 1.5f) * rise;
+            for (k = 0; k < 3; k++)
+                camera.forward[k] = 0.5f * (box->min[k] + box->max[k]) - camera.eye[k];
+            camera.forward[0] += 0.01f; /* not straight down */
+            flight_update(f, &camera);
+            flight_render(f);
+            high_frames += high && f->impostor_count > 0;
+            quads += high ? f->total_floor_beside : 0u;
+            f->total_floor_beside = 0;
+        }
+        CHECK(high_frames > 10 && quads * 6u > high_frames * l.info.floor_index_count / 2u);
+        flight_close(f);
+        land_free(&l);
+    }
+}
+
 static inline void view_tests(void)
 {
     RUN(the_state_of_a_small_terrain_takes_32_kib);
@@ -2708,6 +2809,7 @@ static inline void view_tests(void)
     RUN(flights_with_little_room_keep_every_law);
     RUN(flights_of_any_camera_keep_every_law);
     RUN(an_orthographic_camera_that_only_moves_captures_nothing);
+    RUN(the_floor_is_seen_from_beside_behind_ground_alone);
     RUN(a_resting_eye_captures_nothing);
     RUN(nothing_waits_after_some_frames_of_rest);
     RUN(touch_forgets_what_shows_the_samples_and_little_else);

@@ -425,8 +425,9 @@ static size_t larger(size_t a, size_t b)
 static int make_room(gl_terrain *g, const terrimp_terrain_info *info)
 {
     size_t vertices = larger(info->ground_vertex_count, info->mesh_vertex_stride), indices;
-    g->floor_vertices = info->mesh_vertex_count - info->node_count * info->mesh_vertex_stride;
-    g->floor_indices = info->mesh_index_count - info->node_count * info->mesh_index_stride;
+    g->floor_vertices = info->floor_vertex_count;
+    g->floor_indices = info->floor_index_count;
+    g->floor_first_index = info->mesh_index_count - info->floor_index_count;
     vertices = larger(vertices, g->floor_vertices);
     indices = larger((size_t)info->mesh_index_stride * 3, g->floor_indices); /* and its lines */
     g->xyz = malloc(vertices * 3 * sizeof *g->xyz);
@@ -792,12 +793,13 @@ static void end_capture(void *user, const terrimp_capture_command *command)
 }
 
 /* Draws a slot of the coarse meshes; the program has its own uniforms already. */
-static void draw_mesh(gl_terrain *g, GLuint texture, uint32_t slot, uint32_t index_count)
+static void draw_mesh(gl_terrain *g, GLuint texture, uint32_t slot, uint32_t first_index,
+                      uint32_t index_count)
 {
     const gl_pool *meshes = &g->mesh_pool;
     glBindTexture(GL_TEXTURE_2D, texture);
     draw_slot(meshes->array, meshes, GL_TRIANGLES, slot, index_count,
-              index_offset(slot * meshes->node_indices));
+              index_offset(slot * meshes->node_indices + first_index));
 }
 
 static void draw_mesh_over(gl_terrain *g, const terrimp_impostor_command *c, uint32_t slot);
@@ -834,7 +836,7 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         bind_to(GL_ATLAS_NORMAL_UNIT, g->atlas_normals[c->atlas]);
     glUniform3fv(p->picture_eye, 1, c->eye);
     glDisable(GL_CULL_FACE);
-    draw_mesh(g, g->atlas[c->atlas], slot, c->index_count);
+    draw_mesh(g, g->atlas[c->atlas], slot, 0, c->index_count);
     glEnable(GL_CULL_FACE);
 }
 
@@ -847,7 +849,8 @@ static void draw_floor(void *user, const terrimp_floor_command *c)
     gl_terrain_turn_to_frame(g);
     flush(g);
     glUseProgram(g->ground.id);
-    draw_mesh(g, g->lightmap, g->mesh_pool.slot_count, c->index_count);
+    draw_mesh(g, g->lightmap, g->mesh_pool.slot_count, c->first_index - g->floor_first_index,
+              c->index_count);
 }
 
 /* A morphing node is a draw of its own: its factors are uniforms. */
@@ -1069,7 +1072,7 @@ static void draw_mesh_over(gl_terrain *g, const terrimp_impostor_command *c, uin
     glUseProgram(g->line.id);
     if (g->over == GL_OVER_LEVELS) {
         glUniform3fv(g->line.tint, 1, gl_level_colour(c->level));
-        draw_mesh(g, 0, slot, c->index_count);
+        draw_mesh(g, 0, slot, 0, c->index_count);
         return;
     }
     if (terrimp_terrain_fill_mesh(g->terrain, c->node, g->xyz, (size_t)p->node_vertices * 3,

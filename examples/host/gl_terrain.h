@@ -116,6 +116,7 @@ typedef struct gl_terrain {
     const char *shading;
     gl_pool ground_pool, mesh_pool;  /* behind the slots of meshes stands the floor */
     size_t floor_vertices, floor_indices;
+    uint32_t floor_first_index; /* of commands */
     uint32_t frame_number;
     GLuint morphing_array, moves, weights; /* with morphing */
     float *xyz;                      /* of one node, to be sent, like the next two */

@@ -13,18 +13,12 @@ static double block[1 << 12], memory[1 << 8];
 /* What has been left out is refused, all else is not. */
 static int refuses_what_is_left_out(const terrimp_terrain *terrain)
 {
-    terrimp_result bound = TERRIMP_OK, morph = TERRIMP_OK;
+    terrimp_result morph = TERRIMP_OK;
     terrimp_view_desc desc, out;
-#ifdef TERRIMP_NO_BOUND
-    bound = TERRIMP_E_RANGE;
-#endif
 #ifdef TERRIMP_NO_MORPH
     morph = TERRIMP_E_RANGE;
 #endif
     memset(&desc, 0, sizeof desc);
-    desc.ground_rule = TERRIMP_GEOMIP_BOUND;
-    if (terrimp_view_desc_resolve(terrain, &desc, &out) != bound)
-        return 0;
     desc.ground_rule = TERRIMP_GEOMIP_DISTANCE;
     if (terrimp_view_desc_resolve(terrain, &desc, &out) != TERRIMP_OK)
         return 0;

@@ -40,7 +40,7 @@ ways()
     check "$1: as without a system"         builds_and_runs "$2 $freestanding" bare.c
     check "$1: without building, from a bake" builds_and_runs "$2" no_build.c bake_maker.c
     check "$1: the same without options for small machines" \
-        builds_and_runs "$2 -DTERRIMP_NO_SPLIT -DTERRIMP_NO_BOUND -DTERRIMP_NO_MORPH" \
+        builds_and_runs "$2 -DTERRIMP_NO_SPLIT -DTERRIMP_NO_MORPH" \
         no_build.c bake_maker.c
     check "$1: in two files"                builds_and_runs "$2" unit_a.c unit_b.c
     check "$1: private to each of two files" builds_and_runs "$2" static_a.c static_b.c
