@@ -10405,6 +10405,27 @@ static float terrimpi_view_sine(const terrimpi_frame *f, uint32_t node, float cl
     return f->camera.reach > 0.0f ? terrimpi_max(sine - f->camera.reach / closest, 0.0f) : sine;
 }
 
+/* How far a picture and what is drawn beside it may be apart [px] until the picture is gone: by its
+   parallax error, which is less than the tolerance where the angle is at its limit before that; or
+   by what ground beside it is off, of a level up to two coarser: borders are lifted over that. */
+static float terrimpi_view_apart(const terrimpi_frame *f, const terrimp_node *node, float closest)
+{
+    const terrimp_quadtree *tree = &f->terrain->tree;
+    const terrimp_geomip_node *beside;
+    float error = terrimpi_view_mesh_error(f, node->number), off = f->desc->ground_tolerance_px;
+    terrimp_node n = *node;
+    uint32_t up;
+    for (up = 0; up < 2u && n.level + 1u < tree->level_count; up++)
+        n = terrimpi_tree_parent(tree, &n);
+    beside = terrimpi_tree_kept(tree, n.number);
+    if (beside)
+        off = terrimpi_min(off, 2.0f * beside->rms * f->pixel_factor /
+                                    terrimpi_max(closest, 1e-20f));
+    error *= TERRIMPI_VIEW_STALE * f->pixel_factor * TERRIMP_SINF(f->desc->max_angle_rad) /
+             terrimpi_max(closest - error, 1e-20f);
+    return terrimpi_min(f->desc->tolerance_px, terrimpi_max(error, off));
+}
+
 enum {
     TERRIMPI_CULL_GROUND = 1,   /* the ground cut runs here */
     TERRIMPI_CULL_IMPOSTOR = 2, /* the impostor cut does, */
@@ -12073,7 +12094,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_plan *plan = &job->plan;
     float origin[3], forward[3], distance, split = 0.0f;
     int parallel = f->camera.orthographic;
-    float texels = 1.5f + f->desc->tolerance_px * f->density; /* bilinear, parallax */
+    float apart = terrimpi_view_apart(f, &c->node, c->closest);
+    float texels = 1.5f + apart * f->density; /* bilinear, and what comes into sight */
     uint32_t size[2], i, count, largest = f->desc->max_slot - 2u * TERRIMPI_CAPTURE_MARGIN;
     terrimp_mesh_info mesh;
     int is_known;

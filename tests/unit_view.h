@@ -2173,6 +2173,51 @@ static void auto_is_not_dearer_than_ground_where_pictures_do_not_last(void)
     land_free(&l);
 }
 
+/* The one knob over its range: over low hills that are seen at a grazing angle a frame of a larger
+   tolerance costs no more, and a picture that may be farther off does not draw more ground: its
+   border is for what comes into sight while it lasts, which the angle limits, too. */
+static void a_larger_tolerance_is_never_dearer(void)
+{
+    static const float tolerances[] = {0.25f, 0.5f, 1.0f, 2.0f, 4.0f, 8.0f, 16.0f};
+    double last = 1e30, finest = 0.0;
+    uint32_t i, x, z;
+    int k;
+    land l;
+    land_prepare(&l, 257, 257, TERRIMP_FORMAT_F32, LAND_FLAT);
+    l.desc.chunk_quads = 16;
+    for (z = 0; z < 257u; z++)
+        for (x = 0; x < 257u; x++)
+            l.samples[z * 257u + x] =
+                2.0f * sinf((float)x * 0.075f) * cosf((float)z * 0.055f) +
+                sinf((float)(x + 2u * z) * 0.025f);
+    for (i = 0; (l.terrain || land_build(&l)) && i < sizeof tolerances / sizeof *tolerances; i++) {
+        terrimp_camera camera = camera_beside(&l);
+        double cost = 0.0, triangles = 0.0, captures = 0.0;
+        terrimp_view_desc d;
+        memset(&d, 0, sizeof d);
+        d.tolerance_px = tolerances[i];
+        if (!flight_open(&flight_room, &l, &d))
+            break;
+        camera.eye[1] = l.info.box.max[1] + 0.5f;
+        camera.forward[1] = 0.0f;
+        for (k = 0; k < 120; k++) {
+            camera.eye[0] = camera.eye[2] = 10.0f + 0.6f * (float)k;
+            flight_update(&flight_room, &camera);
+            flight_render(&flight_room);
+            triangles += (double)flight_room.stats.captured_triangles;
+            captures += (double)flight_room.stats.captures;
+            cost += (double)flight_room.stats.cost;
+        }
+        flight_close(&flight_room);
+        CHECK(captures > 0.0 && cost < last);
+        last = cost;
+        finest = i == 0 ? triangles / captures : finest;
+        CHECK(triangles < 2.0 * finest * captures);
+    }
+    CHECK(i == sizeof tolerances / sizeof *tolerances);
+    land_free(&l);
+}
+
 /* Speed counts over the way that a picture lasts for. An eye that only moves to and fro within that
    way lets it last; a steady one has its own speed; a jump is none. */
 static void an_eye_that_bobs_is_not_fast(void)
@@ -2827,6 +2872,7 @@ static inline void view_tests(void)
     RUN(dear_captures_leave_only_ground);
     RUN(auto_is_not_dearer_than_ground_or_impostors_alone);
     RUN(auto_is_not_dearer_than_ground_where_pictures_do_not_last);
+    RUN(a_larger_tolerance_is_never_dearer);
     RUN(an_eye_that_bobs_is_not_fast);
     RUN(geomip_draws_the_selection);
     RUN(scarce_ground_is_coarser_ground);
