@@ -5127,9 +5127,8 @@ static float terrimpi_mip_stretch(const terrimpi_mip_frame *f, float p_min, floa
     return terrimpi_max(terrimpi_max(most, behind), 0.0f);
 }
 
-/* The square of the most pixels that a vertical error of
-   K^-1 shows as anywhere in a box. It changes continuously with the camera, and never grows from a
-   box to a part of it. */
+/* The square of the most pixels that a vertical error of K^-1 shows as anywhere in a box. It
+   changes continuously with the camera, and never grows from a box to a part of it. */
 static float terrimpi_mip_bound_factor(const terrimpi_mip_frame *f, const terrimp_box *box,
                                        float distance2)
 {

@@ -11,12 +11,6 @@
 
 enum { PACE_SIDE = 1025, PACE_FRAMES = 400, PACE_FIRST = 40, PACE_WAYS = 3 };
 
-static int pace_compare(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 static void pace_capture(void *user, const terrimp_capture_command *c) { (void)user, (void)c; }
 static void pace_ground(void *user, const terrimp_ground_command *c) { (void)user, (void)c; }
 static void pace_impostor(void *user, const terrimp_impostor_command *c) { (void)user, (void)c; }
@@ -42,19 +36,15 @@ static terrimp_camera pace_camera(const terrimp_heightfield *field, int way, int
     return camera;
 }
 
-/* Of the costs of a flight's frames: the median, what 99 of 100 keep to, and the largest. */
-typedef struct pace_costs {
-    float median, most_99, most;
-} pace_costs;
-
-static pace_costs pace_fly(const terrimp_terrain *terrain, const terrimp_heightfield *field,
-                           int way, int mode, float max_cost)
+/* What a flight's frames cost. */
+static stats_summary pace_fly(const terrimp_terrain *terrain, const terrimp_heightfield *field,
+                              int way, int mode, float max_cost)
 {
-    static float costs[PACE_FRAMES];
+    stats costs = { NULL, 0, 0 };
+    stats_summary of;
     terrimp_view_desc d;
     terrimp_view *view = NULL;
     terrimp_callbacks draw;
-    pace_costs of;
     int i;
     memset(&d, 0, sizeof d);
     memset(&draw, 0, sizeof draw);
@@ -68,14 +58,12 @@ static pace_costs pace_fly(const terrimp_terrain *terrain, const terrimp_heightf
         need(terrimp_view_update(view, &camera));
         need(terrimp_view_get_stats(view, &of_frame));
         need(terrimp_view_render(view, &draw));
-        if (i >= PACE_FIRST)
-            costs[i - PACE_FIRST] = of_frame.cost;
+        if (i >= PACE_FIRST && !stats_add(&costs, (double)of_frame.cost))
+            bench_stop("memory", "there is none");
     }
     terrimp_view_destroy(view);
-    qsort(costs, PACE_FRAMES, sizeof *costs, pace_compare);
-    of.median = costs[PACE_FRAMES / 2];
-    of.most_99 = costs[PACE_FRAMES * 99 / 100];
-    of.most = costs[PACE_FRAMES - 1];
+    of = stats_summarise(&costs);
+    stats_free(&costs);
     return of;
 }
 
@@ -88,10 +76,10 @@ static void pace_row(const char *name, const terrimp_terrain_desc *desc, int mod
     say("| %s | %u | %s |", name, (unsigned)desc->chunk_quads,
         mode == TERRIMP_MODE_AUTO ? "AUTO" : "GEOMIP");
     for (way = 0; way < PACE_WAYS; way++) {
-        pace_costs free_of = pace_fly(terrain, &desc->field, way, mode, 0.0f);
-        pace_costs of = pace_fly(terrain, &desc->field, way, mode, free_of.median);
-        say(" %.2f | %.2f | %.2f |", (double)(free_of.most_99 / free_of.median),
-            (double)(of.most_99 / of.median), (double)(of.most / free_of.median));
+        stats_summary free_of = pace_fly(terrain, &desc->field, way, mode, 0.0f);
+        stats_summary of = pace_fly(terrain, &desc->field, way, mode, (float)free_of.median);
+        say(" %.2f | %.2f | %.2f |", free_of.p99 / free_of.median, of.p99 / of.median,
+            of.worst / free_of.median);
     }
     say("\n");
     terrimp_terrain_destroy(terrain);
