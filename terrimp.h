@@ -9932,8 +9932,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
 #define TERRIMPI_VIEW_SEEN 0.4f       /* of the pixels of a picture, that the screen shows */
 #define TERRIMPI_VIEW_BORDER 2.6f     /* triangles for a quad of a picture, border included */
-#define TERRIMPI_VIEW_SHORT 30.0f     /* [frames] a picture that moves the eye past before has to be
-                                         much cheaper than ground, if pages have to come for it */
+#define TERRIMPI_VIEW_SHORT 30.0f     /* [frames] a picture that lasts for less has to be far
+                                         cheaper than ground, if pages have to come for it */
 #define TERRIMPI_VIEW_SPREAD 1.5f     /* captures of a frame over those of the mean frame */
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
