@@ -2910,13 +2910,44 @@ static uint32_t border_frame_meets(const border_frame *b, int side, uint32_t alo
     return met;
 }
 
-/* Eyes beside the terrain: wherever coarse ground at an outer border lies over a sample, a skirt
-   stands between the two. */
+/* Whether an eye is over ground of this level behind a segment of an outer border. */
+static int border_seen_from(const land *l, int side, uint32_t from, uint32_t to, uint32_t step,
+                            const terrimp_camera *camera)
+{
+    const terrimp_heightfield *f = &l->desc.field;
+    uint32_t end = (side < 2 ? f->depth : f->width) - 1u, k;
+    double p[4][3], up[3], eye[3];
+    for (k = 0; k < 4u; k++) {
+        uint32_t along = k & 1u ? to : from, across = k < 2u ? 0u : step < end ? step : end;
+        across = side & 1 ? end - across : across;
+        p[k][0] = (double)f->origin_x + (double)f->spacing_x * (side < 2 ? along : across);
+        p[k][2] = (double)f->origin_z + (double)f->spacing_z * (side < 2 ? across : along);
+        p[k][1] = (double)land_border_sample(l, side, along, across);
+    }
+    for (k = 0; k < 3u; k++)
+        eye[k] = (double)camera->eye[k] - p[0][k];
+    for (k = 2; k < 4u; k++) {
+        double a[3], b[3];
+        int c;
+        for (c = 0; c < 3; c++) {
+            a[c] = p[1][c] - p[0][c];
+            b[c] = p[k][c] - p[k & 1u][c];
+        }
+        for (c = 0; c < 3; c++)
+            up[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+        if ((eye[0] * up[0] + eye[1] * up[1] + eye[2] * up[2]) * up[1] > 1e-3 * up[1] * up[1])
+            return 1;
+    }
+    return 0;
+}
+
+/* Eyes beside the terrain: wherever coarse ground at an outer border lies over a sample, and the
+   eye is over it, a skirt stands between the two; and nowhere else. */
 static void skirts_close_the_borders_of_coarse_ground(void)
 {
     static border_frame b;
     int round, frame, k;
-    uint32_t looked = 0, i, s;
+    uint32_t looked = 0, seen = 0, drawn = 0, i, s;
     for (round = 0; round < 4; round++) {
         static land l;
         terrimp_view_desc d;
@@ -2935,7 +2966,7 @@ static void skirts_close_the_borders_of_coarse_ground(void)
         draw.user = &b;
         draw.draw_ground = border_frame_ground;
         draw.draw_floor = border_frame_skirts;
-        for (frame = 0; frame < 20; frame++) {
+        for (frame = 0; frame < 40; frame++) {
             const terrimp_box *box = &l.info.box;
             terrimp_camera camera = camera_beside(&l);
             int side = (int)random_range(0, 3), axis = side < 2 ? 2 : 0;
@@ -2951,23 +2982,30 @@ static void skirts_close_the_borders_of_coarse_ground(void)
             CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
             CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
             CHECK(b.ground_count <= 2048u && b.skirt_count <= 4096u);
+            drawn += b.skirt_count / 2u;
             for (i = 0; i < b.ground_count; i++) {
                 const terrimp_ground_command *c = &b.ground[i];
                 uint32_t last = (side < 2 ? l.desc.field.width : l.desc.field.depth) - 1u;
                 uint32_t across = (side < 2 ? l.desc.field.depth : l.desc.field.width) - 1u;
                 uint32_t n = side < 2 ? c->x : c->z, row = side < 2 ? c->z : c->x;
-                uint32_t quads = l.desc.chunk_quads << c->level, step = 1u << c->level;
+                uint32_t quads = l.desc.chunk_quads << c->level, step = 1u << c->level, to, gap;
                 uint32_t end = (n + 1u) * quads < last ? (n + 1u) * quads : last;
                 if (side & 1 ? (row + 1u) * quads < across : row > 0u)
                     continue;
                 across = side & 1 ? across : 0u;
+                for (s = n * quads, gap = 8; s < end && c->level > 0; s += step) {
+                    to = s + step < last ? s + step : last;
+                    gap = border_seen_from(&l, side, s, to, step, &camera) ? 0u : gap + 1u;
+                    seen += gap < 8u;
+                }
                 for (s = n * quads; s <= end; s++) {
-                    uint32_t from = s / step * step, to = from + step < last ? from + step : last;
+                    uint32_t from = s / step * step;
                     float a = land_border_sample(&l, side, from, across);
-                    float at = land_border_sample(&l, side, s, across);
-                    float chord = a + (land_border_sample(&l, side, to, across) - a) *
-                                          (float)(s - from) / (float)(to > from ? to - from : 1u);
-                    if (chord - at < 1e-4f)
+                    float at = land_border_sample(&l, side, s, across), chord;
+                    to = from + step < last ? from + step : last;
+                    chord = a + (land_border_sample(&l, side, to, across) - a) *
+                            (float)(s - from) / (float)(to > from ? to - from : 1u);
+                    if (chord - at < 1e-4f || !border_seen_from(&l, side, from, to, step, &camera))
                         continue;
                     looked++;
                     CHECK(border_frame_meets(&b, side, s,
@@ -2979,6 +3017,7 @@ static void skirts_close_the_borders_of_coarse_ground(void)
         land_free(&l);
     }
     CHECK(looked > 500u);
+    CHECK(drawn <= seen + seen / 100u && drawn >= seen - seen / 100u);
 }
 
 static inline void view_tests(void)
