@@ -12049,13 +12049,11 @@ static int terrimpi_view_skirt_shows(const terrimp_view *v, uint32_t level, uint
     const terrimp_heightfield *f = &v->built->desc.field;
     const float *eye = v->frame.camera.eye;
     uint32_t along_x = terrimpi_along_x((int)side) ? 1u : 0u, step = 1u << level, k;
-    uint32_t last = (along_x ? f->width : f->depth) - 1u, end = (along_x ? f->depth : f->width) - 1u;
-    uint32_t at[2], across = side & 1u ? end : 0u;
+    uint32_t last = (along_x ? f->width : f->depth) - 1u;
+    uint32_t end = (along_x ? f->depth : f->width) - 1u, at[2], across = side & 1u ? end : 0u;
     uint32_t in = side & 1u ? end - terrimpi_min_u32(step, end) : terrimpi_min_u32(step, end);
-    float unit = along_x ? f->spacing_x : f->spacing_z, deep = along_x ? f->spacing_z : f->spacing_x;
-    float along = ((along_x ? eye[0] - f->origin_x : eye[2] - f->origin_z) / unit);
-    float out = ((along_x ? eye[2] - f->origin_z : eye[0] - f->origin_x) / deep) - (float)across;
-    float heights[2], rise;
+    float x = (eye[0] - f->origin_x) / f->spacing_x, z = (eye[2] - f->origin_z) / f->spacing_z;
+    float along = along_x ? x : z, out = (along_x ? z : x) - (float)across, heights[2], rise;
     for (k = 0; k < 2u; k++) {
         at[k] = terrimpi_min_u32((segment + k) << level, last);
         heights[k] = terrimpi_skirt_sample(f, along_x, at[k], across);
@@ -12097,9 +12095,10 @@ static uint32_t terrimpi_view_skirts_run(const terrimp_view *v, const terrimp_ca
             to = terrimpi_min_u32(terrimpi_skirt_segments(t, level, side),
                                   ((n + 1u) * quads + (1u << level) - 1u) >> level);
             for (from = n * quads >> level; from <= to; from++) {
-                gap = from < to && terrimpi_view_skirt_shows(v, level, side, from) ? 0u : gap + 1u;
+                gap = from == to ? TERRIMPI_VIEW_SKIRT_GAP
+                      : terrimpi_view_skirt_shows(v, level, side, from) ? 0u : gap + 1u;
                 shown += terrimpi_view_floor_step(&command, first + 6u * from,
-                                                  from < to && gap < TERRIMPI_VIEW_SKIRT_GAP, callbacks, draws);
+                                                  gap < TERRIMPI_VIEW_SKIRT_GAP, callbacks, draws);
             }
         }
     }

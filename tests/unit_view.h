@@ -2845,7 +2845,8 @@ static void the_floor_is_seen_from_beside_behind_ground_alone(void)
             quads += high ? f->total_floor_beside : 0u;
             f->total_floor_beside = 0;
         }
-        CHECK(high_frames > 10 && 2u * 6u * quads > high_frames * terrimpi_floor_of(l.terrain).skirt_index);
+        CHECK(high_frames > 10);
+        CHECK(12u * quads > high_frames * terrimpi_floor_of(l.terrain).skirt_index);
         flight_close(f);
         land_free(&l);
     }
