@@ -6696,8 +6696,8 @@ static uint32_t terrimpi_skirt_before(const terrimp_terrain *t, uint32_t level, 
     return before;
 }
 
-/* How many vertices, indices and points of the walls the floor has; in all with the skirts of ground
-   behind it. */
+/* How many vertices, indices and points of the walls the floor has; in all, with the skirts of
+   ground behind it. */
 typedef struct terrimpi_floor {
     uint32_t ground_vertices, ground_indices, wall_points;
     uint32_t skirt_vertex, skirt_index, vertices, indices;
