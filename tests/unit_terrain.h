@@ -669,10 +669,11 @@ static void check_wall(const land *l, int64_t p[3][2], const double y[3])
 static void check_floor(const land *l, uint32_t base_vertex, uint32_t first_index)
 {
     const terrimp_heightfield *f = &l->desc.field;
-    uint32_t i, walls = 0, vertex_count = l->info.mesh_vertex_count - base_vertex;
+    uint32_t i, walls = 0, vertex_count = terrimpi_floor_of(l->terrain).skirt_vertex;
+    uint32_t end = first_index + terrimpi_floor_of(l->terrain).skirt_index;
     int64_t area = 0;
-    CHECK(vertex_count >= 4 && (l->info.mesh_index_count - first_index) % 3u == 0);
-    for (i = first_index; i + 2u < l->info.mesh_index_count; i += 3u) {
+    CHECK(vertex_count >= 4 && (end - first_index) % 3u == 0 && end <= l->info.mesh_index_count);
+    for (i = first_index; i + 2u < end; i += 3u) {
         int64_t p[3][2], twice, least[2], most[2], x, z;
         double y[3], size = 1e-5 * (fabs((double)l->info.box.min[1]) + 1.0);
         int k;

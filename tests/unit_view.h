@@ -104,7 +104,7 @@ typedef struct flight {
     uint32_t capture_count, begun_count, captured_cells, captured_triangles, captured_texels;
     uint32_t triangles, part_count, wanted_parts;
     int in_capture, screen_started, floor_drawn;
-    int stage; /* of the screen: ground, impostors, floor */
+    int stage; /* of the screen: ground, impostors, floor, skirts */
     flight_picture *capturing; /* while in_capture */
     terrimp_rect *slots;                 /* [node_count][part] captured in this frame */
     uint32_t *slot_atlas;
@@ -113,6 +113,7 @@ typedef struct flight {
     uint32_t total_captures, total_impostors, total_ground, total_waiting, total_pieces;
     uint32_t total_fading, total_high, total_splits, most_captures, total_lost;
     uint32_t total_floor_beside; /* quads */
+    uint32_t skirt_triangles;    /* of this frame's screen */
 } flight;
 
 static void *flight_array(size_t count, size_t bytes)
@@ -180,6 +181,7 @@ static void flight_clear(flight *f)
     f->capture_count = f->begun_count = f->captured_cells = 0;
     f->captured_triangles = f->captured_texels = f->part_count = f->wanted_parts = 0;
     f->in_capture = f->screen_started = f->floor_drawn = f->stage = 0;
+    f->skirt_triangles = 0;
 }
 
 /* ---- what the callbacks check by themselves: captures ---- */
@@ -631,13 +633,11 @@ static void flight_draw_impostor(void *user, const terrimp_impostor_command *com
     f->total_high += command->level > 0;
 }
 
-/* Whether the eye is beside the terrain, and no other one goes on there. */
+/* Whether the eye is beside the terrain. */
 static int flight_beside(const flight *f)
 {
     const terrimp_box *box = &f->l->info.box;
     const float *eye = f->camera.eye;
-    if (f->desc.joined || f->apart)
-        return 0;
     return eye[0] < box->min[0] || eye[0] > box->max[0] || eye[2] < box->min[2] ||
            eye[2] > box->max[2];
 }
@@ -665,23 +665,35 @@ static void check_floor_is_behind_ground(const flight *f, const float place[3])
 }
 
 /* The floor comes once, after all else; or when the eye is beside the terrain parts of it, that are
-   nowhere seen below its borders. */
+   nowhere seen below its borders, and then skirts of ground. */
 static void flight_draw_floor(void *user, const terrimp_floor_command *command)
 {
     flight *f = (flight *)user;
     const land *l = f->l;
     uint32_t base = l->info.node_count * l->info.mesh_vertex_stride, i, k;
     uint32_t end = command->first_index + command->index_count;
+    uint32_t skirts = l->info.mesh_index_count - l->info.floor_index_count +
+                      terrimpi_floor_of(l->terrain).skirt_index;
     int beside = flight_beside(f) && !f->camera.orthographic;
+    int floor_beside = beside && !f->desc.joined && !f->apart;
     f->hash = hash_bytes(f->hash, command, sizeof *command);
-    CHECK(!f->in_capture && f->stage == (f->floor_drawn ? 2 : 1));
+    CHECK(!f->in_capture && command->base_vertex == base);
+    if (command->first_index >= skirts) {
+        CHECK(beside && end <= l->info.mesh_index_count);
+        f->stage = 3;
+        f->floor_drawn++;
+        f->triangles += command->index_count / 3u;
+        f->skirt_triangles += command->index_count / 3u;
+        return;
+    }
+    CHECK(f->stage == (f->floor_drawn ? 2 : 1));
     f->stage = 2;
     CHECK(f->impostor_count > 0);
-    CHECK(command->base_vertex == base);
     CHECK(command->first_index >= l->info.mesh_index_count - l->info.floor_index_count);
-    CHECK(end <= l->info.mesh_index_count);
-    CHECK(beside || (f->floor_drawn == 0 && command->index_count == l->info.floor_index_count));
-    for (i = command->first_index; beside && l->xyz && i < end; i += 3u) {
+    CHECK(end <= skirts);
+    CHECK(floor_beside || (f->floor_drawn == 0 &&
+                           command->index_count == terrimpi_floor_of(l->terrain).skirt_index));
+    for (i = command->first_index; floor_beside && l->xyz && i < end; i += 3u) {
         float place[3], share[3];
         for (k = 0; k < 3u; k++)
             share[k] = (float)((i / 3u + k * 5u) % 7u % 4u);
@@ -693,7 +705,7 @@ static void flight_draw_floor(void *user, const terrimp_floor_command *command)
         check_floor_is_behind_ground(f, place);
     }
     f->floor_drawn++;
-    f->total_floor_beside += beside ? command->index_count / 6u : 0u;
+    f->total_floor_beside += floor_beside ? command->index_count / 6u : 0u;
     f->triangles += command->index_count / 3u;
 }
 
@@ -2281,7 +2293,7 @@ static void geomip_draws_the_selection(void)
             flight_render(f);
             CHECK(terrimp_geomip_select(&tree, &view, camera) == TERRIMP_OK);
             CHECK(f->item_count == view.draw_count);
-            CHECK(f->stats.triangles == view.triangle_count);
+            CHECK(f->stats.triangles == view.triangle_count + f->skirt_triangles);
             for (i = 0; i < f->item_count && i < view.draw_count; i++) {
                 const terrimp_ground_command *c = &f->items[i].ground;
                 terrimp_pattern pattern;
@@ -2833,10 +2845,180 @@ static void the_floor_is_seen_from_beside_behind_ground_alone(void)
             quads += high ? f->total_floor_beside : 0u;
             f->total_floor_beside = 0;
         }
-        CHECK(high_frames > 10 && quads * 6u > high_frames * l.info.floor_index_count / 2u);
+        CHECK(high_frames > 10);
+        CHECK(12u * quads > high_frames * terrimpi_floor_of(l.terrain).skirt_index);
         flight_close(f);
         land_free(&l);
     }
+}
+
+static float land_border_sample(const land *l, int side, uint32_t along, uint32_t across)
+{
+    return terrimpi_field_sample(&l->desc.field, side < 2 ? along : across,
+                                 side < 2 ? across : along);
+}
+
+/* What is drawn of the border of ground, and of its skirts. */
+typedef struct border_frame {
+    const land *l;
+    terrimp_ground_command ground[2048];
+    uint32_t skirts[4096]; /* first indices of triangles */
+    uint32_t ground_count, skirt_count;
+} border_frame;
+
+static void border_frame_ground(void *user, const terrimp_ground_command *command)
+{
+    border_frame *b = (border_frame *)user;
+    b->ground[b->ground_count++ % 2048u] = *command;
+}
+
+static void border_frame_skirts(void *user, const terrimp_floor_command *command)
+{
+    border_frame *b = (border_frame *)user;
+    uint32_t i;
+    for (i = 0; i < command->index_count; i += 3u)
+        b->skirts[b->skirt_count++ % 4096u] = command->first_index + i;
+}
+
+/* How many of the skirts' triangles a ray along an axis, from outside of a side, meets from their
+   front: at sample `along` of the outer border, `height` up. */
+static uint32_t border_frame_meets(const border_frame *b, int side, uint32_t along, float height)
+{
+    const land *l = b->l;
+    const float *xyz = l->xyz + 3u * l->info.node_count * l->info.mesh_vertex_stride;
+    int axis = side < 2 ? 0 : 2, k;
+    float border = side & 1 ? l->info.box.max[2 - axis] : l->info.box.min[2 - axis];
+    float place = axis ? l->desc.field.origin_z + l->desc.field.spacing_z * (float)along
+                       : l->desc.field.origin_x + l->desc.field.spacing_x * (float)along;
+    double front = (side < 2) == (side & 1) ? 1.0 : -1.0;
+    uint32_t i, met = 0;
+    for (i = 0; i < b->skirt_count; i++) {
+        double p[3][2], area[3];
+        for (k = 0; k < 3; k++) {
+            const float *corner = xyz + 3u * l->indices[b->skirts[i] + (uint32_t)k];
+            if (fabsf(corner[2 - axis] - border) > 1e-3f)
+                break;
+            p[k][0] = front * ((double)corner[axis] - (double)place);
+            p[k][1] = (double)corner[1] - (double)height;
+        }
+        if (k < 3)
+            continue;
+        for (k = 0; k < 3; k++)
+            area[k] = p[k][0] * p[(k + 1) % 3][1] - p[(k + 1) % 3][0] * p[k][1];
+        met += area[0] >= 0.0 && area[1] >= 0.0 && area[2] >= 0.0 &&
+               area[0] + area[1] + area[2] > 0.0;
+    }
+    return met;
+}
+
+/* Whether an eye is over ground of this level behind a segment of an outer border. */
+static int border_seen_from(const land *l, int side, uint32_t from, uint32_t to, uint32_t step,
+                            const terrimp_camera *camera)
+{
+    const terrimp_heightfield *f = &l->desc.field;
+    uint32_t end = (side < 2 ? f->depth : f->width) - 1u, k;
+    double p[4][3], up[3], eye[3];
+    for (k = 0; k < 4u; k++) {
+        uint32_t along = k & 1u ? to : from, across = k < 2u ? 0u : step < end ? step : end;
+        across = side & 1 ? end - across : across;
+        p[k][0] = (double)f->origin_x + (double)f->spacing_x * (side < 2 ? along : across);
+        p[k][2] = (double)f->origin_z + (double)f->spacing_z * (side < 2 ? across : along);
+        p[k][1] = (double)land_border_sample(l, side, along, across);
+    }
+    for (k = 0; k < 3u; k++)
+        eye[k] = (double)camera->eye[k] - p[0][k];
+    for (k = 2; k < 4u; k++) {
+        double a[3], b[3];
+        int c;
+        for (c = 0; c < 3; c++) {
+            a[c] = p[1][c] - p[0][c];
+            b[c] = p[k][c] - p[k & 1u][c];
+        }
+        for (c = 0; c < 3; c++)
+            up[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+        if ((eye[0] * up[0] + eye[1] * up[1] + eye[2] * up[2]) * up[1] > 1e-3 * up[1] * up[1])
+            return 1;
+    }
+    return 0;
+}
+
+/* Eyes beside the terrain: wherever coarse ground at an outer border lies over a sample, and the
+   eye is over it, a skirt stands between the two; and nowhere else. */
+static void skirts_close_the_borders_of_coarse_ground(void)
+{
+    static border_frame b;
+    int round, frame, k;
+    uint32_t looked = 0, seen = 0, drawn = 0, i, s;
+    for (round = 0; round < 4; round++) {
+        static land l;
+        terrimp_view_desc d;
+        terrimp_view *view;
+        terrimp_callbacks draw;
+        land_prepare(&l, random_range(70, 150), random_range(70, 150), TERRIMP_FORMAT_F32,
+                     round % 2 ? LAND_NOISE : LAND_HILLS);
+        l.desc.chunk_quads = 8u << random_range(0, 1);
+        l.desc.field.height_scale = random_float(0.05f, 0.3f);
+        memset(&d, 0, sizeof d);
+        d.mode = TERRIMP_MODE_GEOMIP;
+        d.tolerance_px = random_float(2.0f, 16.0f);
+        if (!land_build(&l) || terrimp_view_create(l.terrain, &d, NULL, &view) != TERRIMP_OK)
+            return;
+        memset(&draw, 0, sizeof draw);
+        draw.user = &b;
+        draw.draw_ground = border_frame_ground;
+        draw.draw_floor = border_frame_skirts;
+        for (frame = 0; frame < 40; frame++) {
+            const terrimp_box *box = &l.info.box;
+            terrimp_camera camera = camera_beside(&l);
+            int side = (int)random_range(0, 3), axis = side < 2 ? 2 : 0;
+            float wide = box->max[axis] - box->min[axis];
+            for (k = 0; k < 3; k++)
+                camera.eye[k] = random_float(box->min[k], box->max[k]);
+            camera.eye[axis] = side & 1 ? box->max[axis] + random_float(0.01f, 3.0f) * wide
+                                        : box->min[axis] - random_float(0.01f, 3.0f) * wide;
+            for (k = 0; k < 3; k++)
+                camera.forward[k] = 0.5f * (box->min[k] + box->max[k]) - camera.eye[k];
+            b.l = &l;
+            b.ground_count = b.skirt_count = 0;
+            CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_render(view, &draw) == TERRIMP_OK);
+            CHECK(b.ground_count <= 2048u && b.skirt_count <= 4096u);
+            drawn += b.skirt_count / 2u;
+            for (i = 0; i < b.ground_count; i++) {
+                const terrimp_ground_command *c = &b.ground[i];
+                uint32_t last = (side < 2 ? l.desc.field.width : l.desc.field.depth) - 1u;
+                uint32_t across = (side < 2 ? l.desc.field.depth : l.desc.field.width) - 1u;
+                uint32_t n = side < 2 ? c->x : c->z, row = side < 2 ? c->z : c->x;
+                uint32_t quads = l.desc.chunk_quads << c->level, step = 1u << c->level, to, gap;
+                uint32_t end = (n + 1u) * quads < last ? (n + 1u) * quads : last;
+                if (side & 1 ? (row + 1u) * quads < across : row > 0u)
+                    continue;
+                across = side & 1 ? across : 0u;
+                for (s = n * quads, gap = 8; s < end && c->level > 0; s += step) {
+                    to = s + step < last ? s + step : last;
+                    gap = border_seen_from(&l, side, s, to, step, &camera) ? 0u : gap + 1u;
+                    seen += gap < 8u;
+                }
+                for (s = n * quads; s <= end; s++) {
+                    uint32_t from = s / step * step;
+                    float a = land_border_sample(&l, side, from, across);
+                    float at = land_border_sample(&l, side, s, across), chord;
+                    to = from + step < last ? from + step : last;
+                    chord = a + (land_border_sample(&l, side, to, across) - a) *
+                            (float)(s - from) / (float)(to > from ? to - from : 1u);
+                    if (chord - at < 1e-4f || !border_seen_from(&l, side, from, to, step, &camera))
+                        continue;
+                    looked++;
+                    CHECK(border_frame_meets(&b, side, s,
+                                             at + random_float(0.01f, 0.99f) * (chord - at)));
+                }
+            }
+        }
+        terrimp_view_destroy(view);
+        land_free(&l);
+    }
+    CHECK(looked > 500u);
+    CHECK(drawn <= seen + seen / 100u && drawn >= seen - seen / 100u);
 }
 
 static inline void view_tests(void)
@@ -2855,6 +3037,7 @@ static inline void view_tests(void)
     RUN(flights_of_any_camera_keep_every_law);
     RUN(an_orthographic_camera_that_only_moves_captures_nothing);
     RUN(the_floor_is_seen_from_beside_behind_ground_alone);
+    RUN(skirts_close_the_borders_of_coarse_ground);
     RUN(a_resting_eye_captures_nothing);
     RUN(nothing_waits_after_some_frames_of_rest);
     RUN(touch_forgets_what_shows_the_samples_and_little_else);
