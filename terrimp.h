@@ -10017,6 +10017,8 @@ static void terrimpi_capture_emit(const terrimp_terrain *t, const terrimpi_captu
 #define TERRIMPI_VIEW_STAY 1.15f      /* how much closer an impostor comes before it is split */
 #define TERRIMPI_VIEW_SEEN 0.4f       /* of the pixels of a picture, that the screen shows */
 #define TERRIMPI_VIEW_BORDER 2.6f     /* triangles for a quad of a picture, border included */
+#define TERRIMPI_VIEW_SHORT 30.0f     /* [frames] a picture that lasts for less has to be far
+                                         cheaper than ground, if pages have to come for it */
 #define TERRIMPI_VIEW_SPREAD 1.5f     /* captures of a frame over those of the mean frame */
 #define TERRIMPI_VIEW_HYSTERESIS 0.1f /* of ground levels */
 #define TERRIMPI_VIEW_COARSEST 1000.0f /* [px] ground tolerance when max_ground is short, */
@@ -11729,11 +11731,12 @@ static int terrimpi_view_impostor_estimate(const terrimpi_frame *f, const terrim
 {
     const terrimp_costs *costs = &f->desc->costs;
     const terrimpi_candidate *c = region->candidates;
+    float wait = terrimpi_length(f->motion.away[0]) > 0.0f ? TERRIMPI_VIEW_SHORT : 0.0f;
     uint32_t i;
     offer->draw = offer->upkeep = 0.0f;
     for (i = 0; i < region->candidate_count && region->fits; i++, c++) {
         offer->draw += c->draw_cost;
-        offer->upkeep += c->capture_cost / c->life;
+        offer->upkeep += c->capture_cost / c->life * (c->is_short ? 1.0f + wait / c->life : 1.0f);
     }
     offer->draw += terrimpi_cost_shading(region->pixels, costs->impostor_px, costs->ground_px);
     return region->fits;
