@@ -1606,10 +1606,49 @@ static void pictures_stand_for_pages_on_the_way(void)
     CHECK(drawn > 0);
 }
 
+/* What a picture costs that pages are missing for: while the eye moves several times as much as
+   with them, when it is past in a few frames, and hardly more when the picture lasts. An eye at
+   rest sees what memory shows, so there the cost is the same. */
+static void pages_are_not_worth_fleeting_pictures(void)
+{
+    uint32_t turn;
+    for (turn = 0; turn < 8u; turn++) {
+        static const float lives[] = {6.0f, 500.0f};
+        int moves = turn & 1u, lasts = turn >> 1 & 1u;
+        terrimp_view_desc desc;
+        terrimpi_frame f;
+        terrimpi_candidate c;
+        terrimpi_region region;
+        terrimpi_region_offer whole, short_of;
+        memset(&desc, 0, sizeof desc);
+        memset(&f, 0, sizeof f);
+        memset(&c, 0, sizeof c);
+        memset(&region, 0, sizeof region);
+        f.desc = &desc;
+        f.motion.away[0][turn >> 2 ? 0 : 2] = moves ? -300.0f : 0.0f;
+        c.capture_cost = random_float(1e3f, 1e5f);
+        c.draw_cost = 168.0f;
+        c.life = lives[lasts];
+        region.candidates = &c;
+        region.candidate_count = region.fits = 1;
+        CHECK(terrimpi_view_impostor_estimate(&f, &region, &whole));
+        c.is_short = 1;
+        CHECK(terrimpi_view_impostor_estimate(&f, &region, &short_of));
+        CHECK(short_of.draw == whole.draw);
+        if (!moves)
+            CHECK(short_of.upkeep == whole.upkeep);
+        else if (lasts)
+            CHECK(short_of.upkeep < 1.1f * whole.upkeep);
+        else
+            CHECK(short_of.upkeep > 4.0f * whole.upkeep);
+    }
+}
+
 static inline void pages_tests(void)
 {
     RUN(bad_pages);
     RUN(pages_that_are_no_good_are_refused);
+    RUN(pages_are_not_worth_fleeting_pictures);
 }
 
 /* What flies: of the program flights.c. */
