@@ -11032,6 +11032,14 @@ typedef struct terrimpi_jobs {
     uint32_t open;       /* 1 + the job of which pieces are missing */
 } terrimpi_jobs;
 
+/* What captures are prepared with, in the place of the nodes in sight: by then these are not needed
+   any more. */
+typedef struct terrimpi_view_room {
+    terrimpi_capture_draw *draws; /* of one capture */
+    float *xyz;                   /* [vertex_stride][3] of one mesh */
+    uint16_t *indices;            /* [index_stride] */
+} terrimpi_view_room;
+
 struct terrimp_view {
     const terrimp_terrain *terrain, *built; /* what is drawn, and the host's: the same unless that
                                                wraps */
@@ -11041,9 +11049,7 @@ struct terrimp_view {
     terrimpi_regions regions;
     terrimpi_jobs jobs;
     terrimpi_view_draws draws;
-    terrimpi_capture_draw *capture_draws; /* of one capture */
-    float *mesh_xyz;               /* [vertex_stride][3] of one mesh */
-    uint16_t *mesh_indices;        /* [index_stride] */
+    terrimpi_view_room room;
     uint32_t late;                 /* nodes and pictures that pages are missing for */
     uint8_t outdated;              /* what this frame would draw has been forgotten */
     uint8_t capturing, lost;       /* captures are being made; one of them could not be */
@@ -11073,15 +11079,12 @@ static terrimp_live_atlas_desc terrimpi_view_atlas_desc(const terrimp_view_desc 
     return atlas;
 }
 
-/* What captures are prepared with, in the place of the nodes in sight: by then these are not needed
-   any more. */
-static void terrimpi_view_layout_captures(terrimp_view *v, terrimpi_arena *l)
+static void terrimpi_view_room_layout(terrimpi_view_room *r, const terrimp_terrain *t,
+                                      terrimpi_arena *l)
 {
-    v->capture_draws = (terrimpi_capture_draw *)terrimpi_take(l, TERRIMPI_CAPTURE_DRAWS,
-                                                              sizeof *v->capture_draws);
-    v->mesh_xyz = (float *)terrimpi_take(l, v->terrain->vertex_stride, 3u * sizeof *v->mesh_xyz);
-    v->mesh_indices = (uint16_t *)terrimpi_take(l, v->terrain->index_stride,
-                                                sizeof *v->mesh_indices);
+    r->draws = (terrimpi_capture_draw *)terrimpi_take(l, TERRIMPI_CAPTURE_DRAWS, sizeof *r->draws);
+    r->xyz = (float *)terrimpi_take(l, t->vertex_stride, 3u * sizeof *r->xyz);
+    r->indices = (uint16_t *)terrimpi_take(l, t->index_stride, sizeof *r->indices);
 }
 
 /* The one description of a view's block; as terrimpi_terrain_layout. */
@@ -11119,12 +11122,12 @@ static size_t terrimpi_view_layout(terrimp_view *v, unsigned char *base)
     v->ground.draws = (terrimp_geomip_draw *)terrimpi_take(&l, ground, sizeof *v->ground.draws);
     v->cull.capacity = (uint32_t)terrimpi_cull_capacity(&v->terrain->tree, ground + impostors);
     captures = terrimpi_arena_at(NULL);
-    terrimpi_view_layout_captures(v, &captures);
+    terrimpi_view_room_layout(&v->room, v->terrain, &captures);
     scratch = v->cull.capacity * sizeof *v->cull.nodes;
     scratch = captures.bytes > scratch ? captures.bytes : scratch;
     v->cull.nodes = (terrimpi_cull_node *)terrimpi_take(&l, scratch, 1);
     captures = terrimpi_arena_at((unsigned char *)v->cull.nodes);
-    terrimpi_view_layout_captures(v, &captures);
+    terrimpi_view_room_layout(&v->room, v->terrain, &captures);
     v->kind_of = (uint8_t *)terrimpi_take(&l, nodes, sizeof *v->kind_of);
     r->items = (terrimpi_region *)terrimpi_take(&l, ground + 1u, sizeof *r->items);
     r->candidates = (terrimpi_candidate *)terrimpi_take(&l, impostors, sizeof *r->candidates);
@@ -11348,27 +11351,39 @@ static uint32_t terrimpi_tiled_before(const terrimp_terrain *t, const terrimp_no
     return terrimpi_tree_at(tree, n->level, was_x, was_z).number;
 }
 
-static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
+/* Takes a camera into the tile in the middle, and what is known of nodes by as many tiles as it has
+   gone since the frame before, by the shorter way. Of the step of the eye what is left are world
+   units without tiles. */
+static void terrimpi_tiled_enter(terrimp_view *v, terrimp_camera *camera, float middle[2])
 {
     const terrimp_terrain *t = v->terrain;
-    uint32_t count = t->tree.node_count, k;
-    int up = z > 0 || (z == 0 && x > 0);
+    uint32_t count = t->tree.node_count, i;
     terrimpi_cache_picture *p;
+    int32_t went[2];
     float way[2];
-    way[0] = (float)x * terrimpi_field_period(&t->desc.field, 0);
-    way[1] = (float)z * terrimpi_field_period(&t->desc.field, 1);
-    v->frame.camera.eye[0] -= way[0];
-    v->frame.camera.eye[2] -= way[1];
-    v->frame.eye[0] -= way[0];
-    v->frame.eye[2] -= way[1];
+    int k, up;
+    for (k = 0; k < 2; k++) {
+        float period = terrimpi_field_period(&t->desc.field, k), step;
+        middle[k] = period * terrimpi_field_wrap(&t->desc.field, k, &camera->eye[2 * k]);
+        step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
+        went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
+        way[k] = (float)went[k] * period;
+    }
+    if (!went[0] && !went[1])
+        return;
+    up = went[1] > 0 || (went[1] == 0 && went[0] > 0);
+    for (k = 0; k < 2; k++) {
+        v->frame.camera.eye[2 * k] -= way[k];
+        v->frame.eye[2 * k] -= way[k];
+    }
     v->outdated = 1; /* its draws are of nodes that are elsewhere now */
     terrimpi_jobs_cancel(&v->cache, &v->jobs);
     if (v->jobs.open)
         terrimpi_job_cancel(&v->cache, &v->jobs.items[0]);
     v->jobs.open = 0;
-    for (k = 0; k < count; k++) { /* from which they come is later in this direction */
-        terrimp_node n = terrimpi_tree_node(&t->tree, up ? k : count - 1u - k);
-        uint32_t was = terrimpi_tiled_before(t, &n, x, z);
+    for (i = 0; i < count; i++) { /* from which they come is later in this direction */
+        terrimp_node n = terrimpi_tree_node(&t->tree, up ? i : count - 1u - i);
+        uint32_t was = terrimpi_tiled_before(t, &n, went[0], went[1]);
         int is = was < count;
         v->kind_of[n.number] = is ? v->kind_of[was] : (unsigned char)TERRIMPI_VIEW_KIND_GROUND;
         v->ground.marks[n.number].measure = is ? v->ground.marks[was].measure : 0.0f;
@@ -11379,7 +11394,7 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
             v->cache.of_node[p->node.number] = TERRIMPI_CACHE_NO_PICTURE;
     for (p = v->cache.pictures; p < v->cache.pictures + v->cache.capacity; p++) {
         terrimp_node n = p->node;
-        uint32_t now = p->seen ? terrimpi_tiled_before(t, &n, -x, -z) : count;
+        uint32_t now = p->seen ? terrimpi_tiled_before(t, &n, -went[0], -went[1]) : count;
         if (!p->seen)
             continue;
         if (now == count) {
@@ -11389,28 +11404,10 @@ static void terrimpi_tiled_move(terrimp_view *v, int32_t x, int32_t z)
             continue;
         }
         p->node = terrimpi_tree_node(&t->tree, now);
-        p->eye[0] -= way[0];
-        p->eye[2] -= way[1];
+        for (k = 0; k < 2; k++)
+            p->eye[2 * k] -= way[k];
         v->cache.of_node[now] = (uint16_t)(p - v->cache.pictures);
     }
-}
-
-/* Takes a camera into the tile in the middle, and what is known of nodes by as many tiles as it has
-   gone since the frame before, by the shorter way. Of the step of the eye what is left are world
-   units without tiles. */
-static void terrimpi_tiled_enter(terrimp_view *v, terrimp_camera *camera, float middle[2])
-{
-    const terrimp_heightfield *field = &v->terrain->desc.field;
-    int32_t went[2];
-    int k;
-    for (k = 0; k < 2; k++) {
-        float period = terrimpi_field_period(field, k), step;
-        middle[k] = period * terrimpi_field_wrap(field, k, &camera->eye[2 * k]);
-        step = (v->frame.camera.eye[2 * k] - camera->eye[2 * k]) / period;
-        went[k] = v->frame.number == 0 ? 0 : step > 0.5f ? 1 : step < -0.5f ? -1 : 0;
-    }
-    if (went[0] || went[1])
-        terrimpi_tiled_move(v, went[0], went[1]);
 }
 
 TERRIMP_API const terrimp_endless *terrimp_view_endless(void)
@@ -12295,8 +12292,8 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
         terrimpi_view_along(f, plan->eye, forward);
     }
     terrimpi_mesh_place(f->terrain, c->node.number, &mesh);
-    terrimpi_mesh_write(f->terrain, c->node.number, v->mesh_xyz, v->mesh_indices);
-    if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->mesh_xyz,
+    terrimpi_mesh_write(f->terrain, c->node.number, v->room.xyz, v->room.indices);
+    if (!terrimpi_capture_aim(&plan->box, origin, parallel ? forward : NULL, v->room.xyz,
                               mesh.vertex_count, f->side_px * f->density, largest,
                               &plan->camera, size) ||
         !terrimpi_view_has_slot(f, &plan->camera))
@@ -12304,21 +12301,21 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     distance = terrimp_box_distance(&plan->box, plan->eye);
     plan->source = terrimpi_view_source(f, &c->node, distance, &is_known);
     plan->border = terrimpi_capture_border(f->terrain, plan, size, texels);
-    count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
-    if (!terrimpi_capture_has_pages(&v->terrain->tree, v->capture_draws, count, c->urgency,
+    count = terrimpi_capture_list(f->terrain, plan, v->room.draws);
+    if (!terrimpi_capture_has_pages(&v->terrain->tree, v->room.draws, count, c->urgency,
                                     &v->late) || room == 0)
         return 0;
     if (!job->picture)
         job->picture = terrimpi_cache_take(&v->cache, &c->node);
     if (!job->picture)
         return 0;
-    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, count);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->room.draws, count);
     job->cost = terrimpi_cost_capture(costs, (float)size[0] * (float)size[1],
                                       (float)job->triangles);
     room = terrimpi_spending_room(f, room, job);
     job->in_pieces = f->desc->max_capture_triangles || (job->triangles > room && !v->jobs.open);
     if (!job->in_pieces && job->triangles <= room / 2u &&
-        terrimpi_view_split(f, plan, c->closest, v->mesh_xyz, v->mesh_indices, &split))
+        terrimpi_view_split(f, plan, c->closest, v->room.xyz, v->room.indices, &split))
         plan->layer_count = TERRIMPI_CAPTURE_LAYERS;
     if (!terrimpi_job_slots(&v->cache, size, job)) {
         job->picture->refused = f->number;
@@ -12329,9 +12326,9 @@ static int terrimpi_job_prepare(terrimp_view *v, const terrimpi_candidate *c, ui
     terrimpi_capture_spread(f->terrain, plan, size, texels);
     if (plan->layer_count > 1u)
         terrimpi_capture_divide(f->terrain, plan, split);
-    count = terrimpi_capture_list(f->terrain, plan, v->capture_draws);
+    count = terrimpi_capture_list(f->terrain, plan, v->room.draws);
     job->to = job->end = count * terrimpi_capture_rows(f->terrain);
-    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->capture_draws, count);
+    job->triangles = terrimpi_capture_triangles(f->terrain, plan, v->room.draws, count);
     job->sharpness = terrimpi_view_sharpness(f, distance);
     memcpy(job->light, f->light, sizeof job->light);
     job->cost = costs->triangle * (float)job->triangles;
@@ -12349,7 +12346,7 @@ static uint32_t terrimpi_job_cut(const terrimp_view *v, uint32_t triangles, terr
 {
     uint32_t rows = terrimpi_capture_rows(v->terrain), used = 0;
     for (job->to = job->from; job->to < job->end;) {
-        const terrimpi_capture_draw *draw = &v->capture_draws[job->to / rows];
+        const terrimpi_capture_draw *draw = &v->room.draws[job->to / rows];
         uint32_t count = rows - job->to % rows;
         if (used + draw->triangle_count * count / rows > triangles) {
             if (v->desc.max_cost > 0.0f && job->plan.limit && draw->first_index == 0)
@@ -12494,9 +12491,9 @@ static void terrimpi_view_continue(terrimp_view *v, terrimpi_spending *s)
     float angle, parallax;
     uint32_t count, room;
     int has_pages;
-    count = terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    count = terrimpi_capture_list(v->terrain, &job->plan, v->room.draws);
     has_pages = terrimpi_tree_opens(&v->terrain->tree, job->plan.node.number) &&
-                terrimpi_capture_has_pages(&v->terrain->tree, v->capture_draws, count, 2.0f,
+                terrimpi_capture_has_pages(&v->terrain->tree, v->room.draws, count, 2.0f,
                                            &v->late);
     if (!has_pages ||
         terrimpi_view_error(&v->frame, &job->plan.node, job->plan.eye, &angle, &parallax) >=
@@ -12706,14 +12703,14 @@ static void terrimpi_view_capture(terrimp_view *v, terrimpi_job *job,
 {
     terrimp_capture_command command;
     uint32_t layer;
-    terrimpi_capture_list(v->terrain, &job->plan, v->capture_draws);
+    terrimpi_capture_list(v->terrain, &job->plan, v->room.draws);
     for (layer = 0; layer < job->plan.layer_count; layer++) {
         memset(&command, 0, sizeof command);
         command.atlas = job->slots[layer].atlas;
         command.slot = terrimpi_cache_rect(&v->cache, &job->slots[layer]);
         command.clear = job->from == 0;
         command.complete = job->to == job->end;
-        terrimpi_capture_emit(v->terrain, &job->plan, v->capture_draws, job->from, job->to, layer,
+        terrimpi_capture_emit(v->terrain, &job->plan, v->room.draws, job->from, job->to, layer,
                               v->frame.middle, &command, v->frame.camera.depth_zero_to_one,
                               callbacks);
     }

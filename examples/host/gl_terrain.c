@@ -44,9 +44,9 @@ const char gl_morphing_vertex[] = VERTEX_HEAD
     "    return position.y + factor * (move.x + dot(move.yz, along));\n"
     "}\n" VERTEX_MAIN;
 
-/* Fragment shaders of terrain: this head, the text that shades, as in gl_terrain_desc, a main. */
+/* Fragment shaders of terrain: GL_SHADER_HEAD, this one, the text that shades, as in
+   gl_terrain_desc, a main. */
 #define FRAGMENT_HEAD               \
-    GL_SHADER_HEAD                  \
     "uniform sampler2D lightmap;\n" \
     "uniform float on_screen;\n"    \
     "in vec2 uv;\n"                 \
@@ -94,7 +94,16 @@ static const char lit_main[] =
 static const char fragment_head[] = FRAGMENT_HEAD, lightmap_alone[] = LIGHTMAP_ALONE,
                   ground_main[] = GROUND_MAIN;
 
-const char gl_ground_fragment[] = FRAGMENT_HEAD LIGHTMAP_ALONE GROUND_MAIN;
+const char gl_ground_fragment[] = GL_SHADER_HEAD FRAGMENT_HEAD LIGHTMAP_ALONE GROUND_MAIN;
+
+/* Of impostors that write a depth. It is never nearer than the mesh's: where a GPU is told so, it
+   leaves out hidden pixels before they are shaded, as it does where none is written. */
+static const char exact_head[] =
+    "#ifdef GL_ARB_conservative_depth\n"
+    "#extension GL_ARB_conservative_depth : enable\n"
+    "layout(depth_greater) out float gl_FragDepth;\n"
+    "#endif\n"
+    "#define EXACT\n";
 
 static const char impostor_vertex[] = VERTEX_HEAD
     "uniform mat4 matrix, texture_matrix;\n"
@@ -200,17 +209,18 @@ gl_program gl_program_make(const char *vertex_source, const char *fragment_sourc
 
 /* A program that shades as the terrain does. */
 static gl_program make_shaded(const gl_terrain *g, const char *vertex_source,
-                              const char *main_source)
+                              const char *exact, const char *main_source)
 {
-    const char *parts[6];
+    const char *parts[7];
     gl_program p;
-    parts[0] = fragment_head;
-    parts[1] = g->shading;
-    parts[2] = g->normals ? lit_head : "";
-    parts[3] = g->exact_depth ? "#define EXACT\n" : "";
-    parts[4] = g->relit ? "#define RELIT\n" : "";
-    parts[5] = main_source;
-    p = make_program(vertex_source, parts, 6);
+    parts[0] = GL_SHADER_HEAD;
+    parts[1] = exact;
+    parts[2] = fragment_head;
+    parts[3] = g->shading;
+    parts[4] = g->normals ? lit_head : "";
+    parts[5] = g->relit ? "#define RELIT\n" : "";
+    parts[6] = main_source;
+    p = make_program(vertex_source, parts, 7);
     glUseProgram(p.id);
     glUniform1i(glGetUniformLocation(p.id, "atlas_depth"), GL_DEPTH_UNIT);
     glUniform1i(glGetUniformLocation(p.id, "normals"), GL_NORMAL_UNIT);
@@ -452,7 +462,8 @@ const char *gl_terrain_use_morphing(gl_terrain *g)
         return "no memory for the morph weights";
     terrimp_terrain_get_info(g->terrain, &info);
     terrimp_geomip_fill_weights(info.chunk_quads, weights);
-    g->morphing = make_shaded(g, gl_morphing_vertex, g->normals ? lit_main : ground_main);
+    g->morphing = make_shaded(g, gl_morphing_vertex, "",
+                              g->normals ? lit_main : ground_main);
     glGenVertexArrays(1, &g->morphing_array);
     glBindVertexArray(g->morphing_array);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, p->indices);
@@ -599,8 +610,14 @@ static const char *fill(gl_terrain *g, const gl_terrain_desc *desc,
     g->atlas_size = (GLsizei)desc->atlas_size;
     if (!make_atlas(g, 0))
         return "the atlas cannot be rendered to";
-    g->ground = make_shaded(g, gl_ground_vertex, g->normals ? lit_main : ground_main);
-    g->impostor = make_shaded(g, impostor_vertex, impostor_main);
+    g->ground = make_shaded(g, gl_ground_vertex, "", g->normals ? lit_main : ground_main);
+    g->impostor = make_shaded(g, impostor_vertex, "", impostor_main);
+    if (g->exact_depth) {
+        g->deep = make_shaded(g, impostor_vertex, exact_head, impostor_main);
+        g->sights = calloc((size_t)info.node_count * 2, sizeof *g->sights);
+        if (!g->deep.id || !g->sights)
+            return "no impostors with exact depth";
+    }
     g->line = gl_program_make(gl_ground_vertex, gl_line_fragment);
     if (!g->ground.id || !g->impostor.id || !g->line.id)
         return "a shader does not compile";
@@ -628,6 +645,10 @@ const char *gl_terrain_open(gl_terrain *g, const gl_terrain_desc *desc)
 
 void gl_terrain_close(gl_terrain *g)
 {
+    size_t i;
+    for (i = 0; g->sights && i < (size_t)g->mesh_pool.node_count * 2; i++)
+        glDeleteQueries(1, &g->sights[i].query);
+    free(g->sights);
     close_pool(&g->ground_pool);
     close_pool(&g->mesh_pool);
     close_lines(&g->ground_lines);
@@ -648,6 +669,7 @@ void gl_terrain_close(gl_terrain *g)
     free(g->morph);
     glDeleteProgram(g->ground.id);
     glDeleteProgram(g->impostor.id);
+    glDeleteProgram(g->deep.id);
     glDeleteProgram(g->line.id);
     memset(g, 0, sizeof *g);
 }
@@ -746,6 +768,8 @@ void gl_terrain_turn_to_frame(gl_terrain *g)
     gl_program_use(&g->line, g->camera_matrix, g->camera_eye, 1);
     if (g->morphing.id)
         gl_program_use(&g->morphing, g->camera_matrix, g->camera_eye, 1);
+    if (g->deep.id)
+        gl_program_use(&g->deep, g->camera_matrix, g->camera_eye, 1);
     gl_program_use(&g->impostor, g->camera_matrix, g->camera_eye, 1);
     gl_program_use(&g->ground, g->camera_matrix, g->camera_eye, 1);
 }
@@ -811,9 +835,33 @@ static void bind_to(GLenum unit, GLuint texture)
     glActiveTexture(GL_TEXTURE0);
 }
 
+/* Begins to ask whether a pixel of an impostor is seen, and says whether it is to have the depth of
+   the terrain: those that showed none in the frame before need not, and keep their early depth
+   test. An answer that is not there yet is waited for in later frames. */
+static int begin_sight(const gl_terrain *g, gl_sight *sight)
+{
+    GLuint there = 1, seen = 1;
+    if (!sight->query)
+        glGenQueries(1, &sight->query);
+    else
+        glGetQueryObjectuiv(sight->query, GL_QUERY_RESULT_AVAILABLE, &there);
+    if (there && sight->frame)
+        glGetQueryObjectuiv(sight->query, GL_QUERY_RESULT, &seen);
+    if (there)
+        sight->hidden = !seen;
+    if (g->frame_number - sight->frame > 1) /* it has not been drawn of late */
+        sight->hidden = 0;
+    sight->frame = g->frame_number;
+    sight->asked = there != 0;
+    if (there)
+        glBeginQuery(GL_ANY_SAMPLES_PASSED, sight->query);
+    return !sight->hidden;
+}
+
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     gl_terrain *g = (gl_terrain *)user;
+    gl_sight *sight = g->exact_depth ? &g->sights[c->node * 2 + c->part] : NULL;
     const gl_program *p = &g->impostor;
     uint32_t slot;
     gl_terrain_turn_to_frame(g);
@@ -823,10 +871,12 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         draw_mesh_over(g, c, slot);
         return;
     }
+    if (sight && begin_sight(g, sight))
+        p = &g->deep;
     glUseProgram(p->id);
     glUniform1f(p->alpha, c->alpha);
     glUniformMatrix4fv(p->texture_matrix, 1, GL_FALSE, c->texture_matrix);
-    if (g->exact_depth) {
+    if (p == &g->deep) {
         float matrix[16];
         multiply(g->camera_matrix, c->place_matrix, matrix);
         glUniformMatrix4fv(p->depth_matrix, 1, GL_FALSE, matrix);
@@ -838,6 +888,8 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
     glDisable(GL_CULL_FACE);
     draw_mesh(g, g->atlas[c->atlas], slot, 0, c->index_count);
     glEnable(GL_CULL_FACE);
+    if (sight && sight->asked)
+        glEndQuery(GL_ANY_SAMPLES_PASSED);
 }
 
 /* The floor only fills what would else be holes: its outlines would hide those that matter. */
@@ -947,6 +999,7 @@ void gl_terrain_light(gl_terrain *g, const float light[3][3])
     use_light(g, &g->ground);
     use_light(g, &g->morphing);
     use_light(g, &g->impostor);
+    use_light(g, &g->deep);
     bind_to(GL_NORMAL_UNIT, g->normals);
 }
 

@@ -84,6 +84,13 @@ typedef struct gl_pool {
     uint32_t *node_of, *used;        /* [slot_count] node, and frame that drew it last */
 } gl_pool;
 
+/* Whether an impostor showed when it was last drawn. */
+typedef struct gl_sight {
+    GLuint query;
+    uint32_t frame; /* that drew it last; 0: none has */
+    int hidden, asked;
+} gl_sight;
+
 enum { GL_ATLASES = 16 };
 
 /* What a terrain is drawn with. The lightmap lies over the whole terrain; its field is the
@@ -131,6 +138,8 @@ typedef struct gl_terrain {
     GLuint atlas_normals[GL_ATLASES]; /* of pictures that are lit when drawn */
     int exact_depth, relit;
     gl_program ground, morphing, impostor, line;
+    gl_program deep;                 /* impostors with exact depth; */
+    gl_sight *sights;                /* ... [node_count][2] of each part */
     float camera_matrix[16], camera_eye[3];
     float field[4];                  /* x, z scale and offset of the lightmap coordinates */
     gl_batch batch;

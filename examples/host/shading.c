@@ -204,6 +204,8 @@ void shading_begin(shading *s, const gl_terrain *g, float seconds)
     s->drift[1] = fmodf(seconds * CLOUD_SPEED * 0.6f, 1.0f);
     set_uniforms(s, &g->ground);
     set_uniforms(s, &g->impostor);
+    if (g->deep.id)
+        set_uniforms(s, &g->deep);
     if (g->morphing.id)
         set_uniforms(s, &g->morphing);
 }
