@@ -118,6 +118,28 @@ static const char impostor_vertex[] = VERTEX_HEAD
     "    gl_Position = matrix * vec4(position - eye, 1.0);\n"
     "}\n";
 
+/* Where the picture has depth: a ray through a proud mesh may pass over the terrain, where the
+   picture shows a slope far behind. Followed to that depth in the picture, by more than a texel, it
+   comes out where there is nothing, or beside the slot (a step of parallax mapping, Hess 6.4). The
+   cleared depth, 1, is taken out of what the filter has mixed at outlines as the black is of the
+   colours. */
+#define PASSING_MAIN                                                                          \
+    "#ifdef PASSING\n"                                                                        \
+    "uniform sampler2D atlas_depth;\n"                                                        \
+    "uniform vec4 ray; /* the eye in the picture, homogeneous */\n"                           \
+    "uniform vec4 picture_slot; /* least and greatest s, t */\n"                              \
+    "float depth_at(vec2 st, float a) {\n"                                                    \
+    "    return 1.0 - (1.0 - texture(atlas_depth, st).r) / a;\n"                              \
+    "}\n"                                                                                     \
+    "bool passes(vec2 st, float mesh, float d) {\n"                                           \
+    "    vec3 way = ray.xyz - vec3(st, mesh) * ray.w;\n"                                      \
+    "    vec2 move = way.xy * ((d - mesh) / way.z), there = st + move;\n"                     \
+    "    if (d <= mesh || length(move * vec2(textureSize(atlas, 0))) <= 1.0) return false;\n" \
+    "    return there != clamp(there, picture_slot.xy, picture_slot.zw)\n"                    \
+    "        || texture(atlas, there).a < 0.5;\n"                                             \
+    "}\n"                                                                                     \
+    "#endif\n"
+
 /* Colours in the atlas are multiplied by alpha, so that the filter does not mix in the black around
    them; the division brings them back. Of a picture in two parts each keeps to its own depths. With
    EXACT it has the depth of what it shows, which its capture left in the atlas; but where a slope
@@ -125,18 +147,22 @@ static const char impostor_vertex[] = VERTEX_HEAD
    slope, is behind the ridge, and nothing is nearer than the mesh. With RELIT it is lit as the
    ground is. */
 static const char impostor_main[] =
-    "uniform sampler2D atlas, atlas_depth, atlas_normals;\n"
+    "uniform sampler2D atlas, atlas_normals;\n"
     "uniform float alpha;\n"
     "uniform mat4 depth_matrix;\n"
-    "in vec4 strq;\n" GL_THRESHOLD
+    "in vec4 strq;\n" GL_THRESHOLD PASSING_MAIN
     "void main() {\n"
     "    if (alpha < 1.0 && threshold() >= alpha) discard;\n"
     "    vec2 st = strq.xy / strq.w;\n"
     "    vec4 c = texture(atlas, st);\n"
     "    if (c.a < 0.5 || strq.z < 0.0 || strq.z > strq.w) discard;\n"
+    "#ifdef PASSING\n"
+    "    float depth = depth_at(st, c.a);\n"
+    "    if (passes(st, strq.z / strq.w, depth)) discard;\n"
+    "#endif\n"
     "    c.rgb /= c.a;\n"
     "#ifdef EXACT\n"
-    "    vec4 at = depth_matrix * vec4(st, texture(atlas_depth, st).r, 1.0);\n"
+    "    vec4 at = depth_matrix * vec4(st, depth, 1.0);\n"
     "    gl_FragDepth = max(0.5 * at.z / at.w + 0.5, gl_FragCoord.z);\n"
     "#endif\n"
     "#ifdef RELIT\n"
@@ -193,6 +219,8 @@ static gl_program make_program(const char *vertex_source, const char *const *par
     p.side_coarse = glGetUniformLocation(p.id, "side_coarse");
     p.texture_matrix = glGetUniformLocation(p.id, "texture_matrix");
     p.depth_matrix = glGetUniformLocation(p.id, "depth_matrix");
+    p.ray = glGetUniformLocation(p.id, "ray");
+    p.picture_slot = glGetUniformLocation(p.id, "picture_slot");
     p.sun = glGetUniformLocation(p.id, "sun");
     p.sun_colour = glGetUniformLocation(p.id, "sun_colour");
     p.sky_colour = glGetUniformLocation(p.id, "sky_colour");
@@ -211,7 +239,7 @@ gl_program gl_program_make(const char *vertex_source, const char *fragment_sourc
 static gl_program make_shaded(const gl_terrain *g, const char *vertex_source,
                               const char *exact, const char *main_source)
 {
-    const char *parts[7];
+    const char *parts[8];
     gl_program p;
     parts[0] = GL_SHADER_HEAD;
     parts[1] = exact;
@@ -219,8 +247,9 @@ static gl_program make_shaded(const gl_terrain *g, const char *vertex_source,
     parts[3] = g->shading;
     parts[4] = g->normals ? lit_head : "";
     parts[5] = g->relit ? "#define RELIT\n" : "";
-    parts[6] = main_source;
-    p = make_program(vertex_source, parts, 7);
+    parts[6] = g->exact_depth && vertex_source == impostor_vertex ? "#define PASSING\n" : "";
+    parts[7] = main_source;
+    p = make_program(vertex_source, parts, 8);
     glUseProgram(p.id);
     glUniform1i(glGetUniformLocation(p.id, "atlas_depth"), GL_DEPTH_UNIT);
     glUniform1i(glGetUniformLocation(p.id, "normals"), GL_NORMAL_UNIT);
@@ -811,9 +840,10 @@ static void begin_capture(void *user, const terrimp_capture_command *command)
 static void end_capture(void *user, const terrimp_capture_command *command)
 {
     gl_terrain *g = (gl_terrain *)user;
-    (void)command;
     flush(g);
     g->capturing = 0;
+    if (g->exact_depth && command->complete)
+        g->sights[command->node * 2 + command->part].slot = command->slot;
 }
 
 /* Draws a slot of the coarse meshes; the program has its own uniforms already. */
@@ -858,6 +888,24 @@ static int begin_sight(const gl_terrain *g, gl_sight *sight)
     return !sight->hidden;
 }
 
+/* The depth of the picture, where it lies, and the eye as it would be there. */
+static void set_passing(const gl_terrain *g, const gl_program *p,
+                         const terrimp_impostor_command *c, const terrimp_rect *slot)
+{
+    const float *m = c->texture_matrix, texel = 1.0f / (float)g->atlas_size;
+    float to[3], ray[4];
+    int i;
+    for (i = 0; i < 3; i++)
+        to[i] = g->camera_eye[i] - c->eye[i];
+    for (i = 0; i < 4; i++)
+        ray[i] = m[i] * to[0] + m[4 + i] * to[1] + m[8 + i] * to[2] + m[12 + i];
+    glUniform4fv(p->ray, 1, ray);
+    glUniform4f(p->picture_slot, ((float)slot->x + 0.5f) * texel, ((float)slot->y + 0.5f) * texel,
+                ((float)(slot->x + slot->width) - 0.5f) * texel,
+                ((float)(slot->y + slot->height) - 0.5f) * texel);
+    bind_to(GL_DEPTH_UNIT, g->atlas_depths[c->atlas]);
+}
+
 static void draw_impostor(void *user, const terrimp_impostor_command *c)
 {
     gl_terrain *g = (gl_terrain *)user;
@@ -880,8 +928,9 @@ static void draw_impostor(void *user, const terrimp_impostor_command *c)
         float matrix[16];
         multiply(g->camera_matrix, c->place_matrix, matrix);
         glUniformMatrix4fv(p->depth_matrix, 1, GL_FALSE, matrix);
-        bind_to(GL_DEPTH_UNIT, g->atlas_depths[c->atlas]);
     }
+    if (sight)
+        set_passing(g, p, c, &sight->slot);
     if (g->relit)
         bind_to(GL_ATLAS_NORMAL_UNIT, g->atlas_normals[c->atlas]);
     glUniform3fv(p->picture_eye, 1, c->eye);

@@ -13,7 +13,7 @@ typedef struct gl_program {
     GLint alpha;                     /* impostors: the share of the pixels */
     GLint morph, side, side_coarse;  /* morphing ground */
     GLint texture_matrix, picture_eye; /* impostors */
-    GLint depth_matrix;              /* impostors with exact depth */
+    GLint depth_matrix, ray, picture_slot; /* impostors with exact depth */
     GLint sun, sun_colour, sky_colour; /* ground with normals */
     GLint tint;                      /* lines: blue for ground, red for coarse meshes */
     GLint on_screen;                 /* terrain: 0 in a capture, 1 on the screen */
@@ -84,11 +84,12 @@ typedef struct gl_pool {
     uint32_t *node_of, *used;        /* [slot_count] node, and frame that drew it last */
 } gl_pool;
 
-/* Whether an impostor showed when it was last drawn. */
+/* Where an impostor's picture lies, and whether it showed when it was last drawn. */
 typedef struct gl_sight {
     GLuint query;
     uint32_t frame; /* that drew it last; 0: none has */
     int hidden, asked;
+    terrimp_rect slot;
 } gl_sight;
 
 enum { GL_ATLASES = 16 };
