@@ -4620,7 +4620,7 @@ typedef struct terrimpi_page_need {
    which opens none has no code of it. */
 typedef struct terrimpi_page_calls {
     const unsigned char *(*record)(const terrimp_quadtree *t, uint32_t number);
-    int (*begin)(const terrimp_quadtree *t);
+    void (*begin)(const terrimp_quadtree *t);
     int (*want)(const terrimp_quadtree *t, uint32_t node, int reason, float urgency);
     int (*divides)(const terrimp_terrain *t, const terrimp_node *node,
                    const struct terrimpi_page_need *need);
@@ -9154,11 +9154,11 @@ static int terrimpi_page_want(const terrimp_quadtree *t, uint32_t node, int reas
     }
 }
 
-/* Begins a view's update; returns 0 when the root's page is not here: then there is none. */
-static int terrimpi_page_begin(const terrimp_quadtree *t)
+/* Begins a view's update, which has no frame without the root's page. */
+static void terrimpi_page_begin(const terrimp_quadtree *t)
 {
     t->pages->want_first = t->pages->want_count;
-    return terrimpi_page_want(t, t->node_count - 1u, TERRIMP_WANT_GROUND, 1e6f);
+    terrimpi_page_want(t, t->node_count - 1u, TERRIMP_WANT_GROUND, 1e6f);
 }
 
 /* The box of a node; of one that nothing is known of, its heights are those of the ground above. */
@@ -11638,6 +11638,8 @@ static terrimp_result terrimpi_view_cut(terrimp_view *v, const terrimpi_frame *f
         terrimpi_mip_mark(&mip, &f->terrain->tree, &v->ground, &f->camera, scale);
         if (pages)
             v->late = pages->calls->settle(f->terrain, &mip, f->desc->hider != NULL);
+        TERRIMPI_REFUSE(pages && !terrimpi_page_of(pages, f->terrain->tree.node_count - 1u),
+                        TERRIMP_E_PAGE); /* but what it needs beside the root's is wanted */
         if (terrimpi_cull_list(&v->cull, f, &v->cache, &mip))
             break;
         if (v->ground_scale >= most || mip.whole < 0.0f)
@@ -12646,7 +12648,8 @@ TERRIMP_API terrimp_result terrimp_view_update(terrimp_view *view, const terrimp
     frame = terrimpi_frame_next(&view->frame, &resolved);
     memcpy(frame.middle, middle, sizeof middle);
     pages = view->terrain->tree.pages;
-    TERRIMPI_REFUSE(pages && !pages->calls->begin(&view->terrain->tree), TERRIMP_E_PAGE);
+    if (pages)
+        pages->calls->begin(&view->terrain->tree);
     TERRIMPI_TRY(terrimpi_view_fit(view, &frame, &sums));
     view->cache.frame = frame.number;
     view->outdated = 0;

@@ -141,7 +141,8 @@ static terrimp_result painter_draw(painter *p, terrimp_camera camera)
     terrimp_result result = terrimp_view_update(p->view, &camera);
     if (result != TERRIMP_OK || terrimp_view_get_stats(p->view, &stats) != TERRIMP_OK)
         return result;
-    camera.z_near = camera.z_near < stats.z_near ? stats.z_near : camera.z_near;
+    if (camera.z_near < stats.z_near) /* of views whose bounds differ a little: still the same */
+        camera.z_near = exp2f(floorf(log2f(stats.z_near)));
     memcpy(p->eye, camera.eye, sizeof p->eye);
     terrimp_camera_matrices(&camera, p->view_matrix, p->projection);
     draw.user = p;

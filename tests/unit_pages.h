@@ -1379,9 +1379,9 @@ static uint32_t paged_check_reads(const paged_land *p, const terrimp_camera *cam
     return used;
 }
 
-/* A far jump: what the eye needs is asked for at once and not one level after the other, so all of
-   it is here after half as many rounds, and one for each list that is full; and of all jumps
-   together little else has come. */
+/* A far jump, and a start with nothing here, not even the root: what the eye needs is asked for at
+   once and not one level after the other, so all of it is here after half as many rounds, and one
+   for each list that is full; and of all jumps together little else has come. */
 static void pages_of_a_jump_come_at_once(void)
 {
     paged_land *p = paged_wide();
@@ -1399,12 +1399,11 @@ static void pages_of_a_jump_come_at_once(void)
         }
         free(p->memory);
         paged_open(p, PAGED_ALL);
-        CHECK(paged_fetch(p, p->l.info.node_count - 1u) == TERRIMP_OK);
         view = paged_view(p->opened, mode, 0.0f, NULL);
         while (count > 0 && rounds < 20u) {
             const struct terrimp_pages *pages = p->opened->tree.pages;
             CHECK(terrimp_pages_next_frame(p->opened) == TERRIMP_OK);
-            CHECK(terrimp_view_update(view, &camera) == TERRIMP_OK);
+            CHECK(terrimp_view_update(view, &camera) == (rounds ? TERRIMP_OK : TERRIMP_E_PAGE));
             for (i = 0; i < p->l.info.node_count; i++) {
                 const terrimpi_page_slot *slot = terrimpi_page_slot_of(pages, i);
                 needed[i] = (needed[i] && mode == TERRIMP_MODE_AUTO) ||
