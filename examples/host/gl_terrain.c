@@ -890,7 +890,7 @@ static int begin_sight(const gl_terrain *g, gl_sight *sight)
 
 /* The depth of the picture, where it lies, and the eye as it would be there. */
 static void set_passing(const gl_terrain *g, const gl_program *p,
-                         const terrimp_impostor_command *c, const terrimp_rect *slot)
+                        const terrimp_impostor_command *c, const terrimp_rect *slot)
 {
     const float *m = c->texture_matrix, texel = 1.0f / (float)g->atlas_size;
     float to[3], ray[4];
